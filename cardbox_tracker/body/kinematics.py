@@ -1,0 +1,136 @@
+"""Forward kinematics of the upper body (paper, section II-A; frames as in ``docs/conventions.md``).
+
+The torso turns about the middle of the hips with Rz(yaw) Ry(pitch) Rx(roll). A limb hangs along -Z
+of its frame; a positive abduction (about X) raises either arm outwards, a positive flexion (about Y
+of the turned frame) forwards:
+
+    R_upper_arm = R_torso Rx(+-abduction) Ry(-flexion),   R_forearm = R_upper_arm Rx(..) Ry(..)
+
+with + for the left arm and - for the right.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.body.sizes import FloatArray
+
+KEYPOINT_NAMES: tuple[str, ...] = (
+    "left_shoulder",
+    "left_elbow",
+    "left_hand",
+    "right_shoulder",
+    "right_elbow",
+    "right_hand",
+)
+
+
+class Arm(NamedTuple):
+    """One arm in the reference frame: joints (..., 3) in metres and rotations (..., 3, 3)."""
+
+    shoulder: FloatArray
+    elbow: FloatArray
+    hand: FloatArray
+    upper_arm_rotation: FloatArray
+    forearm_rotation: FloatArray
+
+
+class BodyFrames(NamedTuple):
+    """Where every part is, in the reference frame.
+
+    ``hip`` (mid-hip), ``neck`` (middle of the torso's top) and ``head`` (its centre) have shape
+    (..., 3), metres; ``torso_rotation`` has shape (..., 3, 3).
+    """
+
+    torso_rotation: FloatArray
+    hip: FloatArray
+    neck: FloatArray
+    head: FloatArray
+    left: Arm
+    right: Arm
+
+
+def rotation_x(angle_rad: FloatArray) -> FloatArray:
+    """Rotation matrices (..., 3, 3) about X by ``angle_rad`` (...)."""
+    return _rotation(angle_rad, 1, 2)
+
+
+def rotation_y(angle_rad: FloatArray) -> FloatArray:
+    """Rotation matrices (..., 3, 3) about Y by ``angle_rad`` (...)."""
+    return _rotation(angle_rad, 2, 0)
+
+
+def rotation_z(angle_rad: FloatArray) -> FloatArray:
+    """Rotation matrices (..., 3, 3) about Z by ``angle_rad`` (...)."""
+    return _rotation(angle_rad, 0, 1)
+
+
+def _rotation(angle_rad: FloatArray, i: int, j: int) -> FloatArray:
+    """Rotation in the plane of axes ``i`` and ``j``, turning ``i`` towards ``j``."""
+    angle = np.asarray(angle_rad, dtype=np.float64)
+    matrix = np.zeros((*angle.shape, 3, 3))
+    matrix[..., 3 - i - j, 3 - i - j] = 1.0
+    matrix[..., i, i] = matrix[..., j, j] = np.cos(angle)
+    matrix[..., j, i] = np.sin(angle)
+    matrix[..., i, j] = -matrix[..., j, i]
+    return matrix
+
+
+def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
+    """Return where the parts of ``body`` are in each posture.
+
+    Args:
+        body: the measured person.
+        postures: shape (..., 12), rad and metres.
+
+    Returns:
+        Frames in the reference frame, with the leading shape of ``postures``.
+    """
+    d = np.asarray(postures, dtype=np.float64)
+    rotation = rotation_z(d[..., 3]) @ rotation_y(d[..., 2]) @ rotation_x(d[..., 1])
+    hip = np.empty((*d.shape[:-1], 3))
+    hip[..., 0] = -body.distance_m
+    hip[..., 1] = d[..., 0]
+    hip[..., 2] = body.hip_height_m
+
+    top_m = body.size("waist_height") + body.size("torso_height")
+    head_m = top_m + body.size("neck_length") + body.size("head_height") / 2
+    return BodyFrames(
+        rotation,
+        hip,
+        hip + rotation @ (0.0, 0.0, top_m),
+        hip + rotation @ (body.size("head_offset"), 0.0, head_m),
+        _arm(body, rotation, hip, d[..., LEFT_ARM], +1.0),
+        _arm(body, rotation, hip, d[..., RIGHT_ARM], -1.0),
+    )
+
+
+def _arm(
+    body: BodyModel, torso: FloatArray, hip: FloatArray, angles: FloatArray, side: float
+) -> Arm:
+    """``side`` is +1 for the left arm, -1 for the right."""
+    upper_arm = torso @ rotation_x(side * angles[..., 0]) @ rotation_y(-angles[..., 1])
+    forearm = upper_arm @ rotation_x(side * angles[..., 2]) @ rotation_y(-angles[..., 3])
+    height_m = body.size("waist_height") + body.size("torso_height") - body.size("shoulder_drop")
+    shoulder = hip + torso @ (0.0, side * body.size("shoulder_breadth") / 2, height_m)
+    elbow = shoulder - body.size("upper_arm_length") * upper_arm[..., 2]
+    hand = elbow - body.size("forearm_length") * forearm[..., 2]
+    return Arm(shoulder, elbow, hand, upper_arm, forearm)
+
+
+def keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
+    """Return shoulder, elbow and hand of the left, then the right arm.
+
+    Args:
+        body: the measured person.
+        postures: shape (..., 12), rad and metres.
+
+    Returns:
+        Shape (..., 6, 3), metres in the reference frame, ordered as ``KEYPOINT_NAMES``.
+    """
+    frames = forward_kinematics(body, postures)
+    return np.stack([*frames.left[:3], *frames.right[:3]], axis=-2)

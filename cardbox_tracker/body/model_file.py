@@ -1,0 +1,159 @@
+"""The YAML file of a body: written atomically, validated on reading.
+
+The same text travels on the ``body_model`` topic, so a saved file and a message are one format.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cardbox_tracker.body.model import CONSTANTS, BodyModel
+from cardbox_tracker.body.sizes import SIZE_NAMES, SIZES
+from cardbox_tracker.errors import BodyModelError
+
+FORMAT = "cardbox_body_model/1"
+_UNITS = {"length": "m", "angle": "rad"}
+_TOP_KEYS = ("format", "units", *CONSTANTS, "side_turn", "sizes")
+
+
+def dumps_body_model(model: BodyModel) -> str:
+    """Return the YAML text of ``model``; equal models give equal texts."""
+    lines = [
+        "# A person measured by cardbox_tracker: what does not change while they are tracked.",
+        f"format: {FORMAT}",
+        "units: {length: m, angle: rad}",
+    ]
+    for name, (_, _, _, meaning) in CONSTANTS.items():
+        lines.append(f"{name}: {float(getattr(model, name))!r}  # {meaning}")
+    lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
+    lines.append("sizes:")
+    for size, value in zip(SIZES, model.sizes, strict=True):
+        lines.append(f"  {size.name}: {float(value)!r}  # {size.description}")
+    return "\n".join(lines) + "\n"
+
+
+def loads_body_model(text: str, source: str = "body model") -> BodyModel:
+    """Parse a body model.
+
+    Args:
+        text: YAML as :func:`dumps_body_model` writes it.
+        source: what to call it in an error, such as a path or a topic.
+
+    Raises:
+        BodyModelError: the text is no body model; the error names the key at fault.
+    """
+    try:
+        data = yaml.load(text, Loader=_StrictLoader)
+    except yaml.YAMLError as error:
+        raise BodyModelError(f"{source} is not valid YAML: {error}") from None
+    except BodyModelError as error:
+        raise BodyModelError(f"{source}: {error}") from None
+    try:
+        return _from_mapping(data)
+    except BodyModelError as error:
+        raise BodyModelError(
+            f"{source}: {error}. 'cardbox initialize' or the initializer node writes a valid file"
+        ) from None
+
+
+def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
+    """Read a body model file.
+
+    Raises:
+        BodyModelError: the file cannot be read or is no body model.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise BodyModelError(
+            f"cannot read the body model {os.fspath(path)}: {reason}; give the file that "
+            "'cardbox initialize' or the initializer node wrote"
+        ) from None
+    return loads_body_model(text, source=os.fspath(path))
+
+
+def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
+    """Write ``model`` to ``path`` atomically: a reader sees the old file or the new one, whole.
+
+    Raises:
+        BodyModelError: the file cannot be written.
+    """
+    target = Path(path)
+    temporary = None
+    try:
+        descriptor, temporary = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.name}.", text=True
+        )
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(dumps_body_model(model))
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, target)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise BodyModelError(
+            f"cannot write the body model {target}: {error.strerror}; choose a folder that exists "
+            "and is writable"
+        ) from None
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """A loader that refuses a key given twice, where YAML would silently keep the last one."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        keys = [key.value for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise BodyModelError(f"key '{key}' is given twice; keep one")
+        return super().construct_mapping(node, deep)
+
+
+def _from_mapping(data: object) -> BodyModel:
+    if not isinstance(data, dict):
+        raise BodyModelError("expected a mapping with the keys " + ", ".join(_TOP_KEYS))
+    _check_keys(data, _TOP_KEYS, "")
+    if data["format"] != FORMAT:
+        raise BodyModelError(f"format is {data['format']!r}; this version reads '{FORMAT}'")
+    if not isinstance(data["units"], dict):
+        raise BodyModelError(f"units is {data['units']!r}; expected {{length: m, angle: rad}}")
+    _check_keys(data["units"], tuple(_UNITS), "units.")
+    for kind, unit in _UNITS.items():
+        if data["units"][kind] != unit:
+            raise BodyModelError(
+                f"units.{kind} is {data['units'][kind]!r}; expected '{unit}': convert the values"
+            )
+    sizes = data["sizes"]
+    if not isinstance(sizes, dict):
+        raise BodyModelError(f"sizes is {sizes!r}; expected a mapping of the {len(SIZES)} sizes")
+    _check_keys(sizes, SIZE_NAMES, "sizes.")
+    return BodyModel(
+        sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
+        **{name: _number(data[name], name) for name in CONSTANTS},
+        side_turn=data["side_turn"],
+    )
+
+
+def _check_keys(mapping: dict[Any, Any], expected: tuple[str, ...], prefix: str) -> None:
+    for key in mapping:
+        if key not in expected:
+            raise BodyModelError(f"unknown key '{prefix}{key}'; known are {', '.join(expected)}")
+    for key in expected:
+        if key not in mapping:
+            raise BodyModelError(f"missing key '{prefix}{key}'")
+
+
+def _number(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise BodyModelError(
+            f"'{key}' is {value!r}; expected a plain number in the unit of the file, such as 0.27"
+        )
+    return float(value)

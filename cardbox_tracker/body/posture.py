@@ -1,0 +1,95 @@
+"""The 12 posture angles d1..d12, their limits and the three reference postures.
+
+The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
+rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
+reference frame, 0 on the optical axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+
+JOINT_NAMES: tuple[str, ...] = (
+    "torso_y",
+    "torso_roll",
+    "torso_pitch",
+    "torso_yaw",
+    "left_shoulder_abduction",
+    "left_shoulder_flexion",
+    "left_elbow_abduction",
+    "left_elbow_flexion",
+    "right_shoulder_abduction",
+    "right_shoulder_flexion",
+    "right_elbow_abduction",
+    "right_elbow_flexion",
+)
+N_JOINTS = len(JOINT_NAMES)
+
+TORSO = slice(0, 4)
+LEFT_ARM = slice(4, 8)
+RIGHT_ARM = slice(8, 12)
+
+# Source of the anatomical ranges: American Academy of Orthopaedic Surgeons, "Joint Motion: Method
+# of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"):
+# thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
+# abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
+# 45; elbow flexion 150.
+# The torso's line goes from the hips to the neck, so hips and spine add up, rounded down to what a
+# standing person holds. The elbow has 2 DOF relative to an upper arm that has no axial rotation in
+# this model: the shoulder's rotation (70 inwards, 90 outwards) turns the plane in which the elbow's
+# 150 degrees lie, so its abduction reaches to either side.
+_ARM_LIMITS_DEG = ((-45, 180), (-60, 120), (-150, 150), (-30, 150))
+_TORSO_LIMITS_DEG = ((-50, 50), (-30, 100), (-100, 100))
+TORSO_Y_LIMIT_M = 3.0
+"""A fixed camera sees no person further aside than this."""
+
+JOINT_LIMITS: FloatArray = np.vstack(
+    [
+        [[-TORSO_Y_LIMIT_M, TORSO_Y_LIMIT_M]],
+        np.radians(_TORSO_LIMITS_DEG),
+        np.radians(_ARM_LIMITS_DEG),
+        np.radians(_ARM_LIMITS_DEG),
+    ]
+)
+"""Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``)."""
+JOINT_LIMITS.setflags(write=False)
+
+REFERENCE_NAMES: tuple[str, ...] = ("front", "side", "arms")
+SIDE_TURNS: tuple[str, ...] = ("left", "right")
+
+_HANGING_ABDUCTION_RAD = np.radians(20.0)
+_STRETCHED_ABDUCTION_RAD = np.radians(80.0)
+
+
+def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
+    """Return the reference posture d_ref of that name.
+
+    Args:
+        name: ``front`` (facing the camera, arms 20 degrees away from the body), ``side`` (the same,
+            turned by 90 degrees) or ``arms`` (facing, both arms stretched sideways, 80 degrees).
+        side_turn: ``left`` if the person turned to their own left for ``side``, so that their right
+            side is towards the camera, or ``right``.
+
+    Returns:
+        Shape (12,), rad and metres; ``torso_y`` is 0.
+
+    Raises:
+        ValueError: ``name`` or ``side_turn`` is none of those.
+    """
+    if name not in REFERENCE_NAMES:
+        raise ValueError(f"reference posture {name!r} is unknown; it is one of {REFERENCE_NAMES}")
+    if side_turn not in SIDE_TURNS:
+        raise ValueError(f"side_turn {side_turn!r} is unknown; it is one of {SIDE_TURNS}")
+    posture = np.zeros(N_JOINTS)
+    abduction = _STRETCHED_ABDUCTION_RAD if name == "arms" else _HANGING_ABDUCTION_RAD
+    posture[LEFT_ARM.start] = posture[RIGHT_ARM.start] = abduction
+    if name == "side":
+        posture[3] = np.pi / 2 if side_turn == "left" else -np.pi / 2
+    return posture
+
+
+def clip_to_limits(postures: FloatArray) -> FloatArray:
+    """Return ``postures`` (..., 12) with every joint moved into its limits."""
+    return np.clip(postures, JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1])

@@ -1,0 +1,35 @@
+"""The errors a user can cause; ``str(error)`` says what was wrong, what was expected, what to do.
+
+CardboxError
+    BodyModelError       a body model file or a size
+    CameraError          a calibration or a CameraInfo
+    EncodingError        a picture's encoding or its bytes
+    InitializationError  the reference silhouettes cannot give a body
+    BagError             a recording that cannot be read or written
+"""
+
+from __future__ import annotations
+
+
+class CardboxError(Exception):
+    """Base of every error a user can cause; programs show its text and no traceback."""
+
+
+class BodyModelError(CardboxError):
+    """A body model is incomplete, malformed or impossible."""
+
+
+class CameraError(CardboxError):
+    """A camera calibration is missing, malformed or unsupported."""
+
+
+class EncodingError(CardboxError):
+    """A picture's encoding is unsupported, or its bytes do not match it."""
+
+
+class InitializationError(CardboxError):
+    """The reference silhouettes do not allow the body to be measured."""
+
+
+class BagError(CardboxError):
+    """A recording cannot be read or written."""

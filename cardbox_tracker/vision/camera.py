@@ -1,0 +1,237 @@
+"""The pinhole camera, its calibration, and lens distortion."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import CameraError
+
+FloatArray = NDArray[np.float64]
+
+DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
+
+
+@dataclass(frozen=True)
+class Camera:
+    """An ideal pinhole camera at a working resolution.
+
+    Attributes:
+        width: picture width, px.
+        height: picture height, px.
+        fx: horizontal focal length, px.
+        fy: vertical focal length, px.
+        cx: principal point, px; (0, 0) is the centre of the first pixel.
+        cy: principal point, px.
+        pitch_rad: how far the camera looks down; the reference frame stays level.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    pitch_rad: float = 0.0
+
+    def scaled(self, width: int, height: int) -> Camera:
+        """Return the same camera with its picture resized to ``width`` x ``height`` px."""
+        sx, sy = width / self.width, height / self.height
+        return Camera(
+            width,
+            height,
+            self.fx * sx,
+            self.fy * sy,
+            # The centre of the first pixel is half a pixel inside the picture.
+            (self.cx + 0.5) * sx - 0.5,
+            (self.cy + 0.5) * sy - 0.5,
+            self.pitch_rad,
+        )
+
+    def with_pitch(self, pitch_rad: float) -> Camera:
+        """Return the same camera looking down by ``pitch_rad``."""
+        return replace(self, pitch_rad=pitch_rad)
+
+    def reference_to_optical_rotation(self) -> FloatArray:
+        """Rotation (3, 3) from the reference frame into the optical frame."""
+        # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
+        level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+        c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
+        look_down = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)])
+        rotation: FloatArray = look_down @ level
+        return rotation
+
+    def reference_to_optical(self, points_m: FloatArray) -> FloatArray:
+        """Turn points (..., 3) from the reference frame (level) into the optical frame, metres."""
+        turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation().T
+        return turned
+
+    def optical_to_reference(self, points_m: FloatArray) -> FloatArray:
+        """Turn points (..., 3) from the optical frame into the reference frame, metres."""
+        turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation()
+        return turned
+
+    def project(self, points_m: FloatArray) -> FloatArray:
+        """Project points (..., 3) of the optical frame, z > 0, to pixels (..., 2)."""
+        points = np.asarray(points_m, dtype=np.float64)
+        z = points[..., 2]
+        return np.stack(
+            [self.fx * points[..., 0] / z + self.cx, self.fy * points[..., 1] / z + self.cy], -1
+        )
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a CameraInfo message or a camera_calibration file says of a real camera.
+
+    Attributes:
+        width: calibrated picture width, px.
+        height: calibrated picture height, px.
+        k: intrinsic matrix (3, 3).
+        distortion: coefficients (n,) of ``distortion_model``; empty or all zero without distortion.
+        distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
+        frame_id: name of the optical frame.
+    """
+
+    width: int
+    height: int
+    k: FloatArray
+    distortion: FloatArray
+    distortion_model: str = "plumb_bob"
+    frame_id: str = "camera_optical_frame"
+
+    @property
+    def is_calibrated(self) -> bool:
+        """False for the all-zero matrix with which drivers announce an uncalibrated camera."""
+        return bool(np.all(np.isfinite(self.k)) and self.k[0, 0] > 0 and self.k[1, 1] > 0)
+
+    @property
+    def is_distorted(self) -> bool:
+        """True if the lens bends straight lines."""
+        return bool(np.any(self.distortion != 0))
+
+    def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:
+        """Return the pinhole camera at the working resolution ``width`` x ``height``, px.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        self._check()
+        k = self.k
+        full = Camera(self.width, self.height, k[0, 0], k[1, 1], k[0, 2], k[1, 2], pitch_rad)
+        return full.scaled(width, height)
+
+    def rectifier(self, width: int, height: int) -> Rectifier | None:
+        """Return what undistorts a picture of that working resolution; None without distortion.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        self._check()
+        if not self.is_distorted:
+            return None
+        camera = self.camera(width, height)
+        k = np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
+        size = (width, height)
+        if self.distortion_model == "equidistant":
+            maps = cv2.fisheye.initUndistortRectifyMap(
+                k, self.distortion[:4].reshape(4, 1), np.eye(3), k, size, cv2.CV_16SC2
+            )
+        else:
+            maps = cv2.initUndistortRectifyMap(
+                k, self.distortion, np.eye(3), k, size, cv2.CV_16SC2
+            )
+        return Rectifier(*maps)
+
+    def _check(self) -> None:
+        if self.width <= 0 or self.height <= 0:
+            raise CameraError(
+                f"the calibration is for a picture of {self.width}x{self.height}; expected the "
+                "camera's size in pixels: calibrate the camera, or fill in width and height"
+            )
+        if not self.is_calibrated:
+            raise CameraError(
+                "the camera is not calibrated (its matrix K is all zero); calibrate it with "
+                "camera_calibration, or give its driver a calibration file"
+            )
+        if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
+            raise CameraError(
+                f"distortion model '{self.distortion_model}' is unknown; supported are "
+                f"{', '.join(DISTORTION_MODELS)}: calibrate with one of those, or feed "
+                "rectified pictures with all-zero distortion"
+            )
+        allowed = {"equidistant": (4,), "plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14)}
+        counts = allowed.get(self.distortion_model, ())
+        if self.is_distorted and len(self.distortion) not in counts:
+            raise CameraError(
+                f"distortion model '{self.distortion_model}' has {len(self.distortion)} "
+                f"coefficients; expected {' or '.join(map(str, counts))}"
+            )
+
+
+class Rectifier:
+    """Undistorts pictures of one size with maps computed once."""
+
+    def __init__(self, map_1: NDArray[Any], map_2: NDArray[Any]) -> None:
+        """Keep the fixed-point maps of ``cv2.remap``."""
+        self._maps = (map_1, map_2)
+
+    def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return ``picture`` (H, W) or (H, W, 3) undistorted.
+
+        Pixels that the lens never saw repeat the border, so that they stay background.
+        """
+        rectified = cv2.remap(
+            picture, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        return np.asarray(rectified, dtype=np.uint8)
+
+
+def load_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """Read a YAML file as camera_calibration writes it.
+
+    Raises:
+        CameraError: the file cannot be read or lacks something; the text names the key.
+    """
+    name = os.fspath(path)
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise CameraError(
+            f"cannot read the calibration {name}: {reason}; give a YAML file as "
+            "camera_calibration writes it"
+        ) from None
+    except yaml.YAMLError as error:
+        raise CameraError(f"calibration {name} is not valid YAML: {error}") from None
+    if not isinstance(data, dict):
+        raise CameraError(f"calibration {name}: expected a mapping as camera_calibration writes it")
+    try:
+        k = np.array(data["camera_matrix"]["data"], dtype=np.float64)
+        distortion = np.array(data["distortion_coefficients"]["data"], dtype=np.float64).ravel()
+        calibration = Calibration(
+            int(data["image_width"]),
+            int(data["image_height"]),
+            k.reshape(3, 3),
+            distortion,
+            str(data["distortion_model"]),
+        )
+    except KeyError as error:
+        raise CameraError(
+            f"calibration {name}: missing key {error}; expected a file as camera_calibration "
+            "writes it"
+        ) from None
+    except (TypeError, ValueError) as error:
+        raise CameraError(f"calibration {name}: malformed value: {error}") from None
+    try:
+        calibration.camera(calibration.width, calibration.height)
+    except CameraError as error:
+        raise CameraError(f"calibration {name}: {error}") from None
+    return calibration
