@@ -1,0 +1,127 @@
+"""What the nodes share: parameters, QoS, diagnostics, and callbacks that no message can kill."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import ROSInterruptException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from std_srvs.srv import Trigger
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros import qos
+from cardbox_tracker.ros.diagnostics import NodeDiagnostics
+
+Callback = Callable[[Any, int], None]
+"""Takes a message and when it left its sender, ns since the epoch."""
+
+
+class CardboxNode(Node):
+    """A node that says what it does, what it waits for, and what is wrong."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        """Create the node; ``options`` are those of :class:`rclpy.node.Node`."""
+        super().__init__(name, **options)
+        self.diagnostics = NodeDiagnostics(self)
+
+    def resolve(self, topic: str) -> str:
+        """Return the full name of ``topic`` after namespace and remapping."""
+        return self.resolve_topic_name(topic)
+
+    def advertise(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher:
+        """Create a publisher whose QoS can be overridden and whose mismatches are reported."""
+        return self.create_publisher(
+            kind,
+            topic,
+            qos.copy_of(profile),
+            event_callbacks=qos.publisher_events(self.resolve(topic), self.diagnostics.warn),
+            qos_overriding_options=qos.overridable(profile),
+        )
+
+    def subscribe(
+        self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
+    ) -> Subscription:
+        """Create a subscription; what ``callback`` raises is reported and the node goes on."""
+
+        def guarded(message: Any, info: dict[str, Any]) -> None:
+            try:
+                callback(message, int(info["source_timestamp"]))
+            except CardboxError as error:
+                self.diagnostics.problem(str(error))
+            except Exception as error:
+                self._unexpected(f"a message on {self.resolve(topic)}", error)
+
+        return self.create_subscription(
+            kind,
+            topic,
+            guarded,
+            qos.copy_of(profile),
+            event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
+            qos_overriding_options=qos.overridable(profile),
+            raw=raw,
+        )
+
+    def offer(
+        self, name: str, action: Callable[[], str], group: CallbackGroup | None = None
+    ) -> None:
+        """Offer a Trigger service that answers with the text of ``action`` or of its error."""
+
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = self.outcome(name, action)
+            return response
+
+        self.create_service(Trigger, name, answer, callback_group=group)
+
+    def outcome(self, name: str, action: Callable[[], str]) -> tuple[bool, str]:
+        """Run ``action``; return whether it succeeded, and its text or that of its error."""
+        try:
+            text = action()
+        except CardboxError as error:
+            self.get_logger().warning(f"{name}: {error}")
+            return False, str(error)
+        except Exception as error:
+            self._unexpected(f"service {name}", error)
+            return False, f"unexpected error, see the log of {self.get_name()}: {error!r}"
+        self.get_logger().info(f"{name}: {text}")
+        return True, text
+
+    def close(self) -> None:
+        """Release what the node holds besides its ROS entities."""
+
+    def _unexpected(self, where: str, error: Exception) -> None:
+        self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
+        self.get_logger().debug(traceback.format_exc())
+
+
+def run(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
+    """Create a node and spin it until it is told to stop; return the exit code of the process."""
+    try:
+        rclpy.init(args=args)
+    except Exception as error:
+        print(f"cannot start: {error}", file=sys.stderr)
+        return 2
+    node: CardboxNode | None = None
+    try:
+        node = create()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except CardboxError as error:
+        rclpy.logging.get_logger("cardbox_tracker").fatal(str(error))
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+        pass
+    finally:
+        if node is not None:
+            node.close()
+        rclpy.try_shutdown()
+    return 0

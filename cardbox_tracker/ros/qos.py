@@ -1,0 +1,110 @@
+"""Quality of service of every topic (REP-2003), overridable, and mismatches told in plain words.
+
+Drivers publish reliable or best effort, consumers of sensor data subscribe with best effort; what
+describes a state (models, background) is latched: a late subscriber gets the last message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSPolicyKind,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_policy_name_from_kind,
+)
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+SENSOR_DATA = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+# A reader's queue of a few frames rides out a hiccup; the writer keeps to one.
+SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
+RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+_MEANING = {
+    "RELIABILITY": ("best effort", "reliable", "reliability"),
+    "DURABILITY": ("volatile", "latched (transient local)", "durability"),
+}
+
+
+def overridable(profile: QoSProfile) -> QoSOverridingOptions:
+    """Return options that declare ``qos_overrides.<topic>...`` parameters.
+
+    Durability is only overridable where it is not what the topic is about (latched topics).
+    """
+    kinds = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY]
+    if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
+        kinds.append(QoSPolicyKind.DURABILITY)
+    return QoSOverridingOptions(kinds)
+
+
+def copy_of(profile: QoSProfile) -> QoSProfile:
+    """Return a profile of the same policies; overriding one changes the object it is given."""
+    return QoSProfile(
+        history=profile.history,
+        depth=profile.depth,
+        reliability=profile.reliability,
+        durability=profile.durability,
+    )
+
+
+def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
+    """Say in plain words why a publisher and a subscriber of ``topic`` do not talk.
+
+    Args:
+        topic: the resolved topic name.
+        kind: the policy that does not match.
+        subscribing: True if this node is the subscriber, False if it publishes.
+    """
+    name = qos_policy_name_from_kind(kind)
+    weak, strong, policy = _MEANING.get(name, ("less", "more", name.lower()))
+    ours = "subscription" if subscribing else "publisher"
+    wanted = "best_effort" if policy == "reliability" else "volatile"
+    offered = "reliable" if policy == "reliability" else "transient_local"
+    override = f"qos_overrides.{topic}.{ours}.{policy}"
+    if subscribing:
+        return (
+            f"incompatible QoS on {topic}: a publisher offers {weak} {policy} but this node asks "
+            f"for {strong}, so nothing arrives from it; make that publisher {strong}, or start "
+            f"this node with the parameter {override}:={wanted}"
+        )
+    return (
+        f"incompatible QoS on {topic}: a subscriber asks for {strong} {policy} but this node "
+        f"offers {weak}, so it receives nothing; make that subscriber {weak}, or start this node "
+        f"with the parameter {override}:={offered}"
+    )
+
+
+def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
+    """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
+    return SubscriptionEventCallbacks(
+        incompatible_qos=lambda event: report(
+            mismatch_text(topic, event.last_policy_kind, subscribing=True)
+        ),
+        incompatible_type=lambda _: report(_type_text(topic, "publishes")),
+    )
+
+
+def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
+    """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
+    return PublisherEventCallbacks(
+        incompatible_qos=lambda event: report(
+            mismatch_text(topic, event.last_policy_kind, subscribing=False)
+        ),
+        incompatible_type=lambda _: report(_type_text(topic, "subscribes to")),
+    )
+
+
+def _type_text(topic: str, verb: str) -> str:
+    return (
+        f"another node {verb} {topic} with a different message type, so nothing passes between "
+        "the two; compare the types with 'ros2 topic info --verbose'"
+    )

@@ -1,0 +1,129 @@
+"""The URDF of a body moves as the body itself does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+import pytest
+from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.vision.camera import Camera
+
+KEYPOINT_LINKS = (
+    "left_upper_arm",
+    "left_forearm",
+    "left_hand",
+    "right_upper_arm",
+    "right_forearm",
+    "right_hand",
+)
+# From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
+TO_ROOT = np.diag([-1.0, -1.0, 1.0])
+
+
+def axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues' formula, (3, 3)."""
+    x, y, z = axis
+    cross = np.array([(0, -z, y), (z, 0, -x), (-y, x, 0)])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def numbers(text: str) -> np.ndarray:
+    return np.array([float(value) for value in text.split()])
+
+
+def link_poses(xml: str, positions: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """Forward kinematics of a URDF, written from its specification: link name to (4, 4)."""
+    robot = Xml.fromstring(xml)
+    poses = {ROOT_LINK: np.eye(4)}
+    for joint in robot.findall("joint"):  # parents come before children in our files
+        origin = joint.find("origin")
+        roll, pitch, yaw = numbers(origin.get("rpy"))
+        placed = np.eye(4)
+        placed[:3, :3] = (
+            axis_angle(np.array([0, 0, 1]), yaw)
+            @ axis_angle(np.array([0, 1, 0]), pitch)
+            @ axis_angle(np.array([1, 0, 0]), roll)
+        )
+        placed[:3, 3] = numbers(origin.get("xyz"))
+        moved = np.eye(4)
+        if joint.get("type") != "fixed":
+            axis = numbers(joint.find("axis").get("xyz"))
+            value = positions[joint.get("name")]
+            if joint.get("type") == "prismatic":
+                moved[:3, 3] = axis * value
+            else:
+                moved[:3, :3] = axis_angle(axis, value)
+        parent = poses[joint.find("parent").get("link")]
+        poses[joint.find("child").get("link")] = parent @ placed @ moved
+    return poses
+
+
+def random_postures(count: int) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    return rng.uniform(JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1], (count, 12))
+
+
+@pytest.mark.parametrize("posture", random_postures(8))
+def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -> None:
+    body = BodyModel(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
+    poses = link_poses(urdf_from_body(body), dict(zip(JOINT_NAMES, posture, strict=True)))
+
+    frames = forward_kinematics(body, posture)
+    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+        np.testing.assert_allclose(poses[link][:3, 3], TO_ROOT @ point, atol=1e-9)
+    np.testing.assert_allclose(poses["head"][:3, 3], TO_ROOT @ frames.head, atol=1e-9)
+    np.testing.assert_allclose(poses["torso"][:3, 3], TO_ROOT @ frames.hip, atol=1e-9)
+
+
+def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
+    body = BodyModel(camera_pitch_rad=0.2)
+    xml = urdf_from_body(body, optical_frame="cam_optical")
+    poses = link_poses(xml, dict.fromkeys(JOINT_NAMES, 0.0))
+    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.2)
+    for point in np.array([(1.0, 0, 0), (0, 1.0, 0), (-2.0, 0.3, 0.5)]):
+        optical = camera.reference_to_optical(point)
+        np.testing.assert_allclose(
+            poses["cam_optical"][:3, :3] @ optical, TO_ROOT @ point, atol=1e-9
+        )
+
+
+def test_movable_joints_are_those_of_the_joint_state_with_limits() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel()))
+    movable = {j.get("name"): j for j in robot.findall("joint") if j.get("type") != "fixed"}
+    assert set(movable) == set(JOINT_NAMES)
+    for name, (lower, upper) in zip(JOINT_NAMES, JOINT_LIMITS, strict=True):
+        limit = movable[name].find("limit")
+        assert float(limit.get("lower")) == pytest.approx(lower)
+        assert float(limit.get("upper")) == pytest.approx(upper)
+
+
+def test_links_form_one_tree() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel(), optical_frame="optical"))
+    links = {link.get("name") for link in robot.findall("link")}
+    children = [joint.find("child").get("link") for joint in robot.findall("joint")]
+    assert sorted([*children, ROOT_LINK]) == sorted(links)
+
+
+def test_visuals_are_the_fifteen_patches() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel()))
+    assert len(robot.findall("link/visual")) == 15
+
+
+def test_yourdfpy_loads_it_and_agrees() -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
+    import io
+
+    body = BodyModel(distance_m=2.3)
+    posture = random_postures(1)[0]
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
+    assert robot.validate()
+    robot.update_cfg(dict(zip(JOINT_NAMES, posture, strict=True)))
+    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+        np.testing.assert_allclose(
+            robot.get_transform(link, ROOT_LINK)[:3, 3], TO_ROOT @ point, atol=1e-6
+        )
