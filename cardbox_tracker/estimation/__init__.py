@@ -1,0 +1,1 @@
+"""How a posture is found: cost, resampling, particle filter, hierarchy, initialization."""
