@@ -116,6 +116,20 @@ class CompiledCost:
         union = self.silhouette_px + area - common
         return cost, common / union if union else 0.0
 
+    def bodies(self, sizes: FloatArray, postures: FloatArray) -> CostArray:
+        """Costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12), in the same place."""
+        costs = np.empty(len(sizes), np.int64)
+        kernels.body_costs(
+            np.ascontiguousarray(sizes, dtype=np.float64),
+            self._place,
+            np.ascontiguousarray(postures, dtype=np.float64),
+            self._view,
+            self._table,
+            self.silhouette_px,
+            costs,
+        )
+        return costs
+
     def _full(self, postures: FloatArray) -> tuple[CostArray, CostArray]:
         contiguous = np.ascontiguousarray(postures, dtype=np.float64)
         costs = np.empty(len(contiguous), np.int64)

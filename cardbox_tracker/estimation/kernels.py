@@ -371,6 +371,18 @@ def full_costs(
 
 
 @_compile
+def body_costs(
+    sizes: Any, place: Any, postures: Any, view: Any, table: Any, total: int, costs: Any
+) -> None:
+    """Costs (N,) of bodies (N, 18), each in its own posture (N, 12)."""
+    areas = np.empty(1, np.int64)
+    for i in range(sizes.shape[0]):
+        full_costs(
+            postures[i : i + 1], sizes[i], place, view, table, total, costs[i : i + 1], areas
+        )
+
+
+@_compile
 def polygon_costs(corners: Any, view: Any, table: Any, total: int, costs: Any) -> None:
     """Costs (N,) of any quadrilaterals (N, K, 4, 3) of the optical frame, such as a box model's."""
     rows, width = table.shape[0], table.shape[1] - 1

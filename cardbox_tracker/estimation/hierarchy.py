@@ -1,0 +1,121 @@
+"""The hierarchical particle filter: first the torso, then both arms (paper, section III-B).
+
+The torso filter rates torso, waist and head. Each arm filter then rates its arm beside the torso
+just found, so the two arms do not depend on each other and can run at the same time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, TORSO
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost import ARMS, SilhouetteCost
+from cardbox_tracker.estimation.particle_filter import ParticleFilter
+from cardbox_tracker.estimation.resampling import STRATEGIES
+
+_REFERENCE_AREA_PX = 320 * 240
+# An angle's distance from rest is measured in half its range; the torso's place has no rest.
+_HALF_RANGES = (JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]) / 2
+_PRIOR_SCALE = 1.0 / _HALF_RANGES
+_PRIOR_SCALE[0] = 0.0
+
+
+class HierarchyResult(NamedTuple):
+    """Posture and its standard deviation, each (12,), rad and metres."""
+
+    posture: FloatArray
+    stddev: FloatArray
+
+
+class HierarchicalFilter:
+    """Three particle filters that share one cost."""
+
+    def __init__(
+        self, cost: SilhouetteCost, config: TrackerConfig, picture_px: int, rng: np.random.Generator
+    ) -> None:
+        """Set the filters up; :meth:`scatter` gives them particles.
+
+        Args:
+            cost: rates postures; the caller lets it observe each silhouette.
+            config: settings.
+            picture_px: pixels of a picture, to scale what the settings say of 320x240.
+            rng: split into one stream a filter, so that threads cannot mix them.
+        """
+        self._cost = cost
+        self._config = config
+        self._scale = picture_px / _REFERENCE_AREA_PX
+        resampler = STRATEGIES[config.strategy]
+        streams = rng.spawn(3)
+        torso_noise = np.full(4, config.torso.rotation_noise_rad)
+        torso_noise[0] = config.torso.translation_noise_m
+        arm_noise = np.full(4, config.arm.rotation_noise_rad)
+        self.torso = ParticleFilter(
+            config.torso, resampler, torso_noise, JOINT_LIMITS[TORSO], streams[0]
+        )
+        self.arms = {
+            side: ParticleFilter(config.arm, resampler, arm_noise, JOINT_LIMITS[joints], stream)
+            for (side, joints), stream in zip(ARMS.items(), streams[1:], strict=True)
+        }
+        self._pool = ThreadPoolExecutor(1, "left_arm") if config.parallel_arms else None
+
+    def scatter(self, posture: FloatArray, noise_scale: float = 1.0) -> HierarchyResult:
+        """Start all filters around ``posture`` (12,) on the silhouette observed last."""
+        return self._run(
+            lambda: self.torso.scatter(posture[TORSO], self._rate_torso, noise_scale),
+            lambda side: self.arms[side].scatter(
+                posture[ARMS[side]], self._rate_arm(side), noise_scale
+            ),
+        )
+
+    def cycle(self, noise_scale: float = 1.0) -> HierarchyResult:
+        """Run one estimation cycle of all filters on the silhouette observed last."""
+        return self._run(
+            lambda: self.torso.cycle(self._rate_torso, noise_scale, self._scale),
+            lambda side: self.arms[side].cycle(self._rate_arm(side), noise_scale, self._scale),
+        )
+
+    def _run(
+        self, run_torso: Callable[[], None], run_arm: Callable[[str], None]
+    ) -> HierarchyResult:
+        run_torso()
+        posture, stddev = np.empty(N_JOINTS), np.empty(N_JOINTS)
+        posture[TORSO], stddev[TORSO] = self._estimate(self.torso)
+        self._cost.fix_torso(posture[TORSO])
+        if self._pool is None:
+            run_arm("left")
+            run_arm("right")
+        else:
+            left = self._pool.submit(run_arm, "left")
+            run_arm("right")
+            left.result()
+        for side, joints in ARMS.items():
+            posture[joints], stddev[joints] = self._estimate(self.arms[side])
+        return HierarchyResult(posture, stddev)
+
+    def _estimate(self, particle_filter: ParticleFilter) -> tuple[FloatArray, FloatArray]:
+        return particle_filter.estimate(self._config.average, self._scale)
+
+    def _rate_torso(self, particles: FloatArray) -> FloatArray:
+        return self._cost.torso(particles) + self._prior(particles, TORSO)
+
+    def _rate_arm(self, side: str) -> Callable[[FloatArray], FloatArray]:
+        def rate(particles: FloatArray) -> FloatArray:
+            return self._cost.arm(side, particles) + self._prior(particles, ARMS[side])
+
+        return rate
+
+    def _prior(self, particles: FloatArray, joints: slice) -> FloatArray | float:
+        """Cost (N,) in px that grows with the square of each angle's distance from rest."""
+        if self._config.prior == 0.0:
+            return 0.0
+        weight_px = self._config.prior * self._cost.silhouette_px
+        scaled = particles * _PRIOR_SCALE[joints]
+        return weight_px * np.einsum("ij,ij->i", scaled, scaled)
+
+

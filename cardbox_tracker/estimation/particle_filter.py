@@ -1,0 +1,105 @@
+"""One particle filter over a few joints (paper, algorithm "Online Motion Tracking").
+
+A cycle is: resample, add noise, keep within the joint limits, rate. The initial particles are
+d_ref + N(0, sigma_beta^2 E).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.estimation.config import FilterConfig
+from cardbox_tracker.estimation.resampling import Resampler
+
+FloatArray = NDArray[np.float64]
+CostFunction = Callable[[FloatArray], FloatArray]
+"""Particles (N, D) -> costs (N,), px."""
+
+SPREAD_PX = 60.0
+"""Particles this much costlier than the best weigh 1/e in the mean, px at 320x240."""
+
+
+class ParticleFilter:
+    """N particles over D joints; all its randomness comes from the generator it is given."""
+
+    def __init__(
+        self,
+        config: FilterConfig,
+        resampler: Resampler,
+        noise: FloatArray,
+        limits: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        """Set the filter up; :meth:`scatter` gives it particles.
+
+        Args:
+            config: numbers of Table I.
+            resampler: a strategy of :mod:`cardbox_tracker.estimation.resampling`.
+            noise: sigma_beta of each joint, (D,), rad and metres.
+            limits: lowest and highest value of each joint, (D, 2).
+            rng: the source of noise.
+        """
+        self.config = config
+        self.noise = noise
+        self._resampler = resampler
+        self._limits = limits
+        self._rng = rng
+        self.particles = np.zeros((config.particles, len(noise)))
+        self.costs = np.zeros(config.particles)
+
+    def scatter(self, posture: FloatArray, rate: CostFunction, noise_scale: float = 1.0) -> None:
+        """Start with particles around ``posture`` (D,), itself among them, and rate them."""
+        self._rate(np.broadcast_to(posture, self.particles.shape), noise_scale, rate)
+
+    def cycle(
+        self, rate: CostFunction, noise_scale: float = 1.0, sigma_scale: float = 1.0
+    ) -> None:
+        """Run one estimation cycle.
+
+        Args:
+            rate: costs of particles against the present silhouette.
+            noise_scale: factor on sigma_beta.
+            sigma_scale: factor on sigma_gamma, such as for a larger picture.
+        """
+        ancestors = self._resampler(
+            self.costs,
+            self.config.survival_rate,
+            self.config.sigma_gamma_px * sigma_scale,
+            self._rng,
+        )
+        self._rate(self.particles[ancestors], noise_scale, rate)
+
+    def _rate(self, ancestors: FloatArray, noise_scale: float, rate: CostFunction) -> None:
+        steps = self._rng.standard_normal(self.particles.shape)
+        steps *= self.noise * noise_scale
+        steps[0] = 0.0
+        steps += ancestors
+        self.particles = np.clip(steps, self._limits[:, 0], self._limits[:, 1], out=steps)
+        self.costs = rate(self.particles)
+
+    def best(self) -> FloatArray:
+        """Return the particle (D,) of lowest cost."""
+        best: FloatArray = self.particles[np.argmin(self.costs)]
+        return best
+
+    def estimate(self, count: int, spread_scale: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return mean and standard deviation, each (D,), of the ``count`` best particles.
+
+        They are weighted by exp(-(W - W_best) / spread); with a count of 1 the mean is the best
+        particle, and the deviation is that of the survivors.
+        """
+        survivors = max(count, int(self.config.survival_rate * len(self.costs)), 2)
+        if survivors < len(self.costs):
+            chosen = np.argpartition(self.costs, survivors - 1)[:survivors]
+        else:
+            chosen = np.arange(len(self.costs))
+        costs = self.costs[chosen]
+        order = np.argsort(costs, kind="stable")
+        particles = self.particles[chosen[order]]
+        weights = np.exp((costs[order[0]] - costs[order]) / (SPREAD_PX * spread_scale))
+        mean = weights[:count] @ particles[:count] / weights[:count].sum()
+        variance = weights @ (particles - mean) ** 2 / weights.sum()
+        return mean, np.sqrt(variance)
