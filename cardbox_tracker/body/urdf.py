@@ -27,7 +27,7 @@ Vector = Sequence[float]
 
 _COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
 # URDF demands both; the values say nothing of a person and are only formal.
-_FORMAL_LIMITS = {"effort": "100", "velocity": "20"}
+_FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
 
 
 def urdf_from_body(
@@ -101,7 +101,13 @@ def _arm(robot: Xml.Element, body: BodyModel, name: str, side: float) -> None:
         turned, limb = f"{name}_{joint}_link", f"{name}_{part}"
         _link(robot, turned)
         _joint(
-            robot, f"{name}_{joint}_abduction", "revolute", parent, turned, origin, axis=(side, 0, 0)
+            robot,
+            f"{name}_{joint}_abduction",
+            "revolute",
+            parent,
+            turned,
+            origin,
+            axis=(side, 0, 0),
         )
         link = _link(robot, limb)
         _joint(robot, f"{name}_{joint}_flexion", "revolute", turned, limb, axis=(0, -1, 0))
@@ -141,7 +147,8 @@ def _joint(
     if axis is not None:
         Xml.SubElement(joint, "axis", xyz=_text(axis))
         lower, upper = JOINT_LIMITS[JOINT_NAMES.index(name)]
-        Xml.SubElement(joint, "limit", lower=f"{lower:.9g}", upper=f"{upper:.9g}", **_FORMAL_LIMITS)
+        limits = {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}", **_FORMAL_LIMITS}
+        Xml.SubElement(joint, "limit", limits)
 
 
 def _text(values: Vector) -> str:

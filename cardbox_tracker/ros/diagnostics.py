@@ -64,6 +64,14 @@ class StreamStatistics:
         """
         return float(np.percentile(self._spacings_ns, 10)) if self._spacings_ns else 0.0
 
+    @property
+    def loss(self) -> float:
+        """Fraction of the latest messages that never arrived, judged by their stamps."""
+        if len(self._spacings_ns) < 5:
+            return 0.0
+        expected = max(round(sum(self._spacings_ns) / self.period_ns), 1)
+        return max(1.0 - len(self._spacings_ns) / expected, 0.0)
+
 
 class NodeDiagnostics:
     """State, rates, latency and losses of one node.

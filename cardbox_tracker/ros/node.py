@@ -11,10 +11,12 @@ import rclpy
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.utilities import try_shutdown
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
@@ -63,7 +65,7 @@ class CardboxNode(Node):
         return self.create_subscription(
             kind,
             topic,
-            guarded,
+            guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
             qos.copy_of(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
             qos_overriding_options=qos.overridable(profile),
@@ -116,12 +118,12 @@ def run(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int
         executor.add_node(node)
         executor.spin()
     except CardboxError as error:
-        rclpy.logging.get_logger("cardbox_tracker").fatal(str(error))
+        get_logger("cardbox_tracker").fatal(str(error))
         return 1
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     finally:
         if node is not None:
             node.close()
-        rclpy.try_shutdown()
+        try_shutdown()
     return 0

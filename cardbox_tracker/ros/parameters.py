@@ -1,4 +1,4 @@
-"""Parameters of a node declared from one dataclass: the single source of names, types and defaults.
+"""Parameters of a node declared from one dataclass: the single source of types and defaults.
 
 A field made by :func:`parameter` carries its description, unit, range or choices, and whether it can
 change while the node runs. :class:`LiveParameters` declares all of them on a node and keeps a
@@ -59,7 +59,11 @@ class ParameterSpec:
             return " | ".join(choice or '""' for choice in self.choices)
         if self.minimum is None or self.maximum is None:
             return ""
-        return f"{self.minimum:g} to {self.maximum:g}"
+        return f"{_short(self.minimum)} to {_short(self.maximum)}"
+
+
+def _short(value: float) -> str:
+    return str(int(value)) if float(value).is_integer() else f"{value:g}"
 
 
 def parameter(
@@ -72,7 +76,8 @@ def parameter(
     read_only: bool = False,
 ) -> Any:
     """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
-    spec = ParameterSpec(description, unit, *(limits or (None, None)), choices, read_only)
+    lowest, highest = limits or (None, None)
+    spec = ParameterSpec(description, unit, lowest, highest, choices, read_only)
     if isinstance(default, list):
         return field(default_factory=list, metadata={"spec": spec})
     return field(default=default, metadata={"spec": spec})

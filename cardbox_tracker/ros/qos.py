@@ -7,6 +7,8 @@ describes a state (models, background) is latched: a late subscriber gets the la
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import (
@@ -19,6 +21,8 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 SENSOR_DATA = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+# A driver offers the strongest, so that every subscriber can have what it wants (REP-2003).
+CAMERA = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # A reader's queue of a few frames rides out a hiccup; the writer keeps to one.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
@@ -86,9 +90,7 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
 def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
     """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
     return SubscriptionEventCallbacks(
-        incompatible_qos=lambda event: report(
-            mismatch_text(topic, event.last_policy_kind, subscribing=True)
-        ),
+        incompatible_qos=partial(_report_mismatch, topic, report, True),
         incompatible_type=lambda _: report(_type_text(topic, "publishes")),
     )
 
@@ -96,11 +98,15 @@ def subscription_events(topic: str, report: Callable[[str], None]) -> Subscripti
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
     return PublisherEventCallbacks(
-        incompatible_qos=lambda event: report(
-            mismatch_text(topic, event.last_policy_kind, subscribing=False)
-        ),
+        incompatible_qos=partial(_report_mismatch, topic, report, False),
         incompatible_type=lambda _: report(_type_text(topic, "subscribes to")),
     )
+
+
+def _report_mismatch(
+    topic: str, report: Callable[[str], None], subscribing: bool, event: Any
+) -> None:
+    report(mismatch_text(topic, event.last_policy_kind, subscribing=subscribing))
 
 
 def _type_text(topic: str, verb: str) -> str:

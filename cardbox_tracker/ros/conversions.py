@@ -1,0 +1,191 @@
+"""Pictures and calibrations between messages and the core, without copies where possible.
+
+Received data is an ``array.array`` that numpy reads in place; what is sent is an ``array.array``
+too, the only kind that rclpy takes without looking at every byte.
+"""
+
+from __future__ import annotations
+
+import array
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from numpy.typing import NDArray
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+
+from cardbox_tracker.errors import CameraError, EncodingError
+from cardbox_tracker.vision.camera import Calibration, Camera
+from cardbox_tracker.vision.encodings import decode_compressed, decode_grey
+
+Picture = NDArray[np.uint8]
+
+
+def stamp_ns(stamp: Time) -> int:
+    """Return a stamp in nanoseconds."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def brightness_of(message: Image | CompressedImage) -> Picture:
+    """Return the brightness (H, W) of a picture message.
+
+    Raises:
+        EncodingError: the encoding is not supported or the bytes do not match it.
+    """
+    if isinstance(message, CompressedImage):
+        return decode_compressed(message.data, grey=True)
+    return decode_grey(
+        message.data,
+        message.height,
+        message.width,
+        message.step,
+        message.encoding,
+        bool(message.is_bigendian),
+    )
+
+
+def silhouette_of(message: Image) -> Picture:
+    """Return the silhouette (H, W), 0 or 255, a view of the message's data where rows are tight.
+
+    Raises:
+        EncodingError: it is not mono8 or has fewer bytes than its size says.
+    """
+    if message.encoding not in ("mono8", "8UC1"):
+        raise EncodingError(
+            f"the silhouette has encoding '{message.encoding}'; expected mono8 with 0 for the "
+            "background and 255 for the person, as the background node publishes it"
+        )
+    data = np.frombuffer(message.data, dtype=np.uint8)
+    height, width, step = message.height, message.width, message.step
+    if width == 0 or height == 0 or step < width or data.size < step * height:
+        raise EncodingError(
+            f"the silhouette claims {width}x{height} with {step} bytes a row but has {data.size} "
+            "bytes; its publisher fills the message wrongly"
+        )
+    return data[: step * height].reshape(height, step)[:, :width]
+
+
+def image_message(header: Header, picture: NDArray[Any], encoding: str) -> Image:
+    """Return a message of ``picture`` (H, W) or (H, W, 3), uint8 or float32, as ``encoding``."""
+    contiguous = np.ascontiguousarray(picture)
+    message = Image(
+        header=header,
+        height=contiguous.shape[0],
+        width=contiguous.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=contiguous.strides[0],
+    )
+    data = array.array("B")
+    data.frombytes(contiguous.data.cast("B"))
+    message.data = data
+    return message
+
+
+def calibration_of(message: CameraInfo, image_topic: str, info_topic: str) -> Calibration:
+    """Return the calibration of the pictures that go with ``message``.
+
+    A region of interest and binning are taken into the matrix.
+
+    Raises:
+        CameraError: the camera is not calibrated; the text names both topics.
+    """
+    k = np.array(message.k, dtype=np.float64).reshape(3, 3)
+    if not (k[0, 0] > 0 and k[1, 1] > 0):
+        raise CameraError(
+            f"the camera that publishes {image_topic} is not calibrated: the matrix K in "
+            f"{info_topic} is all zero. Calibrate it with camera_calibration, or give its driver "
+            "the calibration file, so that the CameraInfo has its focal length"
+        )
+    width, height = int(message.width), int(message.height)
+    roi = message.roi
+    if roi.width and roi.height and (roi.width, roi.height) != (width, height):
+        k[0, 2] -= roi.x_offset
+        k[1, 2] -= roi.y_offset
+        width, height = int(roi.width), int(roi.height)
+    binning_x, binning_y = max(message.binning_x, 1), max(message.binning_y, 1)
+    # The centre of the first pixel is half a pixel inside the picture.
+    k[0] = (k[0] + (0.0, 0.0, 0.5)) / binning_x - (0.0, 0.0, 0.5)
+    k[1] = (k[1] + (0.0, 0.0, 0.5)) / binning_y - (0.0, 0.0, 0.5)
+    return Calibration(
+        width // binning_x,
+        height // binning_y,
+        k,
+        np.array(message.d, dtype=np.float64),
+        message.distortion_model or "plumb_bob",
+        message.header.frame_id,
+    )
+
+
+def check_shape(
+    picture: Picture, calibration: Calibration, image_topic: str, info_topic: str
+) -> None:
+    """Check that a picture (H, W) has the aspect ratio of its calibration.
+
+    Raises:
+        CameraError: it has not, so that the CameraInfo is not that of the picture.
+    """
+    height, width = picture.shape
+    if abs(width * calibration.height - height * calibration.width) > max(width, height):
+        raise CameraError(
+            f"the pictures on {image_topic} are {width}x{height} but {info_topic} describes "
+            f"{calibration.width}x{calibration.height}, another shape; expected the CameraInfo of "
+            "these pictures: calibrate the camera at the size it delivers"
+        )
+
+
+def camera_info_message(header: Header, camera: Camera) -> CameraInfo:
+    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size."""
+    k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
+    return _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+
+
+def calibration_message(header: Header, calibration: Calibration) -> CameraInfo:
+    """Return the CameraInfo of a real camera, as its driver publishes it."""
+    return _info(
+        header,
+        calibration.width,
+        calibration.height,
+        calibration.distortion_model,
+        [float(value) for value in calibration.distortion],
+        [float(value) for value in calibration.k.ravel()],
+    )
+
+
+def _info(
+    header: Header, width: int, height: int, model: str, d: list[float], k: list[float]
+) -> CameraInfo:
+    projection = [k[0], k[1], k[2], 0.0, k[3], k[4], k[5], 0.0, k[6], k[7], k[8], 0.0]
+    return CameraInfo(
+        header=header,
+        width=width,
+        height=height,
+        distortion_model=model,
+        d=d,
+        k=k,
+        r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p=projection,
+    )
+
+
+def camera_of(message: CameraInfo) -> Camera:
+    """Return the pinhole camera of a ``silhouette/camera_info``.
+
+    Raises:
+        CameraError: the matrix is all zero or the picture is distorted.
+    """
+    k = message.k
+    if not (k[0] > 0 and k[4] > 0):
+        raise CameraError(
+            "the silhouette's CameraInfo is not calibrated (K all zero); take the silhouette and "
+            "its camera_info from the background node"
+        )
+    if any(message.d):
+        raise CameraError(
+            "the silhouette's CameraInfo has lens distortion; expected a rectified silhouette as "
+            "the background node publishes it"
+        )
+    return Camera(
+        int(message.width), int(message.height), float(k[0]), float(k[4]), float(k[2]), float(k[5])
+    )
