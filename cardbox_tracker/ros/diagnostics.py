@@ -104,12 +104,14 @@ class NodeDiagnostics:
     def wait_for(self, text: str) -> None:
         """Say that nothing comes out until ``text`` arrives."""
         self._waiting, self._problem = text, ""
-        self._say(f"waiting for {text}", self._node.get_logger().info)
+        if self._is_news(text):
+            self._node.get_logger().info(f"waiting for {text}")
 
     def problem(self, text: str) -> None:
         """Say what is wrong; it stands until :meth:`working`."""
         self._problem = text
-        self._say(text, self._node.get_logger().error)
+        if self._is_news(text):
+            self._node.get_logger().error(text)
 
     def working(self, sent_ns: int = 0) -> None:
         """Count an output; ``sent_ns`` is when its input left the sender, ns since the epoch."""
@@ -126,11 +128,13 @@ class NodeDiagnostics:
             self._warnings.append(text)
             self._node.get_logger().warning(text)
 
-    def _say(self, text: str, log: Callable[[str], object]) -> None:
+    def _is_news(self, text: str) -> bool:
+        """True if ``text`` was not logged for a while; takes note of it."""
         now = time.monotonic()
-        if now - self._said.get(text, -_REPEAT_S) >= _REPEAT_S:
-            self._said[text] = now
-            log(text)
+        if now - self._said.get(text, -_REPEAT_S) < _REPEAT_S:
+            return False
+        self._said[text] = now
+        return True
 
     def _tick(self) -> None:
         if self._problem:

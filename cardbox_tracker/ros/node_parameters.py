@@ -18,6 +18,7 @@ from cardbox_tracker.ros.parameters import NodeParameters, parameter
 from cardbox_tracker.vision.background import BackgroundConfig
 
 _BACKGROUND = BackgroundConfig()
+_SETTINGS = fields(BackgroundConfig)
 _INITIALIZATION = InitializationConfig()
 _TRACKER = TrackerConfig()
 
@@ -68,6 +69,16 @@ class BackgroundParameters(NodeParameters):
         unit="grey levels",
         limits=(0.0, 255.0),
     )
+    shadow: float = parameter(
+        _BACKGROUND.shadow,
+        "a place darker by less than this fraction is a shadow, not the person; 0 is off",
+        limits=(0.0, 1.0),
+    )
+    edge: float = parameter(
+        _BACKGROUND.edge,
+        "beside a stronger difference, a pixel is foreground from this fraction of it on; 0 is off",
+        limits=(0.0, 1.0),
+    )
     flicker: float = parameter(
         _BACKGROUND.flicker,
         "follow brightness changes of the whole scene by this fraction at most; 0 is off",
@@ -86,8 +97,7 @@ class BackgroundParameters(NodeParameters):
 
     def config(self) -> BackgroundConfig:
         """Return the settings of the core."""
-        given = {entry.name: getattr(self, entry.name) for entry in fields(BackgroundConfig)}
-        return BackgroundConfig(**given)
+        return BackgroundConfig(**{entry.name: getattr(self, entry.name) for entry in _SETTINGS})
 
 
 @dataclass(frozen=True)

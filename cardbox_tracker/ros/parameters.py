@@ -1,7 +1,7 @@
 """Parameters of a node declared from one dataclass: the single source of types and defaults.
 
-A field made by :func:`parameter` carries its description, unit, range or choices, and whether it can
-change while the node runs. :class:`LiveParameters` declares all of them on a node and keeps a
+A field made by :func:`parameter` carries its description, unit, range or choices, and whether it
+can change while it runs. :class:`LiveParameters` declares all of them on a node and keeps a
 validated instance: a wrong value is refused with the reason and the old one stays.
 """
 

@@ -2,8 +2,8 @@
 
     play_bag BAG [--rate 2] [--loop] [--topics /image_raw] [--pause-at 4.5 9] ...
 
-It pauses by itself at the times of ``--pause-at`` and on the service ``play_bag/pause``, and goes on
-on ``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
+It pauses by itself at the times of ``--pause-at`` and on the service ``play_bag/pause``, and goes
+on with ``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
 ``paused at 4.500 s`` or ``finished``. So a script can have the recording stand still at a reference
 posture, call ``initializer/capture_front``, and resume. The exit code is 0 at the end of the bag.
 """

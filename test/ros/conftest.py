@@ -1,0 +1,35 @@
+"""One ROS context a test, on a domain of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+# Below 102: higher domains collide with ephemeral ports.
+os.environ["ROS_DOMAIN_ID"] = str(20 + os.getpid() % 80)
+
+
+@pytest.fixture
+def make_node() -> Iterator[Callable[..., Any]]:
+    """Return a function that makes nodes; extra arguments are ROS arguments."""
+    import rclpy
+    from rclpy.node import Node
+
+    context = rclpy.Context()
+    nodes: list[Node] = []
+
+    def make(*arguments: str, name: str = "tested") -> Node:
+        if not context.ok():
+            rclpy.init(args=["--ros-args", *arguments] if arguments else None, context=context)
+        node = Node(name, context=context, enable_rosout=False)
+        nodes.append(node)
+        return node
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    context.try_shutdown()
