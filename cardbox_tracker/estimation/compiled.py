@@ -45,6 +45,9 @@ class CompiledCost:
         sums = np.int16 if camera.width < 2**15 else np.int32
         self._table = np.zeros((self.rows, camera.width + 1), sums)
         self._covered = np.zeros_like(self._table)
+        self._torso_table = self._table
+        self._torso_base = 0
+        self._beside_arms = np.zeros_like(self._table)
         self._torso = np.zeros(4)
         self._base = 0
         self.observe(np.zeros((camera.height, camera.width), np.uint8))
@@ -52,7 +55,9 @@ class CompiledCost:
 
     def warm_up(self) -> None:
         """Run every kernel once, so that no live picture waits for the compiler."""
+        self.fix_arms(np.zeros(12))
         self.torso(np.zeros((1, 4)))
+        self.fix_arms(None)
         self.fix_torso(np.zeros(4))
         self.arm("left", np.zeros((1, 4)))
         self.full(np.zeros((1, 12)))
@@ -62,6 +67,7 @@ class CompiledCost:
         check_silhouette(silhouette, self.camera)
         seen = np.ascontiguousarray(silhouette[: self.rows])
         self.silhouette_px = int(kernels.running_sums(seen, self._table))
+        self.fix_arms(None)
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
         """See :class:`SilhouetteCost`."""
@@ -72,11 +78,27 @@ class CompiledCost:
             self._sizes,
             self._place,
             self._view,
-            self._table,
-            self.silhouette_px,
+            self._torso_table,
+            self._torso_base,
             costs,
         )
         return costs
+
+    def fix_arms(self, posture: FloatArray | None) -> None:
+        """See :class:`SilhouetteCost`."""
+        self._torso_table, self._torso_base = self._table, self.silhouette_px
+        if posture is not None:
+            self._torso_table = self._beside_arms
+            self._torso_base += int(
+                kernels.cover_arms(
+                    np.array(posture, dtype=np.float64),
+                    self._sizes,
+                    self._place,
+                    self._view,
+                    self._table,
+                    self._beside_arms,
+                )
+            )
 
     def fix_torso(self, torso_posture: FloatArray) -> None:
         """See :class:`SilhouetteCost`."""

@@ -55,8 +55,13 @@ class TrackerConfig:
         strategy: ``drs`` or ``srs``.
         cycles: estimation cycles a frame.
         noise_decay: factor on the noise from one cycle of a frame to the next.
-        prior: cost of a joint at the end of its range, as a fraction of the silhouette's pixels.
+        prior: cost of an angle one unit from rest (see ``hierarchy``), as a fraction of the
+            silhouette's pixels.
         average: output the weighted mean of this many best particles; 1 outputs the best.
+        explore: fraction of the arms' particles that each frame draws from anywhere within the
+            joint limits, so that an arm that was lost is found again.
+        torso_beside_arms: rate a torso beside the arms found last, where they are in the picture;
+            the paper rates it alone, so it leans forward to cover the upper arms.
         parallel_arms: estimate both arms at the same time, in two threads.
         recover: search anew when the person was lost, or came back into the picture.
         lost_iou: an IoU below this counts as lost.
@@ -70,6 +75,8 @@ class TrackerConfig:
     noise_decay: float = 1.0
     prior: float = 0.0
     average: int = 1
+    explore: float = 0.0
+    torso_beside_arms: bool = False
     parallel_arms: bool = True
     recover: bool = False
     lost_iou: float = 0.4
@@ -89,6 +96,7 @@ class TrackerConfig:
         _check("noise_decay", self.noise_decay, 0.0, 1.0)
         _check("prior", self.prior, 0.0, 1.0)
         _check("average", self.average, 1, min(self.torso.particles, self.arm.particles))
+        _check("explore", self.explore, 0.0, 0.9)
         _check("lost_iou", self.lost_iou, 0.0, 1.0)
         _check("lost_frames", self.lost_frames, 1, 1_000_000)
 
@@ -109,7 +117,15 @@ def paper_preset() -> TrackerConfig:
 
 def default_preset() -> TrackerConfig:
     """Return what tracks best: cycles with falling noise, a weak prior, a mean of the best."""
-    return TrackerConfig(cycles=3, noise_decay=0.6, prior=0.012, average=20, recover=True)
+    return TrackerConfig(
+        cycles=3,
+        noise_decay=0.6,
+        prior=0.012,
+        average=20,
+        explore=0.15,
+        torso_beside_arms=True,
+        recover=True,
+    )
 
 
 PRESETS = MappingProxyType({"paper": paper_preset, "default": default_preset})

@@ -46,10 +46,16 @@ class SilhouetteCost(Protocol):
     """Foreground pixels of the observed silhouette in those rows."""
 
     def observe(self, silhouette: Silhouette) -> None:
-        """Take a new silhouette (H, W), 0 or 255; it must have the camera's size."""
+        """Take a new silhouette (H, W), 0 or 255, of the camera's size; no arms are fixed."""
+
+    def fix_arms(self, posture: FloatArray | None) -> None:
+        """Draw the arms of ``posture`` (12,) beside every torso that follows; None draws none.
+
+        They stay where they are in the picture while the torsos move.
+        """
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
-        """Costs (N,) with torso, waist and head drawn, for d1..d4 of shape (N, 4)."""
+        """Costs (N,) of torso, waist and head beside the fixed arms, for d1..d4, shape (N, 4)."""
 
     def fix_torso(self, torso_posture: FloatArray) -> None:
         """Keep the trunk at ``torso_posture`` (4,) for the arms that follow."""
@@ -95,18 +101,26 @@ class ReferenceCost:
         self.silhouette_px = 0
         self._silhouette = np.zeros((self.rows, camera.width), np.uint8)
         self._torso = np.zeros(4)
+        self._fixed_arms = np.zeros((0, 4, 3))
 
     def observe(self, silhouette: Silhouette) -> None:
         """See :class:`SilhouetteCost`."""
         check_silhouette(silhouette, self.camera)
         self._silhouette = np.ascontiguousarray(silhouette[: self.rows])
         self.silhouette_px = cv2.countNonZero(self._silhouette)
+        self.fix_arms(None)
+
+    def fix_arms(self, posture: FloatArray | None) -> None:
+        """See :class:`SilhouetteCost`."""
+        arms = slice(LEFT_ARM_PATCHES.start, RIGHT_ARM_PATCHES.stop)
+        patches = cardbox_patches(self.body, np.zeros(N_JOINTS) if posture is None else posture)
+        self._fixed_arms = patches[arms if posture is not None else slice(0, 0)]
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
         """See :class:`SilhouetteCost`."""
         postures = np.zeros((len(torso_postures), N_JOINTS))
         postures[:, TORSO] = torso_postures
-        return self._costs(postures, (TORSO_PATCHES,))
+        return self._costs(postures, (TORSO_PATCHES,), self._fixed_arms)
 
     def fix_torso(self, torso_posture: FloatArray) -> None:
         """See :class:`SilhouetteCost`."""
@@ -134,10 +148,13 @@ class ReferenceCost:
         """Return the model (rows, W) in ``posture`` (12,) as the camera sees it, 0 or 255."""
         return render(cardbox_patches(self.body, posture), self.camera, self.rows)
 
-    def _costs(self, postures: FloatArray, parts: tuple[slice, ...]) -> CostArray:
+    def _costs(
+        self, postures: FloatArray, parts: tuple[slice, ...], beside: FloatArray | None = None
+    ) -> CostArray:
+        fixed = np.zeros((0, 4, 3)) if beside is None else beside
         costs = np.empty(len(postures), np.int64)
         for i, patches in enumerate(cardbox_patches(self.body, postures)):
-            drawn = np.concatenate([patches[part] for part in parts])
+            drawn = np.concatenate([fixed, *(patches[part] for part in parts)])
             model = render(drawn, self.camera, self.rows)
             costs[i] = cv2.countNonZero(cv2.bitwise_xor(model, self._silhouette))
         return costs

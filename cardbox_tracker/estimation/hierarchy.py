@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, TORSO
+from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, N_JOINTS, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost import ARMS, SilhouetteCost
@@ -20,10 +20,15 @@ from cardbox_tracker.estimation.particle_filter import ParticleFilter
 from cardbox_tracker.estimation.resampling import STRATEGIES
 
 _REFERENCE_AREA_PX = 320 * 240
-# An angle's distance from rest is measured in half its range; the torso's place has no rest.
-_HALF_RANGES = (JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]) / 2
-_PRIOR_SCALE = 1.0 / _HALF_RANGES
-_PRIOR_SCALE[0] = 0.0
+# In which unit the prior measures each angle's distance from rest. An outline shows well how far an
+# arm is raised aside, so its abduction hardly needs a prior; flexion, which moves it towards the
+# camera or away, does. So does the torso: whoever stands before a camera faces it upright. Its
+# place has no rest.
+_RANGES = JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]
+_PRIOR_UNITS = np.where([name.endswith("flexion") for name in JOINT_NAMES], _RANGES / 6, _RANGES)
+_PRIOR_UNITS[0] = np.inf
+_PRIOR_UNITS[1:4] = np.radians(20.0)
+_PRIOR_SCALE = 1.0 / _PRIOR_UNITS
 
 
 class HierarchyResult(NamedTuple):
@@ -62,10 +67,12 @@ class HierarchicalFilter:
             side: ParticleFilter(config.arm, resampler, arm_noise, JOINT_LIMITS[joints], stream)
             for (side, joints), stream in zip(ARMS.items(), streams[1:], strict=True)
         }
+        self._last: FloatArray | None = None
         self._pool = ThreadPoolExecutor(1, "left_arm") if config.parallel_arms else None
 
     def scatter(self, posture: FloatArray, noise_scale: float = 1.0) -> HierarchyResult:
         """Start all filters around ``posture`` (12,) on the silhouette observed last."""
+        self._last = posture
         return self._run(
             lambda: self.torso.scatter(posture[TORSO], self._rate_torso, noise_scale),
             lambda side: self.arms[side].scatter(
@@ -73,16 +80,26 @@ class HierarchicalFilter:
             ),
         )
 
-    def cycle(self, noise_scale: float = 1.0) -> HierarchyResult:
-        """Run one estimation cycle of all filters on the silhouette observed last."""
+    def cycle(self, noise_scale: float = 1.0, explore: float = 0.0) -> HierarchyResult:
+        """Run one estimation cycle of all filters on the silhouette observed last.
+
+        Args:
+            noise_scale: factor on sigma_beta.
+            explore: fraction of the arms' particles to draw from anywhere.
+        """
+        explorers = int(explore * self._config.arm.particles)
         return self._run(
             lambda: self.torso.cycle(self._rate_torso, noise_scale, self._scale),
-            lambda side: self.arms[side].cycle(self._rate_arm(side), noise_scale, self._scale),
+            lambda side: self.arms[side].cycle(
+                self._rate_arm(side), noise_scale, self._scale, explorers
+            ),
         )
 
     def _run(
         self, run_torso: Callable[[], None], run_arm: Callable[[str], None]
     ) -> HierarchyResult:
+        if self._config.torso_beside_arms:
+            self._cost.fix_arms(self._last)
         run_torso()
         posture, stddev = np.empty(N_JOINTS), np.empty(N_JOINTS)
         posture[TORSO], stddev[TORSO] = self._estimate(self.torso)
@@ -96,6 +113,7 @@ class HierarchicalFilter:
             left.result()
         for side, joints in ARMS.items():
             posture[joints], stddev[joints] = self._estimate(self.arms[side])
+        self._last = posture
         return HierarchyResult(posture, stddev)
 
     def _estimate(self, particle_filter: ParticleFilter) -> tuple[FloatArray, FloatArray]:

@@ -297,19 +297,10 @@ def trunk_costs(
 
 
 @_compile
-def cover_trunk(
-    torso: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any
-) -> int:
-    """Write ``table`` with 0 gain under the trunk to ``covered``; return the trunk's own sum."""
-    rows, width = table.shape[0], table.shape[1] - 1
-    spans = np.empty((7, 2, rows), np.int32)
-    extent = np.empty((7, 2), np.int64)
-    starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
-    rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
-    _torso_pose(torso, place, view, rotation, hip)
-    _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
-    covered[:] = table
-    for k in range(7):
+def _cover(spans: Any, extent: Any, count: int, covered: Any) -> None:
+    """Take the gain of the pixels under the first ``count`` patches out of ``covered``."""
+    width = covered.shape[1] - 1
+    for k in range(count):
         for v in range(extent[k, 0], extent[k, 1]):
             start, end = spans[k, 0, v], spans[k, 1, v]
             if start < end:
@@ -322,7 +313,41 @@ def cover_trunk(
                         covered[v, u] -= gain
                 else:
                     covered[v, end] = base
+
+
+@_compile
+def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> int:
+    """Write ``table`` without the gain under the trunk to ``covered``; return what was taken."""
+    rows, width = table.shape[0], table.shape[1] - 1
+    spans = np.empty((7, 2, rows), np.int32)
+    extent = np.empty((7, 2), np.int64)
+    starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
+    rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
+    _torso_pose(torso, place, view, rotation, hip)
+    _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
+    covered[:] = table
+    _cover(spans, extent, 7, covered)
     return _sum_union(spans, extent, 7, table, starts, ends)[0]
+
+
+@_compile
+def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> int:
+    """Write ``table`` without the gain under both arms to ``covered``; return what was taken."""
+    rows, width = table.shape[0], table.shape[1] - 1
+    spans = np.empty((8, 2, rows), np.int32)
+    extent = np.empty((8, 2), np.int64)
+    starts, ends = np.empty(8, np.int64), np.empty(8, np.int64)
+    rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
+    upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    _torso_pose(posture, place, view, rotation, hip)
+    for arm in range(2):
+        _put_arm(
+            posture[4 + 4 * arm : 8 + 4 * arm], 1.0 - 2.0 * arm, rotation, hip, sizes, view,
+            4 * arm, upper, fore, origin, quad, spans, extent, rows, width,
+        )
+    covered[:] = table
+    _cover(spans, extent, 8, covered)
+    return _sum_union(spans, extent, 8, table, starts, ends)[0]
 
 
 @_compile

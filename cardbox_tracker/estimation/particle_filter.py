@@ -55,7 +55,11 @@ class ParticleFilter:
         self._rate(np.broadcast_to(posture, self.particles.shape), noise_scale, rate)
 
     def cycle(
-        self, rate: CostFunction, noise_scale: float = 1.0, sigma_scale: float = 1.0
+        self,
+        rate: CostFunction,
+        noise_scale: float = 1.0,
+        sigma_scale: float = 1.0,
+        explorers: int = 0,
     ) -> None:
         """Run one estimation cycle.
 
@@ -63,6 +67,7 @@ class ParticleFilter:
             rate: costs of particles against the present silhouette.
             noise_scale: factor on sigma_beta.
             sigma_scale: factor on sigma_gamma, such as for a larger picture.
+            explorers: so many particles, the last ones, are drawn from anywhere within the limits.
         """
         ancestors = self._resampler(
             self.costs,
@@ -70,13 +75,18 @@ class ParticleFilter:
             self.config.sigma_gamma_px * sigma_scale,
             self._rng,
         )
-        self._rate(self.particles[ancestors], noise_scale, rate)
+        self._rate(self.particles[ancestors], noise_scale, rate, explorers)
 
-    def _rate(self, ancestors: FloatArray, noise_scale: float, rate: CostFunction) -> None:
+    def _rate(
+        self, ancestors: FloatArray, noise_scale: float, rate: CostFunction, explorers: int = 0
+    ) -> None:
         steps = self._rng.standard_normal(self.particles.shape)
         steps *= self.noise * noise_scale
         steps[0] = 0.0
         steps += ancestors
+        if explorers > 0:
+            low, high = self._limits.T
+            steps[-explorers:] = self._rng.uniform(low, high, (explorers, len(low)))
         self.particles = np.clip(steps, self._limits[:, 0], self._limits[:, 1], out=steps)
         self.costs = rate(self.particles)
 

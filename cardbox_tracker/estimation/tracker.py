@@ -115,7 +115,8 @@ class Tracker:
 
     def _follow(self) -> HierarchyResult:
         for cycle in range(self.config.cycles):
-            result = self._filter.cycle(self.config.noise_decay**cycle)
+            explore = self.config.explore if cycle == 0 else 0.0
+            result = self._filter.cycle(self.config.noise_decay**cycle, explore)
         return result
 
     def _start(self, silhouette: Silhouette) -> HierarchyResult:
