@@ -1,0 +1,205 @@
+"""Real nodes in processes of their own, over real DDS, each test module on its own domain."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
+from numpy.typing import NDArray
+
+with contextlib.suppress(ImportError), warnings.catch_warnings():
+    # What rclpy imports with the first message uses modules that Python has deprecated.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    importlib.import_module("lark")
+
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+_DOMAINS = itertools.count(os.getpid())
+WAIT_S = 30.0
+
+
+class Scene:
+    """A noisy room and a person drawn from the body model itself, 320x240.
+
+    Attributes:
+        body: the person's true sizes and place.
+        camera: the camera that sees them.
+    """
+
+    def __init__(self) -> None:
+        self.body = BodyModel(distance_m=2.3, hip_height_m=-0.45, lateral_m=0.05)
+        self.camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+        self._rng = np.random.default_rng(1)
+
+    def silhouette(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
+        """Return the exact silhouette (H, W) of a posture (12,) or of a reference; None: nobody."""
+        if posture is None:
+            return np.zeros((self.camera.height, self.camera.width), np.uint8)
+        if isinstance(posture, str):
+            posture = reference_posture(posture)
+            posture[0] = self.body.lateral_m
+        return render(cardbox_patches(self.body, posture), self.camera)
+
+    def picture(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
+        """Return the noisy picture (H, W) of the same."""
+        clean = np.where(self.silhouette(posture) > 0, 190.0, 90.0)
+        return np.clip(clean + self._rng.normal(0, 2, clean.shape), 0, 255).astype(np.uint8)
+
+
+class Process:
+    """A node in a process of its own; its output goes to a file."""
+
+    def __init__(self, module: str, arguments: tuple[str, ...], log: Path, domain: int) -> None:
+        self.log = log
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
+        with log.open("w") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", f"cardbox_tracker.ros.{module}", *arguments],
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=environment,
+            )
+
+    def text(self) -> str:
+        """Return what it printed so far."""
+        return self.log.read_text()
+
+    def stop(self) -> int:
+        """Ask it to end as a user's Ctrl-C or a launch file would; return its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            return self.process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise AssertionError(f"did not stop on SIGTERM:\n{self.text()}") from None
+
+
+class Graph:
+    """The nodes under test and one node of ours that talks to them."""
+
+    def __init__(self, folder: Path) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.domain = 1 + next(_DOMAINS) % 100
+        self.folder = folder
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=self.domain)
+        self.node = rclpy.create_node("probe", context=self.context, enable_rosout=False)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.processes: list[Process] = []
+        self._stamp_ns = 1_000_000_000_000
+        self._numbers = itertools.count()
+
+    def start(self, name: str, *arguments: str, **parameters: Any) -> Process:
+        """Start the node ``name`` with ROS parameters; ``arguments`` come before them."""
+        ros = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+        log = self.folder / f"{name}_{next(self._numbers)}.log"
+        extra = ("--ros-args", *ros) if ros else ()
+        process = Process(f"{name}_node", (*arguments, *extra), log, self.domain)
+        self.processes.append(process)
+        return process
+
+    def close(self) -> None:
+        """Stop everything; a node that did not end cleanly fails the test."""
+        codes = {process.log.name: process.stop() for process in self.processes}
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+        bad = {name: code for name, code in codes.items() if code != 0}
+        assert not bad, "\n".join(
+            f"{name} ended with {code}:\n{(self.folder / name).read_text()[-2000:]}"
+            for name, code in bad.items()
+        )
+
+    def wait(self, condition: Callable[[], Any], what: str, timeout_s: float = WAIT_S) -> Any:
+        """Spin until ``condition`` is true and return its value."""
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            value = condition()
+            if value:
+                return value
+            self.executor.spin_once(timeout_sec=0.02)
+        logs = "\n".join(f"--- {p.log.name}\n{p.text()[-1500:]}" for p in self.processes)
+        raise AssertionError(f"{what}: not within {timeout_s:g} s\n{logs}")
+
+    def spin(self, duration_s: float) -> None:
+        """Spin for a while."""
+        end = time.monotonic() + duration_s
+        while (left := end - time.monotonic()) > 0:
+            self.executor.spin_once(timeout_sec=left)
+
+    def collect(self, kind: Any, topic: str, profile: Any = None) -> list[Any]:
+        """Return a list that every message on ``topic`` is added to, from now on."""
+        from cardbox_tracker.ros import qos
+
+        messages: list[Any] = []
+        self.node.create_subscription(kind, topic, messages.append, profile or qos.RESULT)
+        return messages
+
+    def call(self, name: str, timeout_s: float = WAIT_S) -> Any:
+        """Call a Trigger service and return its response."""
+        from std_srvs.srv import Trigger
+
+        client = self.node.create_client(Trigger, name)
+        self.wait(client.service_is_ready, f"service {name}")
+        future = client.call_async(Trigger.Request())
+        self.wait(future.done, f"answer of {name}", timeout_s)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def diagnosis(self, node: str, words: str = "") -> Any:
+        """Wait for a diagnostic status of ``node`` whose message has ``words`` in it; return it."""
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        arrays = self.collect(DiagnosticArray, "/diagnostics")
+
+        def found() -> Any:
+            for array in arrays:
+                for status in array.status:
+                    if status.name.startswith(f"{node}:") and words in status.message:
+                        return status
+            return None
+
+        return self.wait(found, f"diagnostics of {node} with '{words}'")
+
+    def next_stamp(self) -> Any:
+        """Return a stamp one picture (1/15 s) after the last."""
+        from builtin_interfaces.msg import Time
+
+        self._stamp_ns += 66_666_667
+        return Time(sec=self._stamp_ns // 10**9, nanosec=self._stamp_ns % 10**9)
+
+
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+    """A graph that the tests of a module share."""
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    made = Graph(tmp_path_factory.mktemp("graph"))
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """The drawn room and person."""
+    return Scene()

@@ -1,0 +1,388 @@
+"""Pictures in, joint states out: background, initializer and tracker as separate processes.
+
+The tests share one running graph and follow a user's session in order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+import pytest
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from numpy.typing import NDArray
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
+from std_msgs.msg import Header, String  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+LEARN_IMAGES = 10
+
+
+class Session:
+    """A camera that shows the scene to the three nodes."""
+
+    def __init__(self, graph: Any, scene: Any) -> None:
+        self.graph, self.scene = graph, scene
+        self.model_file = Path(graph.folder) / "model.yaml"
+        graph.start("background", learn_images=LEARN_IMAGES)
+        graph.start("initializer", model_file=self.model_file, person_distance_m=2.3)
+        self.tracker = graph.start("tracker")
+        self.images = graph.node.create_publisher(Image, "image_raw", qos.CAMERA)
+        self.infos = graph.node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)
+        self.silhouettes = graph.collect(Image, "silhouette")
+        self.joint_states = graph.collect(JointState, "joint_states")
+        graph.wait(
+            lambda: (
+                self.images.get_subscription_count() == 1
+                and self.infos.get_subscription_count() == 1
+                and graph.node.count_subscribers("silhouette") == 3
+                and graph.node.count_publishers("joint_states") == 1
+            ),
+            "the nodes find each other",
+        )
+
+    def header(self) -> Header:
+        return Header(frame_id="test_optical", stamp=self.graph.next_stamp())
+
+    def show(self, posture: NDArray[np.float64] | str | None, count: int = 1) -> list[Any]:
+        """Publish pictures and wait for the silhouette of each; return the stamps."""
+        stamps = []
+        for _ in range(count):
+            header = self.header()
+            before = len(self.silhouettes)
+            self.infos.publish(camera_info_message(header, self.scene.camera))
+            self.images.publish(image_message(header, self.scene.picture(posture), "mono8"))
+            self.graph.wait(lambda before=before: len(self.silhouettes) > before, "a silhouette")
+            stamps.append(header.stamp)
+        return stamps
+
+    def track(self, posture: NDArray[np.float64] | str, count: int) -> list[Any]:
+        """Show pictures and wait for the joint state of each; return the joint states."""
+        first = len(self.joint_states)
+        for number in range(1, count + 1):
+            self.show(posture)
+            self.graph.wait(
+                lambda number=number: len(self.joint_states) >= first + number, "a joint state"
+            )
+        return self.joint_states[first:]
+
+
+@pytest.fixture(scope="module")
+def session(graph: Any, scene: Any) -> Iterator[Session]:
+    yield Session(graph, scene)
+
+
+@pytest.fixture(scope="module")
+def learned(session: Session) -> Session:
+    """The background is learned."""
+    graph = session.graph
+    for _ in range(LEARN_IMAGES - 1):
+        header = session.header()
+        session.infos.publish(camera_info_message(header, session.scene.camera))
+        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        graph.spin(0.03)
+    for _ in range(100):
+        if session.silhouettes:
+            break
+        header = session.header()
+        session.infos.publish(camera_info_message(header, session.scene.camera))
+        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        graph.spin(0.05)
+    assert session.silhouettes
+    return session
+
+
+@pytest.fixture(scope="module")
+def measured(learned: Session) -> tuple[Session, str, str]:
+    """The body is measured; with the answer of the service and the text on body_model."""
+    models = learned.graph.collect(String, "body_model", qos.LATCHED)
+    for name in ("front", "side", "arms"):
+        learned.show(name, 5)
+        response = learned.graph.call(f"initializer/capture_{name}")
+        assert response.success, response.message
+    response = learned.graph.call("initializer/initialize", timeout_s=90)
+    assert response.success, response.message
+    learned.graph.wait(lambda: models, "body_model")
+    return learned, response.message, models[-1].data
+
+
+@pytest.mark.parametrize(
+    ("service", "words"),
+    [
+        ("initializer/capture_front", ("no silhouette was received yet on /silhouette",)),
+        ("initializer/initialize", ("no silhouette was received yet on /silhouette",)),
+        ("background/learn", ("no picture was received yet on /image_raw", "/camera_info")),
+        ("tracker/reset", ("nothing to reset", "/body_model")),
+    ],
+)
+def test_a_service_called_too_early_says_what_is_missing(
+    session: Session, service: str, words: tuple[str, ...]
+) -> None:
+    response = session.graph.call(service)
+    assert not response.success
+    for word in words:
+        assert word in response.message
+
+
+def test_every_node_says_what_it_waits_for(session: Session) -> None:
+    for node, words in (
+        ("background", "waiting for pictures on /image_raw"),
+        ("initializer", "waiting for silhouettes on /silhouette"),
+        ("tracker", "waiting for a body model on /body_model"),
+    ):
+        session.graph.diagnosis(node, words)
+
+
+def test_pictures_without_camera_info_are_waited_for_in_words(session: Session) -> None:
+    session.images.publish(image_message(session.header(), session.scene.picture(None), "mono8"))
+    session.graph.diagnosis("background", "waiting for the CameraInfo on /camera_info")
+
+
+def test_uncalibrated_camera_is_refused_with_both_topics(session: Session) -> None:
+    session.infos.publish(CameraInfo(header=session.header(), width=320, height=240))
+    status = session.graph.diagnosis("background", "not calibrated")
+    assert "/image_raw" in status.message and "/camera_info" in status.message
+
+
+def test_background_is_learned_and_latched(learned: Session) -> None:
+    means = learned.graph.collect(Image, "background/mean", qos.LATCHED)
+    deviations = learned.graph.collect(Image, "background/stddev", qos.LATCHED)
+    learned.graph.wait(lambda: means and deviations, "the latched background")
+    mean = np.frombuffer(means[0].data, np.float32)
+    assert means[0].encoding == "32FC1" and mean.size == 320 * 240
+    assert mean.mean() == pytest.approx(90, abs=1)
+    assert np.frombuffer(deviations[0].data, np.float32).mean() == pytest.approx(2, abs=0.5)
+
+
+def test_silhouette_has_the_stamp_size_and_camera_info_of_its_picture(learned: Session) -> None:
+    infos = learned.graph.collect(CameraInfo, "silhouette/camera_info")
+    learned.graph.wait(
+        lambda: learned.graph.node.count_subscribers("silhouette/camera_info") == 3, "discovery"
+    )
+    learned.graph.spin(0.3)
+    (stamp,) = learned.show("front")
+    silhouette = learned.silhouettes[-1]
+    learned.graph.wait(lambda: infos, "silhouette/camera_info")
+    assert silhouette.header.stamp == infos[-1].header.stamp == stamp
+    assert silhouette.header.frame_id == "test_optical"
+    assert (silhouette.width, silhouette.height, silhouette.encoding) == (320, 240, "mono8")
+    assert (infos[-1].width, infos[-1].height, list(infos[-1].d)) == (320, 240, [0.0] * 5)
+    assert infos[-1].k[0] == pytest.approx(300.0)
+    got = np.frombuffer(silhouette.data, np.uint8).reshape(240, 320)
+    assert set(np.unique(got)) == {0, 255}
+    assert np.mean(got != learned.scene.silhouette("front")) < 0.01
+
+
+def test_unsupported_encoding_is_refused_in_words_and_the_node_goes_on(learned: Session) -> None:
+    message = image_message(learned.header(), learned.scene.picture(None), "mono8")
+    message.encoding = "16UC3"
+    learned.images.publish(message)
+    status = learned.graph.diagnosis("background", "16UC3")
+    assert "mono8" in status.message and "bgr8" in status.message
+    learned.show(None)
+
+
+def test_too_few_bytes_are_refused_and_the_node_goes_on(learned: Session) -> None:
+    message = image_message(learned.header(), learned.scene.picture(None), "mono8")
+    message.height = 480
+    learned.images.publish(message)
+    learned.show(None)
+
+
+def test_capture_refuses_an_empty_picture(learned: Session) -> None:
+    learned.show(None, 5)
+    response = learned.graph.call("initializer/capture_front")
+    assert not response.success and "nobody is in the picture" in response.message
+
+
+def test_capture_refuses_a_person_cut_off(learned: Session) -> None:
+    aside = reference_posture("front")
+    aside[0] = 1.1
+    learned.show(aside, 5)
+    response = learned.graph.call("initializer/capture_front")
+    assert not response.success and "cut off at the right border" in response.message
+
+
+def test_initialize_refuses_a_person_who_did_not_turn(learned: Session) -> None:
+    for name in ("front", "side", "arms"):
+        learned.show("front", 5)
+        assert learned.graph.call(f"initializer/capture_{name}").success
+    response = learned.graph.call("initializer/initialize", timeout_s=90)
+    assert not response.success and "did not turn" in response.message
+
+
+def test_initialize_answers_with_sizes_and_fit(measured: tuple[Session, str, str]) -> None:
+    session, answer, _ = measured
+    for word in ("fit (IoU) front", "mean", "torso_height", str(session.model_file)):
+        assert word in answer
+    status = session.graph.diagnosis("initializer")
+    assert {value.key: value.value for value in status.values}["body model"] == "published"
+
+
+def test_body_model_message_is_the_saved_file(measured: tuple[Session, str, str]) -> None:
+    session, _, text = measured
+    assert session.model_file.read_text() == text
+    body = loads_body_model(text)
+    assert body.distance_m == pytest.approx(2.3)
+    assert body.size("upper_arm_length") == pytest.approx(
+        session.scene.body.size("upper_arm_length"), abs=0.06
+    )
+
+
+def test_robot_description_is_latched_and_has_the_joints(
+    measured: tuple[Session, str, str],
+) -> None:
+    session, _, _ = measured
+    descriptions = session.graph.collect(String, "robot_description", qos.LATCHED)
+    session.graph.wait(lambda: descriptions, "robot_description")
+    robot = Xml.fromstring(descriptions[-1].data)
+    joints = {j.get("name") for j in robot.findall("joint") if j.get("type") != "fixed"}
+    assert joints == set(JOINT_NAMES)
+    assert "test_optical" in {link.get("name") for link in robot.findall("link")}
+
+
+def test_each_picture_gives_joint_states_of_its_stamp(measured: tuple[Session, str, str]) -> None:
+    session, _, _ = measured
+    first = len(session.joint_states)
+    stamps = []
+    for _ in range(15):
+        stamps += session.show("front")
+    session.graph.wait(lambda: len(session.joint_states) == first + 15, "15 joint states")
+    messages = session.joint_states[first:]
+    assert [message.header.stamp for message in messages] == stamps
+    assert all(tuple(message.name) == JOINT_NAMES for message in messages)
+    posture = np.array(messages[-1].position)
+    body, camera = session.scene.body, session.scene.camera
+    truth = reference_posture("front")
+    truth[0] = body.lateral_m
+    found = keypoints_m(body, posture)
+    error_m = np.linalg.norm(found - keypoints_m(body, truth), axis=1)
+    assert error_m.mean() < 0.15
+    assert camera.width == 320
+
+
+def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
+    measured: tuple[Session, str, str],
+) -> None:
+    session, _, _ = measured
+    graph = session.graph
+    keypoints = graph.collect(PoseArray, "keypoints")
+    markers = graph.collect(MarkerArray, "markers")
+    overlays = graph.collect(Image, "overlay", qos.SENSOR_DATA)
+    deviations = graph.collect(JointState, "joint_states_stddev")
+    graph.spin(0.5)
+    state = session.track("front", 2)[-1]
+    graph.wait(lambda: keypoints and markers and overlays and deviations, "all outputs")
+    graph.spin(0.2)
+    assert keypoints[-1].header.stamp == state.header.stamp
+    assert keypoints[-1].header.frame_id == "test_optical"
+    points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
+    body, camera = session.scene.body, session.scene.camera
+    expected = camera.reference_to_optical(keypoints_m(body, np.array(state.position)))
+    assert points.shape == (6, 3)
+    np.testing.assert_allclose(points, expected, atol=0.1)
+    kinds = {marker.ns: marker.type for marker in markers[-1].markers}
+    assert kinds == {"patches": Marker.TRIANGLE_LIST, "skeleton": Marker.LINE_LIST}
+    assert markers[-1].markers[0].header.frame_id == "test_optical"
+    assert (overlays[-1].width, overlays[-1].height, overlays[-1].encoding) == (320, 240, "bgr8")
+    assert np.all(np.array(deviations[-1].position) >= 0)
+
+    before = len(session.joint_states)
+    session.show(None, 2)
+    graph.wait(
+        lambda: any(m.action == Marker.DELETEALL for a in markers for m in a.markers),
+        "markers removed when nobody is there",
+    )
+    assert len(session.joint_states) == before
+    graph.diagnosis("tracker", "nobody is in the picture")
+
+
+def test_reset_starts_from_the_front_reference(measured: tuple[Session, str, str]) -> None:
+    session, _, _ = measured
+    session.track("front", 2)
+    response = session.graph.call("tracker/reset")
+    assert response.success and "front reference" in response.message
+    session.track("front", 2)
+
+
+def test_wrong_parameter_is_refused_and_a_right_one_is_live(
+    measured: tuple[Session, str, str],
+) -> None:
+    session, _, _ = measured
+    graph = session.graph
+    client = graph.node.create_client(SetParametersAtomically, "tracker/set_parameters_atomically")
+    graph.wait(client.service_is_ready, "parameter service")
+
+    def set_parameter(name: str, value: Any) -> Any:
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()]
+        )
+        future = client.call_async(request)
+        graph.wait(future.done, "answer")
+        return future.result().result
+
+    refused = set_parameter("strategy", "magic")
+    assert not refused.successful and "drs, srs" in refused.reason
+    refused = set_parameter("average", 100000)
+    assert not refused.successful and "average" in refused.reason
+    assert set_parameter("particles", 100).successful
+    session.track("front", 2)
+
+
+def test_a_restarted_tracker_goes_on_with_the_latched_model(
+    measured: tuple[Session, str, str],
+) -> None:
+    session, _, _ = measured
+    assert session.tracker.stop() == 0
+    graph = session.graph
+    graph.wait(lambda: graph.node.count_publishers("joint_states") == 0, "the tracker is gone")
+    session.tracker = graph.start("tracker")
+    graph.wait(
+        lambda: (
+            graph.node.count_publishers("joint_states") == 1
+            and graph.node.count_subscribers("silhouette") == 3
+        ),
+        "the new tracker",
+    )
+    graph.diagnosis("tracker", "waiting for silhouettes")
+    states = session.track("front", 3)
+    assert len(states) >= 3
+
+
+def test_diagnostics_have_state_rates_latency_and_fit(measured: tuple[Session, str, str]) -> None:
+    session, _, _ = measured
+    session.track("front", 3)
+    for node, keys in (
+        ("background", {"rate in (Hz)", "rate out (Hz)", "latency p95 (ms)"}),
+        ("tracker", {"state", "iou", "cost (px)", "latency p95 (ms)", "dropped (by stamps)"}),
+    ):
+        status = session.graph.diagnosis(node, "working")
+        assert keys <= {value.key for value in status.values}
+
+
+def test_learning_again_stops_silhouettes_until_it_is_done(
+    measured: tuple[Session, str, str],
+) -> None:
+    session, _, _ = measured
+    response = session.graph.call("background/learn")
+    assert response.success and f"{LEARN_IMAGES} pictures" in response.message
+    before = len(session.silhouettes)
+    for _ in range(LEARN_IMAGES):
+        header = session.header()
+        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        session.graph.spin(0.03)
+    session.graph.wait(lambda: len(session.silhouettes) > before, "silhouettes again")
+    assert len(session.silhouettes) <= before + 2
