@@ -61,6 +61,7 @@ class Guidance:
                 self._wait(_HOLD_S)
                 try:
                     self._say(f"{name}: {self._capture(name)}")
+                    self._wait(_HOLD_S)
                     break
                 except InitializationError as error:
                     self._say(f"{name}: not captured: {error}")

@@ -13,6 +13,7 @@ from __future__ import annotations
 import importlib
 import sys
 import time
+from contextlib import ExitStack
 from typing import Any
 
 import rclpy
@@ -49,7 +50,8 @@ class PlayBagNode(CardboxNode):
         super().__init__("play_bag", **options)
         self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
         settings = self.parameters.value
-        self._reader = BagReader(settings.bag)
+        self._resources = ExitStack()
+        self._reader = self._resources.enter_context(BagReader(settings.bag))
         self._position_s = settings.start_s
         self._paused = False
         self._anchor = (0.0, 0.0)
@@ -109,13 +111,14 @@ class PlayBagNode(CardboxNode):
     def _play_once(self) -> None:
         settings = self.parameters.value
         end_s = settings.start_s + (settings.duration_s or float("inf"))
-        pauses = sorted(settings.pause_at)
+        pauses = sorted(at_s for at_s in settings.pause_at if at_s >= settings.start_s)
         progress_s = time.monotonic()
         self._position_s = settings.start_s
         self._set_anchor()
         self._say("playing")
-        for topic, bag_time_ns, _, data in self._reader.messages(list(self._publishers_of)):
-            at_s = (bag_time_ns - self._reader.start_ns) / 1e9
+        start_ns, length_s = self._reader.start_ns, self._reader.duration_s
+        for message in self._reader.messages(list(self._publishers_of)):
+            at_s = (message.time_ns - start_ns) / 1e9
             if at_s < settings.start_s:
                 continue
             if at_s > end_s:
@@ -124,12 +127,12 @@ class PlayBagNode(CardboxNode):
                 self._position_s = pauses.pop(0)
                 self._pause()
             self._wait_until_due(at_s)
-            self._publishers_of[topic].publish(bytes(data))
+            self._publishers_of[message.topic].publish(message.raw)
             self.diagnostics.working()
             self._position_s = at_s
             if time.monotonic() - progress_s >= _PROGRESS_S:
                 progress_s = time.monotonic()
-                self.get_logger().info(f"at {at_s:.1f} of {self._reader.duration_s:.1f} s")
+                self.get_logger().info(f"at {at_s:.1f} of {length_s:.1f} s")
 
     def _wait_until_due(self, at_s: float) -> None:
         """Serve calls until the message of that bag time is due and nothing is paused."""
@@ -166,20 +169,28 @@ class PlayBagNode(CardboxNode):
         self._say("playing")
         return f"playing from {self._position_s:.3f} s"
 
+    def close(self) -> None:
+        """Close the bag."""
+        self._resources.close()
+
 
 def main(args: list[str] | None = None) -> int:
     """Play a bag; the exit code is 0 at its end, 1 for a bag that cannot be played."""
     command_line = list(sys.argv) if args is None else ["play_bag", *args]
     overrides = overrides_from(remove_ros_args(command_line)[1:])
     rclpy.init(args=command_line)
+    node: PlayBagNode | None = None
     try:
-        PlayBagNode(parameter_overrides=overrides).play()
+        node = PlayBagNode(parameter_overrides=overrides)
+        node.play()
     except CardboxError as error:
         get_logger("play_bag").fatal(str(error))
         return 1
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
+        if node is not None:
+            node.close()
         try_shutdown()
     return 0
 

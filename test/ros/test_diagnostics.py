@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from cardbox_tracker.ros.diagnostics import NodeDiagnostics, StreamStatistics
 from diagnostic_msgs.msg import DiagnosticStatus
+
+from cardbox_tracker.ros.diagnostics import NodeDiagnostics, StreamStatistics
 
 PERIOD_NS = 66_666_667
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.ros.guidance import Guidance, instruction
 

@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rcl_interfaces.msg import ParameterType
+from rclpy.parameter import Parameter
+
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization import InitializationConfig
@@ -21,8 +24,6 @@ from cardbox_tracker.ros.node_parameters import (
 )
 from cardbox_tracker.ros.parameters import LiveParameters, NodeParameters, parameter
 from cardbox_tracker.vision.background import BackgroundConfig
-from rcl_interfaces.msg import ParameterType
-from rclpy.parameter import Parameter
 
 ROOT = Path(__file__).resolve().parents[2]
 

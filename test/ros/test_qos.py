@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from cardbox_tracker.ros import qos
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind
+
+from cardbox_tracker.ros import qos
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
+
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES

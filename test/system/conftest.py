@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
-from numpy.typing import NDArray
 
 with contextlib.suppress(ImportError), warnings.catch_warnings():
     # What rclpy imports with the first message uses modules that Python has deprecated.

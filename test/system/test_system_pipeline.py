@@ -12,21 +12,23 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from numpy.typing import NDArray
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
 
 LEARN_IMAGES = 10
 

@@ -1,0 +1,88 @@
+"""``camera`` plays a video file as a camera would, and says what is wrong with its sources."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+
+CALIBRATION = """\
+image_width: 64
+image_height: 48
+camera_name: test
+distortion_model: plumb_bob
+camera_matrix: {rows: 3, cols: 3, data: [60.0, 0, 31.5, 0, 60.0, 23.5, 0, 0, 1]}
+distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0]}
+"""
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory: Any) -> Path:
+    path = Path(tmp_path_factory.mktemp("video")) / "video.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 20.0, (64, 48))
+    assert writer.isOpened()
+    for number in range(20):
+        writer.write(np.full((48, 64, 3), 10 * number, np.uint8))
+    writer.release()
+    return path
+
+
+def test_video_and_calibration_come_out_at_the_rate(
+    graph: Any, video: Path, tmp_path: Path
+) -> None:
+    calibration = tmp_path / "camera.yaml"
+    calibration.write_text(CALIBRATION)
+    images = graph.collect(Image, "image_raw", qos.SENSOR_DATA)
+    infos = graph.collect(CameraInfo, "camera_info", qos.SENSOR_DATA)
+    process = graph.start(
+        "camera", file=video, loop=True, rate_hz=20.0, calibration_file=calibration, frame_id="eye"
+    )
+    graph.wait(lambda: len(images) >= 25 and len(infos) >= 25, "pictures beyond the file's end")
+    assert (images[0].width, images[0].height, images[0].encoding) == (64, 48, "mono8")
+    assert images[0].header.frame_id == infos[0].header.frame_id == "eye"
+    assert (infos[0].k[0], infos[0].d[0]) == (60.0, 0.1)
+    assert {stamp_ns(i.header.stamp) for i in images[:20]} <= {
+        stamp_ns(i.header.stamp) for i in infos
+    }
+    spacing_s = np.diff([stamp_ns(image.header.stamp) for image in images[:25]]) / 1e9
+    assert np.median(spacing_s) == pytest.approx(0.05, abs=0.01)
+    assert process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"device": "/dev/video_none"}, ("no camera /dev/video_none", "file")),
+        ({"file": "/nowhere.mp4"}, ("no video /nowhere.mp4",)),
+        ({"file": __file__}, ("no video that OpenCV can read", "ffmpeg")),
+        ({"device": "''"}, ("both empty",)),
+    ],
+)
+def test_a_source_that_cannot_be_opened_says_what_to_do(
+    graph: Any, parameters: dict[str, str], words: tuple[str, ...]
+) -> None:
+    process = graph.start("camera", **parameters)
+    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.processes.remove(process)
+    assert process.process.returncode == 1
+    for word in words:
+        assert word in process.text()
+    assert "Traceback" not in process.text()
+
+
+def test_an_unreadable_calibration_is_named(graph: Any, video: Path) -> None:
+    process = graph.start("camera", file=video, calibration_file="/nowhere.yaml")
+    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.processes.remove(process)
+    assert process.process.returncode == 1
+    assert "/nowhere.yaml" in process.text() and "Traceback" not in process.text()

@@ -1,0 +1,79 @@
+"""One call of ``initialize`` guides a person through all postures and answers with the sizes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
+from std_msgs.msg import Header, String  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
+
+
+class Person:
+    """Somebody who reads the status and does what it says."""
+
+    def __init__(self, graph: Any, scene: Any) -> None:
+        self.graph, self.scene = graph, scene
+        self.posture: str | None = None
+        self.obeys = True
+        self.statuses = graph.collect(String, "initializer/status", qos.LATCHED)
+        self.images = graph.node.create_publisher(Image, "silhouette", qos.SILHOUETTE)
+        self.infos = graph.node.create_publisher(
+            CameraInfo, "silhouette/camera_info", qos.SILHOUETTE
+        )
+        graph.node.create_timer(0.05, self.show)
+
+    def show(self) -> None:
+        line = self.statuses[-1].data if self.statuses else ""
+        if self.obeys and line.split(":")[0] in ("front", "side", "arms"):
+            self.posture = line.split(":")[0]
+        header = Header(frame_id="optical", stamp=self.graph.next_stamp())
+        self.infos.publish(camera_info_message(header, self.scene.camera))
+        self.images.publish(image_message(header, self.scene.silhouette(self.posture), "mono8"))
+
+
+@pytest.fixture(scope="module")
+def person(graph: Any, scene: Any) -> Person:
+    graph.start("initializer", count_down_s=1, attempts=2, capture_frames=3, person_distance_m=2.3)
+    person = Person(graph, scene)
+    graph.wait(lambda: graph.node.count_subscribers("silhouette") == 1, "the initializer")
+    return person
+
+
+def test_guidance_gives_up_with_the_reason_when_nobody_comes(person: Person) -> None:
+    person.obeys, person.posture = False, None
+    person.graph.spin(0.5)
+    response = person.graph.call("initializer/initialize")
+    assert not response.success and "nobody is in the picture" in response.message
+    lines = [status.data for status in person.statuses]
+    assert any(line.startswith("front: not captured: ") for line in lines)
+
+
+def test_one_call_guides_captures_and_measures(person: Person) -> None:
+    person.obeys, graph = True, person.graph
+    person.statuses.clear()
+    client = graph.node.create_client(Trigger, "initializer/initialize")
+    graph.wait(client.service_is_ready, "service")
+    first = client.call_async(Trigger.Request())
+    graph.wait(lambda: person.statuses, "the count-down")
+
+    second = client.call_async(Trigger.Request())
+    graph.wait(second.done, "the second answer, before the first", timeout_s=3)
+    assert not second.result().success and "already running" in second.result().message
+    assert not first.done()
+
+    graph.wait(first.done, "the answer", timeout_s=60)
+    assert first.result().success, first.result().message
+    assert "mean" in first.result().message
+    lines = [status.data for status in person.statuses]
+    for name, words in (("front", "face the camera"), ("side", "left"), ("arms", "sideways")):
+        assert any(line.startswith(f"{name}: ") and words in line for line in lines), lines
+        assert any(line.startswith(f"{name}: captured") for line in lines), lines
+    assert any(line.startswith("measuring") for line in lines)

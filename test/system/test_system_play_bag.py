@@ -1,0 +1,130 @@
+"""``play_bag`` plays what was recorded, with its stamps, and stands still where it is told."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.bag_writer import BagWriter  # noqa: E402
+from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+
+START_NS = 1_700_000_000_000_000_000
+PERIOD_NS = 50_000_000
+COUNT = 40
+
+
+@pytest.fixture(scope="module", params=["mcap", "sqlite3"])
+def bag(request: pytest.FixtureRequest, scene: Any, tmp_path_factory: Any) -> Path:
+    path = Path(tmp_path_factory.mktemp("bags")) / f"bag_{request.param}"
+    with BagWriter(path, storage=request.param) as writer:
+        for number in range(COUNT):
+            now_ns = START_NS + number * PERIOD_NS
+            writer.write_camera_info("/camera_info", now_ns, "optical", scene.camera)
+            picture = np.full((24, 32), number, np.uint8)
+            writer.write_image("/image_raw", now_ns, "optical", picture, "mono8")
+    return path
+
+
+def ended(graph: Any, process: Any, timeout_s: float = 20.0) -> int:
+    graph.wait(lambda: process.process.poll() is not None, "the end of the bag", timeout_s)
+    return int(process.process.returncode)
+
+
+def test_every_message_comes_with_its_stamp_in_order(graph: Any, bag: Path) -> None:
+    images = graph.collect(Image, "image_raw")
+    infos = graph.collect(CameraInfo, "camera_info")
+    started = time.monotonic()
+    process = graph.start("play_bag", str(bag), "--rate", "4", "--delay", "1")
+    assert ended(graph, process) == 0
+    assert time.monotonic() - started > COUNT * PERIOD_NS / 1e9 / 4
+    graph.wait(lambda: len(images) == len(infos) == COUNT, "all messages")
+    expected = [START_NS + number * PERIOD_NS for number in range(COUNT)]
+    assert [stamp_ns(image.header.stamp) for image in images] == expected
+    assert [image.data[0] for image in images] == list(range(COUNT))
+    assert infos[0].k[0] == pytest.approx(300.0)
+    graph.spin(0.2)
+    for subscription in list(graph.node.subscriptions):
+        graph.node.destroy_subscription(subscription)
+
+
+def test_it_pauses_where_told_and_resumes_on_call(graph: Any, bag: Path) -> None:
+    images = graph.collect(Image, "image_raw")
+    statuses = graph.collect(String, "play_bag/status", qos.LATCHED)
+    process = graph.start(
+        "play_bag", str(bag), "--rate", "4", "--delay", "1", "--pause-at", "0.5", "1.0"
+    )
+
+    def says(text: str) -> Any:
+        return graph.wait(lambda: statuses and statuses[-1].data == text, f"status '{text}'")
+
+    says("paused at 0.500 s")
+    graph.spin(0.3)
+    assert len(images) == 10
+    assert graph.call("play_bag/resume").success
+    says("paused at 1.000 s")
+    graph.spin(0.3)
+    assert len(images) == 20
+    assert graph.call("play_bag/resume").success
+    says("playing")
+    response = graph.call("play_bag/pause")
+    assert response.success and "paused at" in response.message
+    assert graph.call("play_bag/resume").success
+    assert ended(graph, process) == 0
+    graph.wait(lambda: len(images) == COUNT, "all pictures")
+    for subscription in list(graph.node.subscriptions):
+        graph.node.destroy_subscription(subscription)
+
+
+def test_part_and_topics_can_be_chosen(graph: Any, bag: Path) -> None:
+    images = graph.collect(Image, "image_raw")
+    infos = graph.collect(CameraInfo, "camera_info")
+    options = ("--start", "0.5", "--duration", "0.49", "--topics", "/image_raw", "--delay", "1")
+    process = graph.start("play_bag", str(bag), *options)
+    assert ended(graph, process) == 0
+    graph.wait(lambda: len(images) == 10, "ten pictures")
+    assert [image.data[0] for image in images] == list(range(10, 20))
+    assert not infos
+    for subscription in list(graph.node.subscriptions):
+        graph.node.destroy_subscription(subscription)
+
+
+def test_resume_while_playing_is_refused(graph: Any, bag: Path) -> None:
+    process = graph.start("play_bag", str(bag), "--no-wait")
+    response = graph.call("play_bag/resume")
+    assert not response.success and "not paused" in response.message
+    assert process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), ("no bag is given",)),
+        (("/nowhere/bag",), ("/nowhere/bag",)),
+    ],
+)
+def test_a_bag_that_cannot_be_played_is_named(
+    graph: Any, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    process = graph.start("play_bag", *arguments)
+    assert ended(graph, process) == 1
+    graph.processes.remove(process)
+    for word in words:
+        assert word in process.text()
+    assert "Traceback" not in process.text()
+
+
+def test_an_unknown_topic_is_named_with_those_there_are(graph: Any, bag: Path) -> None:
+    process = graph.start("play_bag", str(bag), "--topics", "/nothing")
+    assert ended(graph, process) == 1
+    graph.processes.remove(process)
+    assert "no topic /nothing" in process.text() and "/image_raw" in process.text()

@@ -1,0 +1,57 @@
+"""Publishers and subscribers that cannot talk are told so, in the log and in the diagnostics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from sensor_msgs.msg import Image, JointState  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import image_message  # noqa: E402
+
+
+def test_a_best_effort_silhouette_is_told_with_the_remedy(graph: Any) -> None:
+    tracker = graph.start("tracker")
+    graph.wait(lambda: graph.node.count_publishers("joint_states") == 1, "the tracker")
+    graph.node.create_publisher(Image, "silhouette", qos.SENSOR_DATA)
+    words = "incompatible QoS on /silhouette: a publisher offers best effort"
+    graph.wait(lambda: words in tracker.text(), "the warning in the log")
+    assert "qos_overrides./silhouette.subscription.reliability:=best_effort" in tracker.text()
+
+    def reported() -> bool:
+        status = graph.diagnosis("tracker")
+        return any(words in value.value for value in status.values)
+
+    graph.wait(reported, "the warning in the diagnostics")
+
+
+def test_a_latched_subscriber_of_joint_states_is_told(graph: Any) -> None:
+    tracker = graph.processes[0]
+    graph.collect(JointState, "joint_states", qos.LATCHED)
+    words = "incompatible QoS on /joint_states: a subscriber asks for latched"
+    graph.wait(lambda: words in tracker.text(), "the warning in the log")
+
+
+def test_the_remedy_works(graph: Any, scene: Any) -> None:
+    """With the override named in the warning, best-effort silhouettes arrive."""
+    override = "qos_overrides./eye/silhouette.subscription.reliability"
+    tracker = graph.start(
+        "tracker", "--ros-args", "-r", "__ns:=/eye", "-p", f"{override}:=best_effort"
+    )
+    publisher = graph.node.create_publisher(Image, "/eye/silhouette", qos.SENSOR_DATA)
+    graph.wait(publisher.get_subscription_count, "the tracker")
+    graph.spin(0.3)
+    header = Header(frame_id="eye", stamp=graph.next_stamp())
+    publisher.publish(image_message(header, scene.silhouette("front"), "mono8"))
+
+    def received() -> bool:
+        values = {v.key: v.value for v in graph.diagnosis("eye/tracker").values}
+        return values["received"] == "1"
+
+    graph.wait(received, "the silhouette")
+    assert "incompatible" not in tracker.text()
