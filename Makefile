@@ -1,0 +1,94 @@
+# make setup   everything in .venv: the cardbox command, the nodes, the tools of the tests
+# make demo    the whole chain on a synthetic recording; results in demo_output/
+# make test    set-up, lint, types, all tests
+# make lint    ruff and mypy alone
+# make colcon  proof that colcon builds and tests the package as a ROS workspace would
+# make clean   remove all that the above made
+#
+# PYTHON=python3.12 chooses the interpreter of a new .venv (3.11 or later). No venv has to be active.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+# What another venv or a sourced ROS installation leaves behind would be mixed into ours: its
+# libraries, its packages, or a DDS implementation that the wheels lack.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
+unexport AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH RMW_IMPLEMENTATION
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(CURDIR)/$(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+
+# Spaces in a path would break the rules of make; no file of ours has any.
+SOURCES := $(shell find cardbox_tracker config launch resource -type f \
+	-not -path '*/__pycache__/*' -not -path '*/.*')
+# A deleted or renamed file is no newer than the stamp; the list of the names shows it.
+NAMES := $(VENV)/sources-$(firstword $(shell printf '%s\n' $(sort $(SOURCES)) | cksum))
+
+.PHONY: help
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); expected Python 3.11 or later:" \
+			"make setup PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+
+# Dependencies change seldom and take long; the package itself changes often and takes seconds.
+$(VENV)/dependencies: setup.py | $(VENV)/bin/python
+	$(PIP) install --quiet 'setuptools>=70.1,<80' .[ros,test]
+	@touch $@
+
+$(NAMES): | $(VENV)/bin/python
+	@rm -f $(VENV)/sources-*
+	@touch $@
+
+# Setuptools builds in the tree and would pick up what an earlier build left there.
+$(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyproject.toml package.xml
+	@rm -rf build/lib build/bdist.* *.egg-info
+	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
+	@rm -rf build/lib build/bdist.* *.egg-info
+	@touch $@
+
+.PHONY: setup
+setup: $(VENV)/package
+
+.PHONY: lint
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+.PHONY: test
+test: lint
+	$(BIN)/python -m pytest
+
+.PHONY: demo
+demo: setup
+	$(BIN)/cardbox demo --output demo_output
+
+# In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
+COLCON := build/colcon
+.PHONY: colcon
+colcon: setup
+	$(PIP) install --quiet .[colcon]
+	rm -rf $(COLCON)
+	mkdir -p $(COLCON)/src/cardbox_tracker
+	git ls-files -z --cached --others --exclude-standard \
+		| while IFS= read -r -d '' file; do if [[ -e $$file ]]; then printf '%s\0' "$$file"; fi; done \
+		| tar --create --null --files-from=- | tar --extract --directory=$(COLCON)/src/cardbox_tracker
+	cd $(COLCON) && export AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH=$(BIN):$$PATH && \
+		colcon build --event-handlers console_direct+ && \
+		for name in cardbox background initializer tracker camera play_bag; do \
+			test -x install/cardbox_tracker/lib/cardbox_tracker/$$name || \
+				{ echo "colcon installed no $$name" >&2; exit 1; }; \
+		done && \
+		colcon test --event-handlers console_direct+ --return-code-on-test-failure \
+			--pytest-args -m 'not slow'
+
+.PHONY: clean
+clean:
+	rm -rf $(VENV) build dist *.egg-info demo_output .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,66 @@
+"""Build with colcon (ament_python) or with pip; package.xml lists what ROS provides."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "cardbox_tracker"
+SHARE = f"share/{NAME}"
+
+# On a ROS installation these come with it, so pip installs them only when asked to.
+ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
+TEST = [
+    "hypothesis>=6.100",
+    "mypy>=1.11",
+    "pytest>=7.4",
+    "pytest-timeout>=2.3",
+    "ruff>=0.6",
+    "types-PyYAML",
+    "types-tqdm",
+]
+# Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
+COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Upper-body posture of one person from the silhouettes of one fixed camera",
+    maintainer="cardbox_tracker maintainers",
+    maintainer_email="maintainers@cardbox-tracker.invalid",
+    license="Apache-2.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    zip_safe=False,
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (SHARE, ["package.xml"]),
+        (f"{SHARE}/config", sorted(glob("config/*"))),
+        (f"{SHARE}/launch", sorted(glob("launch/*.launch.py"))),
+    ],
+    python_requires=">=3.11",
+    install_requires=[
+        "matplotlib>=3.8",
+        "numba>=0.60",
+        "numpy>=1.26",
+        "opencv-python-headless>=4.9",
+        "PyYAML>=6.0",
+        "rosbags>=0.10",
+        "tqdm>=4.66",
+    ],
+    extras_require={
+        "ros": ROS,
+        "test": TEST,
+        "colcon": COLCON,
+        "mediapipe": ["mediapipe==0.10.21"],
+    },
+    entry_points={
+        "console_scripts": [
+            f"cardbox = {NAME}.cli:main",
+            f"background = {NAME}.ros.background_node:main",
+            f"initializer = {NAME}.ros.initializer_node:main",
+            f"tracker = {NAME}.ros.tracker_node:main",
+            f"camera = {NAME}.ros.camera_node:main",
+            f"play_bag = {NAME}.ros.play_bag_node:main",
+        ],
+    },
+)
