@@ -25,9 +25,10 @@ os.environ["ROS_DOMAIN_ID"] = str(20 + os.getpid() % 80)
 def make_node() -> Iterator[Callable[..., Any]]:
     """Return a function that makes nodes; extra arguments are ROS arguments."""
     import rclpy
+    from rclpy.context import Context
     from rclpy.node import Node
 
-    context = rclpy.Context()
+    context = Context()
     nodes: list[Node] = []
 
     def make(*arguments: str, name: str = "tested") -> Node:

@@ -15,11 +15,11 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization import InitializationConfig
 from cardbox_tracker.ros import parameter_docs
+from cardbox_tracker.ros.input_parameters import PlayBagParameters
 from cardbox_tracker.ros.node_parameters import (
     NODES,
     BackgroundParameters,
     InitializerParameters,
-    PlayBagParameters,
     TrackerParameters,
 )
 from cardbox_tracker.ros.parameters import LiveParameters, NodeParameters, parameter
@@ -63,7 +63,8 @@ def test_defaults_are_declared_with_description_unit_and_range(make_node: Callab
 
 
 def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
-    node, seen = make_node(), []
+    node = make_node()
+    seen: list[Sample] = []
     live = LiveParameters(node, Sample, seen.append)
     assert set_values(node, low=1.5, names=["x", "y"]) == (True, "")
     assert live.value == Sample(low=1.5, names=["x", "y"])
@@ -85,7 +86,8 @@ def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
 def test_wrong_value_is_refused_with_the_reason_and_the_old_one_stays(
     make_node: Callable, values: dict[str, Any], reason: str
 ) -> None:
-    node, seen = make_node(), []
+    node = make_node()
+    seen: list[Sample] = []
     live = LiveParameters(node, Sample, seen.append)
     accepted, text = set_values(node, **values)
     assert not accepted

@@ -26,11 +26,19 @@ KEYPOINT_LINKS = (
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
 
 
+def child(element: Xml.Element, tag: str) -> dict[str, str]:
+    """Return the attributes of the first child of that tag."""
+    found = element.find(tag)
+    assert found is not None, f"no <{tag}>"
+    return dict(found.attrib)
+
+
 def axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rodrigues' formula, (3, 3)."""
     x, y, z = axis
     cross = np.array([(0, -z, y), (z, 0, -x), (-y, x, 0)])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    turned: np.ndarray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return turned
 
 
 def numbers(text: str) -> np.ndarray:
@@ -42,25 +50,25 @@ def link_poses(xml: str, positions: Mapping[str, float]) -> dict[str, np.ndarray
     robot = Xml.fromstring(xml)
     poses = {ROOT_LINK: np.eye(4)}
     for joint in robot.findall("joint"):  # parents come before children in our files
-        origin = joint.find("origin")
-        roll, pitch, yaw = numbers(origin.get("rpy"))
+        origin = child(joint, "origin")
+        roll, pitch, yaw = numbers(origin["rpy"])
         placed = np.eye(4)
         placed[:3, :3] = (
             axis_angle(np.array([0, 0, 1]), yaw)
             @ axis_angle(np.array([0, 1, 0]), pitch)
             @ axis_angle(np.array([1, 0, 0]), roll)
         )
-        placed[:3, 3] = numbers(origin.get("xyz"))
+        placed[:3, 3] = numbers(origin["xyz"])
         moved = np.eye(4)
-        if joint.get("type") != "fixed":
-            axis = numbers(joint.find("axis").get("xyz"))
-            value = positions[joint.get("name")]
-            if joint.get("type") == "prismatic":
+        if joint.attrib["type"] != "fixed":
+            axis = numbers(child(joint, "axis")["xyz"])
+            value = positions[joint.attrib["name"]]
+            if joint.attrib["type"] == "prismatic":
                 moved[:3, 3] = axis * value
             else:
                 moved[:3, :3] = axis_angle(axis, value)
-        parent = poses[joint.find("parent").get("link")]
-        poses[joint.find("child").get("link")] = parent @ placed @ moved
+        parent = poses[child(joint, "parent")["link"]]
+        poses[child(joint, "child")["link"]] = parent @ placed @ moved
     return poses
 
 
@@ -95,18 +103,18 @@ def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
 
 def test_movable_joints_are_those_of_the_joint_state_with_limits() -> None:
     robot = Xml.fromstring(urdf_from_body(BodyModel()))
-    movable = {j.get("name"): j for j in robot.findall("joint") if j.get("type") != "fixed"}
+    movable = {j.attrib["name"]: j for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
     assert set(movable) == set(JOINT_NAMES)
     for name, (lower, upper) in zip(JOINT_NAMES, JOINT_LIMITS, strict=True):
-        limit = movable[name].find("limit")
-        assert float(limit.get("lower")) == pytest.approx(lower)
-        assert float(limit.get("upper")) == pytest.approx(upper)
+        limit = child(movable[name], "limit")
+        assert float(limit["lower"]) == pytest.approx(lower)
+        assert float(limit["upper"]) == pytest.approx(upper)
 
 
 def test_links_form_one_tree() -> None:
     robot = Xml.fromstring(urdf_from_body(BodyModel(), optical_frame="optical"))
-    links = {link.get("name") for link in robot.findall("link")}
-    children = [joint.find("child").get("link") for joint in robot.findall("joint")]
+    links = {link.attrib["name"] for link in robot.findall("link")}
+    children = [child(joint, "child")["link"] for joint in robot.findall("joint")]
     assert sorted([*children, ROOT_LINK]) == sorted(links)
 
 

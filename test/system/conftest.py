@@ -98,11 +98,12 @@ class Graph:
 
     def __init__(self, folder: Path) -> None:
         import rclpy
+        from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
 
         self.domain = 1 + next(_DOMAINS) % 100
         self.folder = folder
-        self.context = rclpy.Context()
+        self.context = Context()
         rclpy.init(context=self.context, domain_id=self.domain)
         self.node = rclpy.create_node("probe", context=self.context, enable_rosout=False)
         self.executor = SingleThreadedExecutor(context=self.context)

@@ -79,7 +79,7 @@ class Session:
             self.graph.wait(
                 lambda number=number: len(self.joint_states) >= first + number, "a joint state"
             )
-        return self.joint_states[first:]
+        return list(self.joint_states[first:])
 
 
 @pytest.fixture(scope="module")

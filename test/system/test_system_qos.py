@@ -51,7 +51,7 @@ def test_the_remedy_works(graph: Any, scene: Any) -> None:
 
     def received() -> bool:
         values = {v.key: v.value for v in graph.diagnosis("eye/tracker").values}
-        return values["received"] == "1"
+        return bool(values["received"] == "1")
 
     graph.wait(received, "the silhouette")
     assert "incompatible" not in tracker.text()

@@ -1,0 +1,92 @@
+"""The recorded sessions of realistic people, through the live nodes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+KEYPOINTS = tuple(
+    f"{side}_{joint}" for side in ("left", "right") for joint in ("shoulder", "elbow", "hand")
+)
+MEAN_ERROR_M = 0.15
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="no recorded sessions in ../shared/data")
+@pytest.mark.parametrize("name", ["person_a", "person_b"])
+def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: str) -> None:
+    session = DATA / name
+    truth = json.loads((session / "ground_truth.json").read_text())
+    spans = {
+        segment["name"]: (segment["start_s"], segment["end_s"]) for segment in truth["segments"]
+    }
+    eye = f"/{name}"
+    remap = ("--ros-args", "-r", f"__ns:={eye}")
+    camera = (
+        *("-r", "image_raw/compressed:=/camera/image_raw/compressed"),
+        *("-r", "camera_info:=/camera/camera_info"),
+    )
+    graph.start("background", *remap, *camera, image_transport="compressed")
+    graph.start(
+        "initializer",
+        *remap,
+        person_distance_m=truth["person"]["distance_m"],
+        camera_pitch_deg=float(truth["camera"]["pitch_down_deg"]),
+        side_turn=truth["side_posture_turns_to"],
+    )
+    graph.start("tracker", *remap)
+    states = graph.collect(JointState, f"{eye}/joint_states")
+    keypoints = graph.collect(PoseArray, f"{eye}/keypoints")
+    statuses = graph.collect(String, f"{eye}/play_bag/status", qos.LATCHED)
+    graph.wait(
+        lambda: (
+            graph.node.count_subscribers(f"{eye}/silhouette") == 2
+            and graph.node.count_publishers(f"{eye}/keypoints") == 1
+        ),
+        "the nodes",
+    )
+    pauses = {reference: np.mean(spans[reference]) for reference in ("front", "side", "arms")}
+    stops = [f"{at_s:.3f}" for at_s in pauses.values()]
+    player = graph.start(
+        "play_bag", str(session / "bag"), "--rate", "3", "--pause-at", *stops, *remap
+    )
+    for reference, stop in zip(pauses, stops, strict=True):
+        graph.wait(lambda: statuses and statuses[-1].data == f"paused at {stop} s", reference, 60)  # noqa: B023
+        graph.spin(0.3)
+        response = graph.call(f"{eye}/initializer/capture_{reference}")
+        assert response.success, response.message
+        if reference == "arms":
+            response = graph.call(f"{eye}/initializer/initialize", timeout_s=90)
+            assert response.success, response.message
+            iou = float(response.message.split("mean ")[1].split(";")[0])
+            assert iou >= 0.80, response.message
+            graph.diagnosis(f"{name}/tracker", "")
+        assert graph.call(f"{eye}/play_bag/resume").success
+    graph.wait(lambda: player.process.poll() is not None, "the end of the bag", 60)
+    graph.spin(0.5)
+
+    frames = [f for f in truth["frames"] if "joints_m" in f]
+    pictures = [f["stamp_ns"] for f in frames if f["stamp_ns"] >= stamp_ns(states[0].header.stamp)]
+    assert [stamp_ns(state.header.stamp) for state in states] == pictures
+    where = {frame["stamp_ns"]: frame["joints_m"] for frame in frames}
+    errors = [
+        np.linalg.norm(np.array([(p.position.x, p.position.y, p.position.z)]) - where[at][joint])
+        for message in keypoints
+        if (at := stamp_ns(message.header.stamp)) in where
+        for joint, p in zip(KEYPOINTS, message.poses, strict=True)
+    ]
+    print(f"{name}: IoU {iou:.2f}, {len(states)} pictures, mean error {np.mean(errors):.3f} m")
+    assert np.mean(errors) < MEAN_ERROR_M
