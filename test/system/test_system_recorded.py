@@ -25,6 +25,12 @@ KEYPOINTS = tuple(
 MEAN_ERROR_M = 0.15
 
 
+def deep(topic: str, end: str) -> tuple[str, ...]:
+    """Return arguments that let ``topic`` queue up and lose nothing, as a replay should."""
+    name = f"qos_overrides.{topic}.{end}"
+    return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:=100")
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="no recorded sessions in ../shared/data")
 @pytest.mark.parametrize("name", ["person_a", "person_b"])
 def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: str) -> None:
@@ -38,7 +44,10 @@ def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: s
     camera = (
         *("-r", "image_raw/compressed:=/camera/image_raw/compressed"),
         *("-r", "camera_info:=/camera/camera_info"),
+        *deep("/camera/image_raw/compressed", "subscription"),
+        *deep(f"{eye}/silhouette", "publisher"),
     )
+    queue = deep(f"{eye}/silhouette", "subscription")
     graph.start("background", *remap, *camera, image_transport="compressed")
     graph.start(
         "initializer",
@@ -47,7 +56,7 @@ def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: s
         camera_pitch_deg=float(truth["camera"]["pitch_down_deg"]),
         side_turn=truth["side_posture_turns_to"],
     )
-    graph.start("tracker", *remap)
+    graph.start("tracker", *remap, *queue)
     states = graph.collect(JointState, f"{eye}/joint_states")
     keypoints = graph.collect(PoseArray, f"{eye}/keypoints")
     statuses = graph.collect(String, f"{eye}/play_bag/status", qos.LATCHED)
@@ -61,7 +70,7 @@ def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: s
     pauses = {reference: np.mean(spans[reference]) for reference in ("front", "side", "arms")}
     stops = [f"{at_s:.3f}" for at_s in pauses.values()]
     player = graph.start(
-        "play_bag", str(session / "bag"), "--rate", "3", "--pause-at", *stops, *remap
+        "play_bag", str(session / "bag"), "--rate", "2", "--pause-at", *stops, *remap
     )
     for reference, stop in zip(pauses, stops, strict=True):
         graph.wait(lambda: statuses and statuses[-1].data == f"paused at {stop} s", reference, 60)  # noqa: B023
@@ -77,7 +86,6 @@ def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: s
         assert graph.call(f"{eye}/play_bag/resume").success
     graph.wait(lambda: player.process.poll() is not None, "the end of the bag", 60)
     graph.spin(0.5)
-
     frames = [f for f in truth["frames"] if "joints_m" in f]
     pictures = [f["stamp_ns"] for f in frames if f["stamp_ns"] >= stamp_ns(states[0].header.stamp)]
     assert [stamp_ns(state.header.stamp) for state in states] == pictures
