@@ -35,13 +35,14 @@ RIGHT_ARM = slice(8, 12)
 # of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"):
 # thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
 # abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
-# 45; elbow flexion 150.
+# 45; elbow flexion 150, none backwards (10 left for what a straight arm is).
 # The torso's line goes from the hips to the neck, so hips and spine add up, rounded down to what a
-# standing person holds. The elbow has 2 DOF relative to an upper arm that has no axial rotation in
-# this model: the shoulder's rotation (70 inwards, 90 outwards) turns the plane in which the elbow's
-# 150 degrees lie, so its abduction reaches to either side.
-_ARM_LIMITS_DEG = ((-45, 180), (-60, 120), (-150, 150), (-30, 150))
-_TORSO_LIMITS_DEG = ((-50, 50), (-30, 100), (-100, 100))
+# standing person holds. A limb's two angles reach every direction twice: flexion beyond 90 degrees
+# is the same as less flexion with the abduction turned by half a circle. So flexion ends at about
+# 90, where it reaches each direction once, and abduction takes the rest; a forearm can point to
+# either side, since this model's upper arm does not turn about its axis.
+_TORSO_LIMITS_DEG = ((-45, 45), (-25, 90), (-60, 60))
+_ARM_LIMITS_DEG = ((-45, 180), (-60, 90), (-150, 150), (-10, 95))
 TORSO_Y_LIMIT_M = 3.0
 """A fixed camera sees no person further aside than this."""
 

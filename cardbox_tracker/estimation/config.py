@@ -60,8 +60,9 @@ class TrackerConfig:
         average: output the weighted mean of this many best particles; 1 outputs the best.
         explore: fraction of the arms' particles that each frame draws from anywhere within the
             joint limits, so that an arm that was lost is found again.
-        torso_beside_arms: rate a torso beside the arms found last, where they are in the picture;
-            the paper rates it alone, so it leans forward to cover the upper arms.
+        torso_beside_arms: rate a torso beside the arms found last, where they are in the picture,
+            so that the whole model is drawn as equation (2) has it; rated alone, it leans forward
+            to cover the upper arms.
         parallel_arms: estimate both arms at the same time, in two threads.
         recover: search anew when the person was lost, or came back into the picture.
         lost_iou: an IoU below this counts as lost.
@@ -76,7 +77,7 @@ class TrackerConfig:
     prior: float = 0.0
     average: int = 1
     explore: float = 0.0
-    torso_beside_arms: bool = False
+    torso_beside_arms: bool = True
     parallel_arms: bool = True
     recover: bool = False
     lost_iou: float = 0.4
@@ -123,7 +124,6 @@ def default_preset() -> TrackerConfig:
         prior=0.012,
         average=20,
         explore=0.15,
-        torso_beside_arms=True,
         recover=True,
     )
 

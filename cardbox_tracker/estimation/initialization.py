@@ -25,7 +25,6 @@ from cardbox_tracker.body.posture import (
     LEFT_ARM,
     N_JOINTS,
     RIGHT_ARM,
-    clip_to_limits,
     reference_posture,
 )
 from cardbox_tracker.body.sizes import (
@@ -201,7 +200,8 @@ class _Search:
                 SIZE_LIMITS[:, 0],
                 SIZE_LIMITS[:, 1],
             )
-            postures = clip_to_limits(posture + noise[:, N_SIZES:] * posture_noise)
+            postures = posture + noise[:, N_SIZES:] * posture_noise
+            # No joint limits here: whoever turns for the side reference moves the feet, too.
             costs = self._rate(name, hypotheses, postures)
             winner = int(np.argmin(costs))
             if costs[winner] < best:

@@ -1,0 +1,130 @@
+"""The ground truth of a recorded session, and the error of estimates against it."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.errors import CardboxError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TrueFrame:
+    """One picture with a person: its segment and keypoints (6, 3), metres, optical frame."""
+
+    segment: str
+    keypoints_m: FloatArray
+    posture: FloatArray | None
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """A session's truth.
+
+    Attributes:
+        frames: by stamp in nanoseconds, those with a person in the scene.
+        spans: start and end of the first segment of each name, seconds from the first picture.
+        start_ns: stamp of the first picture.
+        distance_m: level distance to the person.
+        pitch_deg: how far the camera looks down.
+        side_turn: the way the person turned for the side reference.
+    """
+
+    frames: Mapping[int, TrueFrame]
+    spans: Mapping[str, tuple[float, float]]
+    start_ns: int
+    distance_m: float
+    pitch_deg: float
+    side_turn: str
+
+
+def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
+    """Read the ``ground_truth.json`` of a session.
+
+    Raises:
+        CardboxError: the file cannot be read or is no ground truth.
+    """
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        frames = {}
+        for entry in data["frames"]:
+            if "joints_m" not in entry:
+                continue
+            joints = entry["joints_m"]
+            points = np.array([joints[name] for name in KEYPOINT_NAMES])
+            posture = np.array(list(entry["posture"].values())) if "posture" in entry else None
+            frames[int(entry["stamp_ns"])] = TrueFrame(entry["segment"], points, posture)
+        spans: dict[str, tuple[float, float]] = {}
+        for segment in data["segments"]:
+            spans.setdefault(segment["name"], (segment["start_s"], segment["end_s"]))
+        return GroundTruth(
+            frames,
+            spans,
+            int(data["frames"][0]["stamp_ns"]),
+            float(data["person"]["distance_m"]),
+            float(data["camera"]["pitch_down_deg"]),
+            str(data["side_posture_turns_to"]),
+        )
+    except OSError as error:
+        raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise CardboxError(
+            f"{path} is no ground truth: {error!r}; expected the ground_truth.json of a session"
+        ) from None
+
+
+@dataclass(frozen=True)
+class TrackingError:
+    """Distances between estimated and true keypoints.
+
+    Attributes:
+        mean_m: mean 3D error over shoulders, elbows and hands (MPJPE).
+        by_keypoint_m: the same for each keypoint.
+        by_segment_m: the same for each segment of the session.
+        lateral_m: mean error along x of the optical frame.
+        vertical_m: mean error along y.
+        depth_m: mean error along z.
+        frames: pictures compared.
+    """
+
+    mean_m: float
+    by_keypoint_m: dict[str, float]
+    by_segment_m: dict[str, float]
+    lateral_m: float
+    vertical_m: float
+    depth_m: float
+    frames: int
+
+
+def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> TrackingError:
+    """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
+
+    Raises:
+        CardboxError: no stamp is in both.
+    """
+    stamps = [stamp for stamp in estimates if stamp in truth.frames]
+    if not stamps:
+        raise CardboxError("no estimate has the stamp of a true frame; is it another session's?")
+    differences = np.array([estimates[s] - truth.frames[s].keypoints_m for s in stamps])
+    distances = np.linalg.norm(differences, axis=2)
+    segments: dict[str, list[float]] = defaultdict(list)
+    for stamp, row in zip(stamps, distances, strict=True):
+        segments[truth.frames[stamp].segment].append(float(row.mean()))
+    along = np.abs(differences).mean(axis=(0, 1))
+    return TrackingError(
+        float(distances.mean()),
+        dict(zip(KEYPOINT_NAMES, distances.mean(axis=0).tolist(), strict=True)),
+        {name: float(np.mean(values)) for name, values in segments.items()},
+        *(float(value) for value in along),
+        len(stamps),
+    )

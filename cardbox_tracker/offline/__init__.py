@@ -1,0 +1,1 @@
+"""The ``cardbox`` commands that work on recordings, without a running graph."""

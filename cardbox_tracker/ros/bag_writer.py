@@ -1,0 +1,196 @@
+"""Write rosbag2 recordings (mcap or sqlite3) without a ROS installation, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.vision.camera import Camera
+
+STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
+
+
+class BagWriter:
+    """Context of a new recording: a folder that appears, complete, when the context ends."""
+
+    def __init__(self, path: str | os.PathLike[str], storage: str = "mcap") -> None:
+        """Name the folder; an existing recording there is replaced.
+
+        Raises:
+            BagError: the storage is unknown, or something that is no recording is in the way.
+        """
+        self.path = Path(path)
+        if storage not in STORAGES:
+            raise BagError(f"storage '{storage}' is unknown; expected {' or '.join(STORAGES)}")
+        if self.path.exists() and not (self.path / "metadata.yaml").exists():
+            empty = self.path.is_dir() and not any(self.path.iterdir())
+            if not empty:
+                raise BagError(
+                    f"{self.path} exists and is no recording; choose another name or remove it"
+                )
+        self._storage = STORAGES[storage]
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._connections: dict[str, Connection] = {}
+
+    def __enter__(self) -> BagWriter:
+        """Open a temporary folder beside the target.
+
+        Raises:
+            BagError: the target's folder cannot be written.
+        """
+        try:
+            self._folder = Path(
+                tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent)
+            )
+        except OSError as error:
+            raise BagError(
+                f"cannot write the recording {self.path}: {error.strerror}; choose a folder that "
+                "exists and is writable"
+            ) from None
+        self._writer = Writer(
+            self._folder / self.path.name, version=9, storage_plugin=self._storage
+        )
+        self._writer.open()
+        return self
+
+    @property
+    def folder(self) -> Path:
+        """Where the recording grows; a file put here appears in the recording's folder."""
+        return self._folder / self.path.name
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Move the recording to its place, or after an error remove what there is of it."""
+        try:
+            self._writer.close()
+            if kind is None:
+                if self.path.exists():
+                    shutil.rmtree(self.path)
+                os.replace(self.folder, self.path)
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def type(self, name: str) -> Any:
+        """Return the message class of ``name``, such as ``std_msgs/msg/String``."""
+        return self._store.types[name]
+
+    def write(self, topic: str, message: Any, stamp_ns: int) -> None:
+        """Write a message made with :meth:`type`."""
+        name = message.__msgtype__
+        self.write_raw(topic, name, self._store.serialize_cdr(message, name), stamp_ns)
+
+    def write_raw(self, topic: str, msgtype: str, raw: bytes | memoryview, stamp_ns: int) -> None:
+        """Write the CDR bytes of a message."""
+        connection = self._connections.get(topic)
+        if connection is None:
+            connection = self._writer.add_connection(topic, msgtype, typestore=self._store)
+            self._connections[topic] = connection
+        self._writer.write(connection, stamp_ns, raw)
+
+    def header(self, stamp_ns: int, frame_id: str) -> Any:
+        """Return a std_msgs/Header."""
+        time = self.type("builtin_interfaces/msg/Time")
+        stamp = time(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+        return self.type("std_msgs/msg/Header")(stamp=stamp, frame_id=frame_id)
+
+    def write_image(
+        self, topic: str, stamp_ns: int, frame_id: str, array: NDArray[Any], encoding: str
+    ) -> None:
+        """Write pixels (H, W) or (H, W, channels) as an Image of that encoding."""
+        array = np.ascontiguousarray(array)
+        message = self.type("sensor_msgs/msg/Image")(
+            header=self.header(stamp_ns, frame_id),
+            height=array.shape[0],
+            width=array.shape[1],
+            encoding=encoding,
+            is_bigendian=0,
+            step=array.nbytes // array.shape[0],
+            data=array.view(np.uint8).ravel(),
+        )
+        self.write(topic, message, stamp_ns)
+
+    def write_compressed(
+        self, topic: str, stamp_ns: int, frame_id: str, data: bytes, kind: str = "jpeg"
+    ) -> None:
+        """Write JPEG or PNG bytes as a CompressedImage."""
+        message = self.type("sensor_msgs/msg/CompressedImage")(
+            header=self.header(stamp_ns, frame_id),
+            format=kind,
+            data=np.frombuffer(data, np.uint8),
+        )
+        self.write(topic, message, stamp_ns)
+
+    def write_camera_info(self, topic: str, stamp_ns: int, frame_id: str, camera: Camera) -> None:
+        """Write an ideal camera as a CameraInfo without distortion."""
+        k = np.array([camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1], np.float64)
+        roi = self.type("sensor_msgs/msg/RegionOfInterest")(
+            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+        )
+        message = self.type("sensor_msgs/msg/CameraInfo")(
+            header=self.header(stamp_ns, frame_id),
+            height=camera.height,
+            width=camera.width,
+            distortion_model="plumb_bob",
+            d=np.zeros(5),
+            k=k,
+            r=np.eye(3).ravel(),
+            p=np.insert(k, (3, 6, 9), 0.0),
+            binning_x=0,
+            binning_y=0,
+            roi=roi,
+        )
+        self.write(topic, message, stamp_ns)
+
+    def write_joint_state(
+        self,
+        topic: str,
+        stamp_ns: int,
+        frame_id: str,
+        names: Sequence[str],
+        positions: NDArray[np.float64],
+    ) -> None:
+        """Write joint positions, rad and metres."""
+        message = self.type("sensor_msgs/msg/JointState")(
+            header=self.header(stamp_ns, frame_id),
+            name=list(names),
+            position=np.asarray(positions, np.float64),
+            velocity=np.zeros(0),
+            effort=np.zeros(0),
+        )
+        self.write(topic, message, stamp_ns)
+
+    def write_pose_array(
+        self, topic: str, stamp_ns: int, frame_id: str, points_m: NDArray[np.float64]
+    ) -> None:
+        """Write points (n, 3), metres, as poses without rotation."""
+        point = self.type("geometry_msgs/msg/Point")
+        pose = self.type("geometry_msgs/msg/Pose")
+        still = self.type("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
+        poses = [
+            pose(position=point(x=float(x), y=float(y), z=float(z)), orientation=still)
+            for x, y, z in points_m
+        ]
+        message = self.type("geometry_msgs/msg/PoseArray")(
+            header=self.header(stamp_ns, frame_id), poses=poses
+        )
+        self.write(topic, message, stamp_ns)
+
+    def write_string(self, topic: str, stamp_ns: int, text: str) -> None:
+        """Write a std_msgs/String."""
+        self.write(topic, self.type("std_msgs/msg/String")(data=text), stamp_ns)

@@ -1,0 +1,1 @@
+"""Synthetic people and cameras, and recordings of them with ground truth."""

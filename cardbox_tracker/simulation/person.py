@@ -1,0 +1,164 @@
+"""A person with volume: rounded parts around the skeleton, no cardbox.
+
+Each part is a stack of elliptical rings; what lies between two neighbouring rings is their convex
+hull. The rings follow the sizes of a :class:`BodyModel` loosely, as flesh does: limbs taper, the
+torso narrows at waist and shoulders, there are a neck, fists and legs. So the cardbox never matches
+perfectly, while the skeleton is known exactly.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
+
+FloatArray = NDArray[np.float64]
+
+_RING_POINTS = 16
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)
+
+SKIN, SHIRT, TROUSERS = 125, 70, 45
+"""Brightness of the parts, grey levels."""
+
+
+class Part(NamedTuple):
+    """Rings (n, 16, 3) in the reference frame, metres, and a brightness."""
+
+    rings: FloatArray
+    brightness: int
+
+
+def person_parts(body: BodyModel, posture: FloatArray) -> list[Part]:
+    """Return the parts of ``body`` in ``posture`` (12,), the farthest from the chest first."""
+    frames = forward_kinematics(body, posture)
+    parts = [*_legs(body, frames)]
+    parts += [_trunk(body, frames), _neck(body, frames), _head(body, frames)]
+    for arm in (frames.left, frames.right):
+        upper = body.size("upper_arm_width") / 2
+        fore = body.size("forearm_width") / 2
+        parts.append(
+            _tube(
+                arm.shoulder,
+                arm.elbow,
+                [(-0.12, 0.5), (-0.06, 0.95), (0.1, 1.12), (0.5, 1.0), (1.0, 0.88), (1.06, 0.6)],
+                upper,
+                SHIRT,
+            )
+        )
+        parts.append(
+            _tube(
+                arm.elbow,
+                arm.hand,
+                [(-0.1, 0.6), (0.0, 1.05), (0.25, 1.15), (0.62, 0.85), (0.72, 0.75)]
+                + [(0.8, 1.0), (0.92, 1.0), (1.0, 0.6)],
+                fore,
+                SKIN,
+            )
+        )
+    return parts
+
+
+def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
+    """Return a person of random stature (1.55 to 1.9 m) and proportions."""
+    stature = rng.uniform(0.9, 1.1)
+    sizes = DEFAULT_SIZES * stature * rng.normal(1.0, 0.07, len(DEFAULT_SIZES))
+    return BodyModel(
+        np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
+        distance_m,
+        hip_height_m=-0.51 * distance_m / 2.0,
+    )
+
+
+def _trunk(body: BodyModel, frames: BodyFrames) -> Part:
+    size = body.size
+    waist = size("waist_height")
+    top = waist + size("torso_height")
+    # Height, half width and half depth of each ring.
+    profile = [
+        (-0.06, 0.5 * size("waist_width"), 0.46 * size("waist_depth")),
+        (0.3 * waist, 0.51 * size("waist_width"), 0.5 * size("waist_depth")),
+        (waist, 0.49 * size("torso_bottom_width"), 0.48 * size("torso_depth")),
+        (waist + 0.55 * (top - waist), 0.48 * size("torso_top_width"), 0.5 * size("torso_depth")),
+        (waist + 0.85 * (top - waist), 0.5 * size("torso_top_width"), 0.44 * size("torso_depth")),
+        (top, 0.4 * size("torso_top_width"), 0.3 * size("torso_depth")),
+        (top + 0.3 * size("neck_length"), 0.2 * size("torso_top_width"), 0.25 * size("torso_depth")),
+    ]
+    return Part(_rings(profile, frames.torso_rotation, frames.hip), SHIRT)
+
+
+def _neck(body: BodyModel, frames: BodyFrames) -> Part:
+    radius = 0.34 * body.size("head_width")
+    top = body.size("waist_height") + body.size("torso_height")
+    chin = top + body.size("neck_length")
+    profile = [(top - 0.03, radius, radius), (chin + 0.05, radius, radius)]
+    origin = frames.hip + frames.torso_rotation @ (0.5 * body.size("head_offset"), 0.0, 0.0)
+    return Part(_rings(profile, frames.torso_rotation, origin), SKIN)
+
+
+def _head(body: BodyModel, frames: BodyFrames) -> Part:
+    half = body.size("head_height") / 2
+    angles = np.radians([-80, -55, -25, 5, 35, 60, 80])
+    profile = [
+        (
+            half * np.sin(angle),
+            np.cos(angle) * body.size("head_width") / 2,
+            np.cos(angle) * body.size("head_depth") / 2,
+        )
+        for angle in angles
+    ]
+    return Part(_rings(profile, frames.torso_rotation, frames.head), SKIN)
+
+
+def _legs(body: BodyModel, frames: BodyFrames) -> list[Part]:
+    """Two legs that stand straight below the hips and only turn with them."""
+    aside = body.size("waist_width") / 4
+    radius = 0.98 * aside
+    length = 1.6 * (body.size("waist_height") + body.size("torso_height"))
+    across = frames.torso_rotation[:, 1] * (1.0, 1.0, 0.0)
+    across /= np.linalg.norm(across)
+    down = np.array([0.0, 0.0, -length])
+    legs = []
+    for side in (-1.0, 1.0):
+        hip = frames.hip + side * aside * across
+        foot = frames.hip + 1.4 * side * aside * across + down
+        legs.append(
+            _tube(hip, foot, [(-0.05, 0.9), (0.1, 1.0), (0.5, 0.7), (1.0, 0.45)], radius, TROUSERS)
+        )
+    return legs
+
+
+def _tube(
+    start: FloatArray,
+    end: FloatArray,
+    profile: list[tuple[float, float]],
+    radius_m: float,
+    brightness: int,
+) -> Part:
+    """Round part from ``start`` to ``end``; ``profile`` has (place along it, factor on radius)."""
+    axis = end - start
+    length = np.linalg.norm(axis)
+    z = axis / length
+    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    y = np.cross(z, helper)
+    y /= np.linalg.norm(y)
+    rotation = np.column_stack([np.cross(y, z), y, z])
+    rings = [(t * length, f * radius_m, f * radius_m) for t, f in profile]
+    return Part(_rings(rings, rotation, start), brightness)
+
+
+def _rings(
+    profile: list[tuple[float, float, float]], rotation: FloatArray, origin: FloatArray
+) -> FloatArray:
+    """Rings (n, 16, 3) from (height along Z, half extent along Y, half extent along X)."""
+    table = np.array(profile)
+    rings = np.empty((len(table), _RING_POINTS, 3))
+    rings[..., 0] = table[:, 2:3] * np.cos(_ANGLES)
+    rings[..., 1] = table[:, 1:2] * np.sin(_ANGLES)
+    rings[..., 2] = table[:, 0:1]
+    placed: FloatArray = rings @ rotation.T + origin
+    return placed

@@ -1,0 +1,98 @@
+"""Pictures of a synthetic person before a wall, as a camera with noise would take them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.simulation.person import person_parts
+from cardbox_tracker.vision.camera import Camera
+
+Picture = NDArray[np.uint8]
+
+_SUPERSAMPLING = 2
+_SHIFT = 4
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Wall and sensor.
+
+    Attributes:
+        wall: mean brightness of the wall, grey levels.
+        texture: standard deviation of the wall's blotches, grey levels.
+        noise: standard deviation of the sensor's noise, grey levels.
+        flicker: standard deviation of the whole scene's brightness, as a fraction.
+    """
+
+    wall: float = 180.0
+    texture: float = 8.0
+    noise: float = 3.0
+    flicker: float = 0.0
+
+
+class Renderer:
+    """Draws one scene; all its randomness comes from the generator it is given."""
+
+    def __init__(self, camera: Camera, scene: Scene, rng: np.random.Generator) -> None:
+        """Paint the wall."""
+        self.camera = camera
+        self._scene = scene
+        self._rng = rng
+        coarse = rng.normal(0.0, 1.0, (camera.height // 20 + 2, camera.width // 20 + 2))
+        blotches = cv2.resize(
+            coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC
+        )
+        self.wall = np.clip(scene.wall + scene.texture * blotches, 0, 255).astype(np.float32)
+
+    def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> Picture:
+        """Return the exact silhouette (H, W), 0 or 255, legs included."""
+        return np.where(self._draw(body, posture)[1] >= 0.5, 255, 0).astype(np.uint8)
+
+    def picture(
+        self, body: BodyModel | None = None, posture: NDArray[np.float64] | None = None
+    ) -> tuple[Picture, Picture]:
+        """Return a noisy picture (H, W) and its exact silhouette; without a body the empty scene."""
+        scene = self._scene
+        clean = self.wall
+        mask = np.zeros(clean.shape, np.uint8)
+        if body is not None and posture is not None:
+            person, cover = self._draw(body, posture)
+            clean = clean * (1.0 - cover) + person
+            mask = np.where(cover >= 0.5, 255, 0).astype(np.uint8)
+        gain = 1.0 + scene.flicker * self._rng.standard_normal()
+        noise = self._rng.standard_normal(clean.shape, dtype=np.float32) * scene.noise
+        return np.clip(np.rint(clean * gain + noise), 0, 255).astype(np.uint8), mask
+
+    def _draw(
+        self, body: BodyModel, posture: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Brightness times cover, and cover in [0, 1], of the person alone, each (H, W)."""
+        camera = self.camera.scaled(
+            _SUPERSAMPLING * self.camera.width, _SUPERSAMPLING * self.camera.height
+        )
+        shade = np.zeros((camera.height, camera.width), np.uint8)
+        cover = np.zeros_like(shade)
+        for part in person_parts(body, posture):
+            points = camera.reference_to_optical(part.rings)
+            if np.any(points[..., 2] < 0.1):
+                continue
+            pixels = np.asarray(
+                np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32
+            )
+            for i, pair in enumerate(zip(pixels[:-1], pixels[1:], strict=True)):
+                hull = cv2.convexHull(np.concatenate(pair))
+                # A little light from above, so that a part is no flat patch.
+                level = part.brightness + 6 * (i % 3)
+                cv2.fillConvexPoly(shade, hull, level, cv2.LINE_8, _SHIFT)
+                cv2.fillConvexPoly(cover, hull, 255, cv2.LINE_8, _SHIFT)
+        size = (self.camera.width, self.camera.height)
+        small = [
+            cv2.resize(layer, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+            for layer in (shade, cover)
+        ]
+        return small[0], small[1] / np.float32(255.0)

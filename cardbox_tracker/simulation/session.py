@@ -1,0 +1,184 @@
+"""Record a synthetic session: a rosbag with ground truth, as a camera driver would record it.
+
+The folder is a rosbag2 recording; beside its metadata lie ``ground_truth.json`` and ``masks.npz``.
+Same seed, same pictures, byte for byte.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, forward_kinematics, keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.simulation.motions import Segment, timeline
+from cardbox_tracker.simulation.renderer import Renderer, Scene
+from cardbox_tracker.vision.camera import Camera
+
+START_NS = 1_700_000_000_000_000_000
+IMAGE_TOPIC = "/camera/image_raw"
+CAMERA_INFO_TOPIC = "/camera/camera_info"
+TRUTH_TOPIC = "/ground_truth/joint_states"
+FRAME_ID = "camera_optical_frame"
+
+_SWAY_M = 0.003
+_FOCAL_OF_WIDTH = 330.0 / 320.0
+
+
+def session_camera(width: int = 320, height: int = 240) -> Camera:
+    """Return the level camera of a session, f = 330 px at a width of 320."""
+    focal = _FOCAL_OF_WIDTH * width
+    return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+
+
+def synthesize_session(
+    output: str | os.PathLike[str],
+    motion: str = "all",
+    seed: int = 0,
+    fps: float = 15.0,
+    width: int = 320,
+    height: int = 240,
+    body: BodyModel | None = None,
+    storage: str = "mcap",
+    compressed: bool = False,
+    encoding: str = "mono8",
+    scene: Scene | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, Any]:
+    """Write a session and return its ground truth.
+
+    Args:
+        output: folder of the recording; it appears when it is complete.
+        motion: ``wave``, ``bend``, ``bow`` or ``all``.
+        seed: of noise and sway.
+        fps: pictures a second.
+        width: picture width, px.
+        height: picture height, px.
+        body: the person; a default one without it. Their camera pitch is the camera's.
+        storage: ``mcap`` or ``sqlite3``.
+        compressed: JPEG pictures on ``/camera/image_raw/compressed`` instead of raw ones.
+        encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw pictures.
+        scene: wall and sensor.
+        progress: called with the finished fraction.
+
+    Raises:
+        CardboxError: the motion is unknown, or the folder cannot be written.
+    """
+    body = body or BodyModel(hip_height_m=-0.51)
+    segments = timeline(motion, body.side_turn)
+    camera = session_camera(width, height).with_pitch(body.camera_pitch_rad)
+    rng = np.random.default_rng(seed)
+    renderer = Renderer(camera, scene or Scene(), rng.spawn(1)[0])
+    count = int(round(segments[-1].end_s * fps))
+    truth: list[dict[str, Any]] = []
+    masks = np.zeros((count, height * width), np.uint8)
+    sway = 0.0
+    with BagWriter(output, storage) as bag:
+        for number in range(count):
+            time_s = number / fps
+            stamp_ns = START_NS + round(number * 1e9 / fps)
+            index = next(i for i, s in enumerate(segments) if time_s < s.end_s)
+            segment = segments[index]
+            entry: dict[str, Any] = {
+                "stamp_ns": stamp_ns,
+                "segment": segment.name,
+                "segment_index": index,
+            }
+            if segment.pose is None:
+                picture, mask = renderer.picture()
+            else:
+                # Nobody stands quite still: a slow random walk that is pulled back.
+                sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
+                posture = segment.pose(time_s - segment.start_s)
+                posture[0] += body.lateral_m + sway
+                picture, mask = renderer.picture(body, posture)
+                entry |= _truth(body, camera, posture, mask)
+                bag.write_joint_state(TRUTH_TOPIC, stamp_ns, FRAME_ID, JOINT_NAMES, posture)
+            truth.append(entry)
+            masks[number] = (mask > 0).ravel()
+            bag.write_camera_info(CAMERA_INFO_TOPIC, stamp_ns, FRAME_ID, camera)
+            _write_picture(bag, stamp_ns, picture, compressed, encoding)
+            if progress is not None:
+                progress((number + 1) / count)
+        session = _session(body, camera, fps, segments, truth, seed)
+        (bag.folder / "ground_truth.json").write_text(json.dumps(session), encoding="utf-8")
+        np.savez_compressed(
+            bag.folder / "masks.npz",
+            packed=np.packbits(masks, axis=1),
+            shape=np.array([count, height, width]),
+        )
+    return session
+
+
+def _write_picture(
+    bag: BagWriter, stamp_ns: int, picture: NDArray[np.uint8], compressed: bool, encoding: str
+) -> None:
+    if compressed:
+        jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
+        bag.write_compressed(f"{IMAGE_TOPIC}/compressed", stamp_ns, FRAME_ID, jpeg)
+        return
+    if encoding != "mono8":
+        picture = np.repeat(picture[..., None], 3, axis=2)
+    bag.write_image(IMAGE_TOPIC, stamp_ns, FRAME_ID, picture, encoding)
+
+
+def _truth(
+    body: BodyModel, camera: Camera, posture: NDArray[np.float64], mask: NDArray[np.uint8]
+) -> dict[str, Any]:
+    frames = forward_kinematics(body, posture)
+    names = ("hips", "neck", "head", *KEYPOINT_NAMES)
+    points = np.vstack([frames.hip, frames.neck, frames.head, keypoints_m(body, posture)])
+    optical = camera.reference_to_optical(points)
+    return {
+        "joints_m": dict(zip(names, np.round(optical, 4).tolist(), strict=True)),
+        "joints_px": dict(zip(names, np.round(camera.project(optical), 2).tolist(), strict=True)),
+        "torso_rpy_deg": np.round(np.degrees(posture[1:4]), 2).tolist(),
+        "posture": dict(zip(JOINT_NAMES, np.round(posture, 6).tolist(), strict=True)),
+        "mask_px": int(np.count_nonzero(mask)),
+    }
+
+
+def _session(
+    body: BodyModel,
+    camera: Camera,
+    fps: float,
+    segments: list[Segment],
+    frames: list[dict[str, Any]],
+    seed: int,
+) -> dict[str, Any]:
+    size = body.size
+    hips_to_neck = size("waist_height") + size("torso_height")
+    return {
+        "format": 1,
+        "camera": {
+            "width": camera.width,
+            "height": camera.height,
+            "focal_px": camera.fx,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            "pitch_down_deg": float(np.degrees(camera.pitch_rad)),
+            "frame_id": FRAME_ID,
+        },
+        "person": {
+            "distance_m": body.distance_m,
+            "upper_arm": size("upper_arm_length"),
+            "forearm_to_hand": size("forearm_length"),
+            "shoulder_breadth": size("shoulder_breadth"),
+            "hips_to_neck": hips_to_neck,
+        },
+        "side_posture_turns_to": body.side_turn,
+        "fps": fps,
+        "segments": [
+            {"name": s.name, "start_s": s.start_s, "end_s": s.end_s} for s in segments
+        ],
+        "scene": {"seed": seed},
+        "frames": frames,
+    }

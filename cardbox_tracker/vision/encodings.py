@@ -1,0 +1,133 @@
+"""Pictures as cameras send them, turned into brightness or colour.
+
+The names are those of ``sensor_msgs/image_encodings``. A Bayer pattern is named after the colours of
+the first row's first two pixels and the second row's first two; OpenCV names the same pattern after
+its second row and column, which is why the table below looks crossed.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import EncodingError
+
+Picture = NDArray[np.uint8]
+
+
+class _Encoding(NamedTuple):
+    """Bytes a pixel, channels of the array, and OpenCV's codes to grey and bgr (None: as it is)."""
+
+    bytes_per_pixel: int
+    channels: int
+    to_grey: int | None
+    to_bgr: int | None
+
+
+_ENCODINGS = MappingProxyType(
+    {
+        "mono8": _Encoding(1, 1, None, cv2.COLOR_GRAY2BGR),
+        "mono16": _Encoding(2, 1, None, cv2.COLOR_GRAY2BGR),
+        "rgb8": _Encoding(3, 3, cv2.COLOR_RGB2GRAY, cv2.COLOR_RGB2BGR),
+        "bgr8": _Encoding(3, 3, cv2.COLOR_BGR2GRAY, None),
+        "rgba8": _Encoding(4, 4, cv2.COLOR_RGBA2GRAY, cv2.COLOR_RGBA2BGR),
+        "bgra8": _Encoding(4, 4, cv2.COLOR_BGRA2GRAY, cv2.COLOR_BGRA2BGR),
+        "yuv422": _Encoding(2, 2, cv2.COLOR_YUV2GRAY_UYVY, cv2.COLOR_YUV2BGR_UYVY),
+        "yuv422_yuy2": _Encoding(2, 2, cv2.COLOR_YUV2GRAY_YUY2, cv2.COLOR_YUV2BGR_YUY2),
+        "bayer_rggb8": _Encoding(1, 1, cv2.COLOR_BayerBG2GRAY, cv2.COLOR_BayerBG2BGR),
+        "bayer_bggr8": _Encoding(1, 1, cv2.COLOR_BayerRG2GRAY, cv2.COLOR_BayerRG2BGR),
+        "bayer_gbrg8": _Encoding(1, 1, cv2.COLOR_BayerGR2GRAY, cv2.COLOR_BayerGR2BGR),
+        "bayer_grbg8": _Encoding(1, 1, cv2.COLOR_BayerGB2GRAY, cv2.COLOR_BayerGB2BGR),
+    }
+)
+
+SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
+
+
+def decode_grey(
+    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
+) -> Picture:
+    """Return the brightness (H, W) uint8 of a picture; of mono8 without a copy.
+
+    Args:
+        data: the bytes, as bytes, array.array or uint8 array.
+        height: rows.
+        width: columns.
+        step: bytes a row, padding included.
+        encoding: one of ``SUPPORTED_ENCODINGS``.
+        is_bigendian: byte order of mono16.
+
+    Raises:
+        EncodingError: the encoding is not supported, or the bytes do not fit it.
+    """
+    raw, kind = _pixels(data, height, width, step, encoding, is_bigendian)
+    return raw if kind.to_grey is None else np.asarray(cv2.cvtColor(raw, kind.to_grey), np.uint8)
+
+
+def decode_bgr(
+    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
+) -> Picture:
+    """Return the colours (H, W, 3) uint8, bgr, of a picture; see :func:`decode_grey`.
+
+    Raises:
+        EncodingError: the encoding is not supported, or the bytes do not fit it.
+    """
+    raw, kind = _pixels(data, height, width, step, encoding, is_bigendian)
+    return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
+
+
+def decode_compressed(data: Any, grey: bool = True) -> Picture:
+    """Return a JPEG or PNG picture as (H, W) grey or (H, W, 3) bgr, uint8.
+
+    Raises:
+        EncodingError: the bytes are no picture.
+    """
+    raw = np.frombuffer(data, np.uint8)
+    flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
+    try:
+        picture = cv2.imdecode(raw, flag) if len(raw) else None
+    except cv2.error:
+        picture = None
+    if picture is None:
+        raise EncodingError(
+            f"the compressed picture ({len(raw)} bytes) cannot be decoded; expected whole JPEG or "
+            "PNG data: check the camera's transport"
+        )
+    return np.asarray(picture, np.uint8)
+
+
+def _pixels(
+    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
+) -> tuple[Picture, _Encoding]:
+    """The picture as an array in its own layout, and what its encoding is."""
+    kind = _ENCODINGS.get(encoding)
+    if kind is None:
+        raise EncodingError(
+            f"encoding '{encoding}' is not supported; supported are "
+            f"{', '.join(SUPPORTED_ENCODINGS)}: set the camera driver to one of them"
+        )
+    row_bytes = width * kind.bytes_per_pixel
+    if height <= 0 or width <= 0 or step < row_bytes:
+        raise EncodingError(
+            f"a {encoding} picture of {width}x{height} has rows of {step} bytes; expected "
+            f"{row_bytes} or more"
+        )
+    if kind.channels == 2 and width % 2:
+        raise EncodingError(f"a {encoding} picture is {width} wide; expected an even width")
+    raw = np.frombuffer(data, np.uint8)
+    if len(raw) < height * step:
+        raise EncodingError(
+            f"a {encoding} picture of {width}x{height} has {len(raw)} bytes; expected "
+            f"{height * step}: the message is incomplete"
+        )
+    rows = raw[: height * step].reshape(height, step)[:, :row_bytes]
+    if encoding == "mono16":
+        # The high byte is the brightness to eight bits.
+        return np.ascontiguousarray(rows[:, 0 if is_bigendian else 1 :: 2]), kind
+    if kind.channels == 1:
+        return (rows if step == row_bytes else np.ascontiguousarray(rows)), kind
+    return np.ascontiguousarray(rows).reshape(height, width, kind.channels), kind
