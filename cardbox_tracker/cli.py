@@ -146,7 +146,7 @@ def _integer(text: str, lowest: int, what: str) -> int:
 
 
 def _demo(options: argparse.Namespace) -> None:
-    from cardbox_tracker.offline.demo import run_demo
+    from cardbox_tracker.demo.run import run_demo
 
     run_demo(options.output, options.preset, options.seed)
 

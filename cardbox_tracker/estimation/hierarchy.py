@@ -27,7 +27,7 @@ _REFERENCE_AREA_PX = 320 * 240
 _RANGES = JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]
 _PRIOR_UNITS = np.where([name.endswith("flexion") for name in JOINT_NAMES], _RANGES / 6, _RANGES)
 _PRIOR_UNITS[0] = np.inf
-_PRIOR_UNITS[1:4] = np.radians(20.0)
+_PRIOR_UNITS[1:4] = np.radians([20.0, 26.0, 20.0])
 _PRIOR_SCALE = 1.0 / _PRIOR_UNITS
 
 

@@ -8,9 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
@@ -18,9 +16,10 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import TRACKING, Estimate, Tracker
-from cardbox_tracker.offline.files import atomic_path
+from cardbox_tracker.files import atomic_path
 from cardbox_tracker.offline.silhouettes import Frame, SilhouetteSource
 from cardbox_tracker.vision.drawing import draw_overlay
+from cardbox_tracker.vision.video import video_file
 
 CSV_HEADER = (
     "stamp",
@@ -81,7 +80,10 @@ def track_recording(
         )
         rows = csv.writer(table, lineterminator="\n")
         rows.writerow(CSV_HEADER)
-        draw = stack.enter_context(_VideoFile(video_path, source, fps)) if video_path else None
+        draw = None
+        if video_path is not None:
+            size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
+            draw = stack.enter_context(video_file(video_path, size, fps))
         for frame, estimate in _estimates(source, tracker, start_s):
             frames += 1
             rows.writerow(csv_row(frame.stamp_ns, estimate))
@@ -122,28 +124,3 @@ def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
         str(estimate.cost_px),
         f"{estimate.iou:.4f}",
     ]
-
-
-class _VideoFile:
-    """Context of a video file, written atomically; gives a function that takes pictures."""
-
-    def __init__(self, path: Path, source: SilhouetteSource, fps: float) -> None:
-        self._target = atomic_path(path)
-        self._name = path
-        self._size = (_VIDEO_SCALE * source.camera.width, _VIDEO_SCALE * source.camera.height)
-        self._fps = fps
-
-    def __enter__(self) -> Callable[[NDArray[np.uint8]], object]:
-        path = self._target.__enter__()
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        self._writer = cv2.VideoWriter(str(path), code, self._fps, self._size)
-        if not self._writer.isOpened():
-            self._target.__exit__(None, None, None)
-            raise CardboxError(
-                f"cannot write the video {self._name}; its name must end in .mp4 or .avi"
-            )
-        return self._writer.write
-
-    def __exit__(self, *error: object) -> None:
-        self._writer.release()
-        self._target.__exit__(*error)  # type: ignore[arg-type]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from rclpy.callback_groups import CallbackGroup
@@ -25,6 +25,8 @@ from cardbox_tracker.ros.diagnostics import NodeDiagnostics
 
 Callback = Callable[[Any, int], None]
 """Takes a message and when it left its sender, ns since the epoch."""
+
+N = TypeVar("N", bound="CardboxNode")
 
 
 class CardboxNode(Node):
@@ -104,24 +106,35 @@ class CardboxNode(Node):
         self.get_logger().debug(traceback.format_exc())
 
 
-def run(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
-    """Create a node and spin it until it is told to stop; return the exit code of the process."""
+def spin(node: CardboxNode) -> None:
+    """Serve the node until it is told to stop."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    executor.spin()
+
+
+def run(
+    create: Callable[[], N], args: list[str] | None = None, work: Callable[[N], None] = spin
+) -> int:
+    """Create a node and let it work until it is told to stop; return the process's exit code."""
     try:
         rclpy.init(args=args)
     except Exception as error:
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
-    node: CardboxNode | None = None
+    node: N | None = None
     try:
         node = create()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
+        work(node)
     except CardboxError as error:
         get_logger("cardbox_tracker").fatal(str(error))
         return 1
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
+    except Exception:
+        # A signal ends ROS in the midst of whatever runs; what then fails is no error.
+        if rclpy.ok():
+            raise
     finally:
         if node is not None:
             node.close()

@@ -14,21 +14,20 @@ import importlib
 import sys
 import time
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
-import rclpy
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.logging import get_logger
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.errors import BagError
 from cardbox_tracker.ros import qos
 from cardbox_tracker.ros.bag_reader import BagReader
 from cardbox_tracker.ros.input_parameters import PlayBagParameters
-from cardbox_tracker.ros.node import CardboxNode
+from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.ros.play_bag_arguments import overrides_from
 
@@ -178,21 +177,7 @@ def main(args: list[str] | None = None) -> int:
     """Play a bag; the exit code is 0 at its end, 1 for a bag that cannot be played."""
     command_line = list(sys.argv) if args is None else ["play_bag", *args]
     overrides = overrides_from(remove_ros_args(command_line)[1:])
-    rclpy.init(args=command_line)
-    node: PlayBagNode | None = None
-    try:
-        node = PlayBagNode(parameter_overrides=overrides)
-        node.play()
-    except CardboxError as error:
-        get_logger("play_bag").fatal(str(error))
-        return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        if node is not None:
-            node.close()
-        try_shutdown()
-    return 0
+    return run(partial(PlayBagNode, parameter_overrides=overrides), command_line, PlayBagNode.play)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,150 @@
+"""What a user does from outside the nodes: call services, watch topics, record the results."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseArray
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from cardbox_tracker.demo.processes import Nodes
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros import qos
+from cardbox_tracker.ros.bag_writer import BagWriter
+
+_TOPICS = {
+    "body_model": (String, "std_msgs/msg/String", qos.LATCHED),
+    "robot_description": (String, "std_msgs/msg/String", qos.LATCHED),
+    "joint_states": (JointState, "sensor_msgs/msg/JointState", qos.REPLAY),
+    "keypoints": (PoseArray, "geometry_msgs/msg/PoseArray", qos.REPLAY),
+    "silhouette": (Image, "sensor_msgs/msg/Image", qos.REPLAY),
+    "markers": (MarkerArray, "visualization_msgs/msg/MarkerArray", qos.REPLAY),
+}
+
+
+class Client:
+    """Records the results into a bag and keeps what the report needs.
+
+    Attributes:
+        body_model: YAML text of the measured person, once it was published.
+        postures: joint positions (12,) by stamp, ns.
+        keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
+        silhouettes: (H, W) by stamp, ns.
+        arrivals_s: arrival time of each joint state, monotonic seconds.
+    """
+
+    def __init__(self, nodes: Nodes, bag: BagWriter) -> None:
+        """Subscribe to everything the nodes publish."""
+        self.body_model = ""
+        self.postures: dict[int, NDArray[np.float64]] = {}
+        self.keypoints_m: dict[int, NDArray[np.float64]] = {}
+        self.silhouettes: dict[int, NDArray[np.uint8]] = {}
+        self.arrivals_s: list[float] = []
+        self._player_status = ""
+        self._nodes = nodes
+        self._bag = bag
+        self._stamp_ns = 0
+        rclpy.init(args=[])
+        self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        for topic, (kind, name, profile) in _TOPICS.items():
+            self._node.create_subscription(
+                kind, topic, self._recorder(topic, kind, name), profile, raw=True
+            )
+        self._node.create_subscription(
+            String, "play_bag/status", self._note_status, qos.LATCHED
+        )
+
+    def _recorder(self, topic: str, kind: Any, name: str) -> Callable[[bytes], None]:
+        def record(raw: bytes) -> None:
+            message = deserialize_message(raw, kind)
+            if hasattr(message, "header"):
+                stamp = message.header.stamp
+                self._stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+            self._keep(topic, message)
+            self._bag.write_raw(topic, name, raw, self._stamp_ns)
+
+        return record
+
+    def _keep(self, topic: str, message: Any) -> None:
+        stamp = self._stamp_ns
+        if topic == "body_model":
+            self.body_model = message.data
+        elif topic == "joint_states":
+            self.postures[stamp] = np.array(message.position)
+            self.arrivals_s.append(time.monotonic())
+        elif topic == "keypoints":
+            points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
+            self.keypoints_m[stamp] = np.array(points)
+        elif topic == "silhouette":
+            pixels = np.frombuffer(message.data, np.uint8)
+            self.silhouettes[stamp] = pixels.reshape(message.height, message.width)
+
+    def _note_status(self, message: String) -> None:
+        self._player_status = message.data
+
+    def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
+        """Serve topics until ``condition`` holds.
+
+        Raises:
+            CardboxError: it did not in time, or a node died.
+        """
+        end = time.monotonic() + timeout_s
+        while not condition():
+            self._executor.spin_once(timeout_sec=0.05)
+            self._nodes.check()
+            if time.monotonic() > end:
+                raise CardboxError(
+                    f"waited {timeout_s:g} s for {what}; see the nodes' log files in the output"
+                )
+
+    def wait_for_nodes(self) -> None:
+        """Wait until the nodes are connected to each other."""
+        count = self._node.count_subscribers
+        self.wait(
+            lambda: count("silhouette") == 3 and self._node.count_publishers("joint_states") == 1,
+            "the nodes to find each other",
+        )
+
+    def wait_for_pause(self, time_s: float) -> None:
+        """Wait until the player stands still at ``time_s``, and its pictures have been served."""
+        self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
+        self.rest(0.5)
+
+    def rest(self, duration_s: float) -> None:
+        """Serve topics for a while."""
+        end = time.monotonic() + duration_s
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def call(self, service: str) -> str:
+        """Call a Trigger service and return its message.
+
+        Raises:
+            CardboxError: the service refused, or is not there.
+        """
+        client = self._node.create_client(Trigger, service)
+        self.wait(client.service_is_ready, f"the service {service}")
+        future = client.call_async(Trigger.Request())
+        self.wait(future.done, f"the answer of {service}")
+        response = future.result()
+        if not response.success:
+            raise CardboxError(f"{service} refused: {response.message}")
+        return str(response.message)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()

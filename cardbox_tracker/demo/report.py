@@ -1,0 +1,155 @@
+"""The demo's results: report.json, joint_states.png, overlay.mp4, and a short table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.demo.run import DemoResult
+from cardbox_tracker.estimation.compiled import CompiledCost
+from cardbox_tracker.estimation.tracker import TRACKING, Estimate
+from cardbox_tracker.evaluation.truth import tracking_error
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.ros.bag_reader import BagReader
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.drawing import draw_overlay
+from cardbox_tracker.vision.video import video_file
+
+matplotlib.use("Agg")
+
+_VIDEO_SCALE = 2
+
+
+def write_report(
+    result: DemoResult, session: Path, output: Path, preset: str, seed: int
+) -> dict[str, object]:
+    """Write everything into ``output``, print the table, return what report.json holds."""
+    with BagReader(session) as bag:
+        height, width = next(iter(result.silhouettes.values())).shape
+        camera = bag.calibration().camera(width, height).with_pitch(result.body.camera_pitch_rad)
+    expected = [stamp for stamp in result.truth.frames if stamp >= result.start_ns]
+    tracked = [stamp for stamp in expected if stamp in result.postures]
+    estimates = rate(result, camera, tracked)
+    error = tracking_error({s: result.keypoints_m[s] for s in tracked}, result.truth)
+    fits = initialization_fit(result.answer)
+    report: dict[str, object] = {
+        "preset": preset,
+        "seed": seed,
+        "frames": len(expected),
+        "frames_tracked": len(tracked),
+        "mean_3d_error_m": error.mean_m,
+        "error_by_keypoint_m": error.by_keypoint_m,
+        "error_by_segment_m": error.by_segment_m,
+        "lateral_error_m": error.lateral_m,
+        "vertical_error_m": error.vertical_m,
+        "depth_error_m": error.depth_m,
+        "mean_cost_px": float(np.mean([estimate.cost_px for estimate in estimates.values()])),
+        "mean_iou": float(np.mean([estimate.iou for estimate in estimates.values()])),
+        "fps": result.fps,
+        "initialization_iou": fits,
+    }
+    with atomic_path(output / "report.json") as path:
+        path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    save_body_model(result.body, output / "body.yaml")
+    plot_joint_states(result, tracked, output / "joint_states.png")
+    write_overlay(result, camera, estimates, session, output / "overlay.mp4")
+    print_table(report, output)
+    return report
+
+
+def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int, Estimate]:
+    """Cost and IoU of what was published, by stamp, from the silhouettes on the topic."""
+    cost = CompiledCost(result.body, camera)
+    estimates = {}
+    for stamp in stamps:
+        if stamp not in result.silhouettes:
+            continue
+        cost.observe(result.silhouettes[stamp])
+        cost_px, iou = cost.overlap(result.postures[stamp])
+        estimates[stamp] = Estimate(
+            TRACKING, posture=result.postures[stamp], cost_px=cost_px, iou=iou
+        )
+    return estimates
+
+
+def initialization_fit(answer: str) -> float:
+    """Mean IoU out of the initializer's answer ("... mean 0.87; ...")."""
+    return float(answer.split("mean ")[1].split(";")[0])
+
+
+def plot_joint_states(result: DemoResult, stamps: list[int], path: Path) -> None:
+    """Plot the 12 joints over time, estimate against truth."""
+    from matplotlib import pyplot as plt
+
+    time_s = (np.array(stamps) - result.truth.start_ns) / 1e9
+    estimate = np.array([result.postures[stamp] for stamp in stamps])
+    postures = [result.truth.frames[stamp].posture for stamp in stamps]
+    figure, axes = plt.subplots(6, 2, figsize=(13, 14), sharex=True)
+    for i, (axis, name) in enumerate(zip(axes.T.ravel(), JOINT_NAMES, strict=True)):
+        scale, unit = (1.0, "m") if name == "torso_y" else (180.0 / np.pi, "deg")
+        axis.plot(time_s, [p[i] * scale for p in postures if p is not None], "k", lw=1.2)
+        axis.plot(time_s, estimate[:, i] * scale, "tab:orange", lw=1.0)
+        axis.set_ylabel(f"{name}\n[{unit}]", fontsize=8)
+        axis.grid(alpha=0.3)
+    axes[0, 0].legend(["truth", "estimate"], loc="upper right", fontsize=8)
+    for axis in axes[-1]:
+        axis.set_xlabel("seconds from the session's start")
+    figure.tight_layout()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=90)
+    plt.close(figure)
+
+
+def write_overlay(
+    result: DemoResult,
+    camera: Camera,
+    estimates: dict[int, Estimate],
+    session: Path,
+    path: Path,
+) -> None:
+    """Draw the published postures over the session's pictures."""
+    size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
+    nothing = Estimate("not_tracked")
+    with BagReader(session) as bag, video_file(path, size, 15.0) as write:
+        for picture in bag.pictures():
+            if picture.stamp_ns >= result.start_ns:
+                small = _resize(picture.grey, camera)
+                estimate = estimates.get(picture.stamp_ns, nothing)
+                write(draw_overlay(small, result.body, camera, estimate, _VIDEO_SCALE))
+
+
+def _resize(picture: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+    size = (camera.width, camera.height)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def print_table(report: dict[str, object], output: Path) -> None:
+    """Print the main figures and where the rest is."""
+    rows = [
+        ("pictures after initialization", f"{report['frames']}"),
+        ("of them tracked", f"{report['frames_tracked']}"),
+        ("mean 3D error", f"{100 * _number(report, 'mean_3d_error_m'):.1f} cm"),
+        ("  of it in depth", f"{100 * _number(report, 'depth_error_m'):.1f} cm"),
+        ("mean cost", f"{_number(report, 'mean_cost_px'):.0f} px"),
+        ("initialization IoU", f"{_number(report, 'initialization_iou'):.2f}"),
+        ("joint states a second", f"{_number(report, 'fps'):.1f}"),
+    ]
+    print("\n".join(f"  {name:32s}{value:>10s}" for name, value in rows))
+    print(
+        f"look at {output}/overlay.mp4 and {output}/joint_states.png; "
+        f"all figures are in {output}/report.json, the results' bag in {output}/bag"
+    )
+
+
+def _number(report: dict[str, object], key: str) -> float:
+    value = report[key]
+    assert isinstance(value, int | float)
+    return float(value)

@@ -1,0 +1,165 @@
+"""The course of the demo: synthesize, start the nodes, call the services, record, report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.posture import REFERENCE_NAMES
+from cardbox_tracker.demo.processes import Nodes, isolate, running_nodes
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
+from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.simulation.session import synthesize_session
+
+_RATE = 2.0
+_TOPICS = ("/camera/image_raw", "/camera/camera_info")
+_NEUTRAL_S = 0.1
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """What the nodes published, and the truth.
+
+    Attributes:
+        body: the measured person.
+        truth: of the session.
+        start_ns: from this stamp on the person was measured and is tracked.
+        postures: (12,) by stamp.
+        keypoints_m: (6, 3) by stamp, metres in the optical frame.
+        silhouettes: (H, W) by stamp.
+        fps: joint states that arrived in a second.
+        answer: what the initializer answered.
+    """
+
+    body: BodyModel
+    truth: GroundTruth
+    start_ns: int
+    postures: dict[int, NDArray[np.float64]]
+    keypoints_m: dict[int, NDArray[np.float64]]
+    silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
+    fps: float
+    answer: str
+
+
+def run_demo(output: Path, preset: str, seed: int) -> None:
+    """Run the demo and leave its results in the folder ``output``.
+
+    Raises:
+        CardboxError: something failed; the text says what.
+    """
+    from cardbox_tracker.demo.report import write_report
+
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    session = output / "session"
+    with tqdm(total=100, desc="synthesize", unit="%") as bar:
+        synthesize_session(
+            session, "all", seed, progress=lambda done: bar.update(round(100 * done) - bar.n)
+        )
+    result = track_through_nodes(session, output, preset, seed)
+    write_report(result, session, output, preset, seed)
+
+
+def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> DemoResult:
+    """Play ``session`` to the nodes, measure and track its person, record to ``output``/bag.
+
+    Raises:
+        CardboxError: ROS is not installed, a node failed, or a service refused.
+    """
+    isolate()
+    try:
+        from cardbox_tracker.demo.client import Client
+    except ImportError as error:
+        raise CardboxError(
+            f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
+            "a ROS 2 Jazzy installation"
+        ) from None
+    truth = load_ground_truth(session / "ground_truth.json")
+    pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
+    start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
+    with running_nodes(output) as nodes, BagWriter(output / "bag") as bag:
+        client = Client(nodes, bag)
+        try:
+            _start_nodes(nodes, truth, preset, seed)
+            client.wait_for_nodes()
+            stops = [f"{at_s:.3f}" for at_s in (*pauses.values(), start_s)]
+            nodes.start(
+                "play_bag",
+                str(session),
+                *("--rate", f"{_RATE:g}", "--topics", *_TOPICS, "--pause-at", *stops),
+            )
+            for name, at_s in tqdm(pauses.items(), desc="references", unit="posture"):
+                client.wait_for_pause(at_s)
+                client.call(f"initializer/capture_{name}")
+                client.call("play_bag/resume")
+            client.wait_for_pause(start_s)
+            answer = client.call("initializer/initialize")
+            client.wait(lambda: bool(client.body_model), "the body model")
+            client.rest(1.0)
+            client.call("tracker/reset")
+            first = len(client.arrivals_s)
+            client.call("play_bag/resume")
+            end_s = max(end for _, end in truth.spans.values())
+            with tqdm(total=round(end_s - start_s), desc="track", unit="s") as bar:
+                while nodes.is_running("play_bag"):
+                    client.rest(0.5)
+                    nodes.check()
+                    if client.postures:
+                        done_s = (max(client.postures) - truth.start_ns) / 1e9 - start_s
+                        bar.update(min(bar.total, max(0, int(done_s))) - bar.n)
+            client.rest(1.0)
+        finally:
+            client.close()
+    arrivals = client.arrivals_s[first:]
+    lasted_s = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else float("nan")
+    return DemoResult(
+        loads_body_model(client.body_model, "body_model"),
+        truth,
+        truth.start_ns + round(start_s * 1e9),
+        client.postures,
+        client.keypoints_m,
+        client.silhouettes,
+        (len(arrivals) - 1) / lasted_s,
+        answer,
+    )
+
+
+def _start_nodes(nodes: Nodes, truth: GroundTruth, preset: str, seed: int) -> None:
+    def parameters(**values: object) -> list[str]:
+        return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+
+    # A replay shall lose nothing, where a live camera's old pictures are better dropped.
+    deep = [
+        word
+        for topic, end in (
+            ("/camera/image_raw", "subscription"),
+            ("/silhouette", "publisher"),
+            ("/silhouette", "subscription"),
+        )
+        for word in (
+            *("-p", f"qos_overrides.{topic}.{end}.reliability:=reliable"),
+            *("-p", f"qos_overrides.{topic}.{end}.depth:=100"),
+        )
+    ]
+    remap = ("-r", "image_raw:=/camera/image_raw", "-r", "camera_info:=/camera/camera_info")
+    nodes.start("background", "--ros-args", *remap, *deep)
+    nodes.start(
+        "initializer",
+        "--ros-args",
+        *parameters(
+            person_distance_m=truth.distance_m,
+            camera_pitch_deg=truth.pitch_deg,
+            side_turn=truth.side_turn,
+            seed=seed,
+        ),
+    )
+    nodes.start("tracker", "--ros-args", *parameters(preset=preset, seed=seed), *deep)
