@@ -1,8 +1,8 @@
 """Pictures as cameras send them, turned into brightness or colour.
 
-The names are those of ``sensor_msgs/image_encodings``. A Bayer pattern is named after the colours of
-the first row's first two pixels and the second row's first two; OpenCV names the same pattern after
-its second row and column, which is why the table below looks crossed.
+The names are those of ``sensor_msgs/image_encodings``. A Bayer pattern is named after the colours
+of the first row's first two pixels and the second row's first two; OpenCV names the same pattern
+after the second row's second and third pixel, which is why the table below looks crossed.
 """
 
 from __future__ import annotations
@@ -118,6 +118,11 @@ def _pixels(
         )
     if kind.channels == 2 and width % 2:
         raise EncodingError(f"a {encoding} picture is {width} wide; expected an even width")
+    if encoding.startswith("bayer") and min(width, height) < 3:
+        raise EncodingError(
+            f"a {encoding} picture of {width}x{height} is too small to interpolate its colours; "
+            "expected 3x3 or more"
+        )
     raw = np.frombuffer(data, np.uint8)
     if len(raw) < height * step:
         raise EncodingError(
