@@ -16,12 +16,14 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.errors import BagError
+from cardbox_tracker.ros.camera_info import calibration_from_info
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.encodings import decode_bgr, decode_compressed, decode_grey
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
-_PICTURE_ENDINGS = (".mcap", ".db3", ".bag")
+_REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
+_FILE_ENDINGS = (".mcap", ".db3", ".bag")
 
 
 class BagMessage(NamedTuple):
@@ -79,7 +81,7 @@ class BagReader:
         if not path.exists():
             raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
         if path.is_dir() and not (path / "metadata.yaml").exists():
-            files = [f for f in sorted(path.iterdir()) if f.suffix in _PICTURE_ENDINGS]
+            files = [f for f in sorted(path.iterdir()) if f.suffix in _FILE_ENDINGS]
             if (path / "bag" / "metadata.yaml").exists():
                 path = path / "bag"
             elif len(files) == 1:
@@ -97,9 +99,12 @@ class BagReader:
             # rosbags passes on whatever its parsers raise at damaged files.
             self._reader = None
             raise BagError(
-                f"cannot read the recording {self.path}: {error}; give a rosbag2 recording "
-                "(mcap or sqlite3) that was closed properly ('ros2 bag reindex' repairs one)"
+                f"cannot read the recording {self.path}: {_reason(error)}; give a rosbag2 "
+                f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
             ) from None
+        if self._reader.message_count == 0:
+            self.__exit__(None, None, None)
+            raise BagError(f"the recording {self.path} has no messages; record it again")
         return self
 
     def __exit__(
@@ -128,7 +133,8 @@ class BagReader:
     @property
     def duration_s(self) -> float:
         """Seconds from the first to the last message."""
-        return float(self._open.duration) / 1e9
+        # rosbags counts to one nanosecond after the last message.
+        return float(self._open.duration - 1) / 1e9
 
     @property
     def topics(self) -> dict[str, str]:
@@ -155,28 +161,44 @@ class BagReader:
     def _only(self, types: tuple[str, ...], what: str) -> str:
         found = sorted(name for name, kind in self.topics.items() if kind in types)
         if len(found) != 1:
-            has = ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
             raise BagError(
-                f"{self.path} has {len(found)} {what} topics; expected one. It has {has}"
+                f"{self.path} has {len(found)} {what} topics; expected one. It has {self._list()}"
             )
         return found[0]
 
     def messages(self, topics: Sequence[str] | None = None) -> Iterator[BagMessage]:
-        """Yield the messages of ``topics``, or of all, in the order of their time."""
+        """Yield the messages of ``topics``, or of all, in the order of their time.
+
+        Raises:
+            BagError: the recording lacks one of the topics, or turns out to be damaged.
+        """
+        missing = sorted(set(topics or ()) - set(self.topics))
+        if missing:
+            raise BagError(f"{self.path} has no topic {', '.join(missing)}; it has {self._list()}")
         chosen = [c for c in self._open.connections if topics is None or c.topic in topics]
         if not chosen:
             return
         try:
             for connection, time_ns, raw in self._open.messages(chosen):
                 yield BagMessage(connection.topic, time_ns, connection.msgtype, bytes(raw))
-        except (ValueError, KeyError, EOFError, OSError, RuntimeError, AnyReaderError) as error:
-            raise BagError(
-                f"the recording {self.path} is damaged: {error}; 'ros2 bag reindex' may repair it"
-            ) from None
+        except Exception as error:
+            # As on opening; a consumer's errors do not arise here.
+            raise self._damaged(error) from None
 
     def deserialize(self, message: BagMessage) -> Any:
         """Return the message as an object with the fields of its type."""
-        return self._open.deserialize(message.raw, message.msgtype)
+        try:
+            return self._open.deserialize(message.raw, message.msgtype)
+        except AnyReaderError as error:
+            raise self._damaged(error) from None
+
+    def _damaged(self, error: Exception) -> BagError:
+        return BagError(
+            f"the recording {self.path} is damaged: {_reason(error)}; record it again, or {_REPAIR}"
+        )
+
+    def _list(self) -> str:
+        return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
 
     def pictures(self, topic: str | None = None) -> Iterator[BagPicture]:
         """Yield the pictures of ``topic``, or of the only picture topic, in order."""
@@ -188,18 +210,20 @@ class BagReader:
             )
 
     def calibration(self) -> Calibration:
-        """Return what the recording's first CameraInfo says."""
-        for message in self.messages([self.camera_info_topic()]):
-            info = self.deserialize(message)
-            return Calibration(
-                int(info.width),
-                int(info.height),
-                np.array(info.k, dtype=np.float64).reshape(3, 3),
-                np.array(info.d, dtype=np.float64),
-                info.distortion_model,
-                info.header.frame_id,
-            )
-        raise BagError(f"{self.path} has no message on {self.camera_info_topic()}")
+        """Return what the recording's first CameraInfo says.
+
+        Raises:
+            BagError: there is none.
+            CameraError: the camera was not calibrated; the text names both topics.
+        """
+        topic = self.camera_info_topic()
+        for message in self.messages([topic]):
+            return calibration_from_info(self.deserialize(message), self.image_topic(), topic)
+        raise BagError(f"{self.path} has no message on {topic}; record it with the pictures")
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
 
 
 def _decoder(image: Any) -> Callable[[bool], NDArray[np.uint8]]:
