@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from rclpy.utilities import try_shutdown
+from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
@@ -133,7 +133,7 @@ def run(
         pass
     except Exception:
         # A signal ends ROS in the midst of whatever runs; what then fails is no error.
-        if rclpy.ok():
+        if ok():
             raise
     finally:
         if node is not None:

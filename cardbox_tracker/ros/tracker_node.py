@@ -59,6 +59,8 @@ class TrackerNode(CardboxNode):
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
         self.diagnostics.extra = self._values
+        # Compiles what no cache has yet, so that no live picture waits for it.
+        Tracker(BodyModel(), Camera(320, 240, 300.0, 300.0, 159.5, 119.5))
         if self.parameters.value.model_file:
             self._use(load_body_model(self.parameters.value.model_file))
         self._wait()

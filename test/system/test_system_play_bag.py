@@ -99,7 +99,7 @@ def test_part_and_topics_can_be_chosen(graph: Any, bag: Path) -> None:
 
 
 def test_resume_while_playing_is_refused(graph: Any, bag: Path) -> None:
-    process = graph.start("play_bag", str(bag), "--no-wait")
+    process = graph.start("play_bag", str(bag), "--no-wait", "--loop")
     response = graph.call("play_bag/resume")
     assert not response.success and "not paused" in response.message
     assert process.stop() == 0

@@ -1,4 +1,4 @@
-"""The recorded sessions of realistic people, through the live nodes."""
+"""Whole sessions, synthetic and recorded: a bag through the live nodes, against ground truth."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.simulation.session import synthesize_session  # noqa: E402
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 KEYPOINTS = tuple(
@@ -31,29 +32,36 @@ def deep(topic: str, end: str) -> tuple[str, ...]:
     return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:=100")
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="no recorded sessions in ../shared/data")
-@pytest.mark.parametrize("name", ["person_a", "person_b"])
-def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: str) -> None:
-    session = DATA / name
-    truth = json.loads((session / "ground_truth.json").read_text())
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["synthetic", "person_a", "person_b"])
+def test_session_is_measured_and_tracked_to_its_end(graph: Any, name: str, tmp_path: Path) -> None:
+    if name == "synthetic":
+        bag, transport = tmp_path / "bag", "raw"
+        truth = synthesize_session(bag, motion="wave")
+    else:
+        if not (DATA / name).is_dir():
+            pytest.skip(f"no recorded session {name} in ../shared/data")
+        bag, transport = DATA / name / "bag", "compressed"
+        truth = json.loads((DATA / name / "ground_truth.json").read_text())
+    topic = "/camera/image_raw" + ("/compressed" if transport == "compressed" else "")
     spans = {
         segment["name"]: (segment["start_s"], segment["end_s"]) for segment in truth["segments"]
     }
     eye = f"/{name}"
     remap = ("--ros-args", "-r", f"__ns:={eye}")
     camera = (
-        *("-r", "image_raw/compressed:=/camera/image_raw/compressed"),
+        *("-r", f"{topic.removeprefix('/camera/')}:={topic}"),
         *("-r", "camera_info:=/camera/camera_info"),
-        *deep("/camera/image_raw/compressed", "subscription"),
+        *deep(topic, "subscription"),
         *deep(f"{eye}/silhouette", "publisher"),
     )
     queue = deep(f"{eye}/silhouette", "subscription")
-    graph.start("background", *remap, *camera, image_transport="compressed")
+    graph.start("background", *remap, *camera, image_transport=transport)
     graph.start(
         "initializer",
         *remap,
         person_distance_m=truth["person"]["distance_m"],
-        camera_pitch_deg=float(truth["camera"]["pitch_down_deg"]),
+        camera_pitch_deg=float(truth["camera"].get("pitch_down_deg", 0.0)),
         side_turn=truth["side_posture_turns_to"],
     )
     graph.start("tracker", *remap, *queue)
@@ -69,9 +77,7 @@ def test_recorded_session_is_measured_and_tracked_to_its_end(graph: Any, name: s
     )
     pauses = {reference: np.mean(spans[reference]) for reference in ("front", "side", "arms")}
     stops = [f"{at_s:.3f}" for at_s in pauses.values()]
-    player = graph.start(
-        "play_bag", str(session / "bag"), "--rate", "2", "--pause-at", *stops, *remap
-    )
+    player = graph.start("play_bag", str(bag), "--rate", "3", "--pause-at", *stops, *remap)
     for reference, stop in zip(pauses, stops, strict=True):
         graph.wait(lambda: statuses and statuses[-1].data == f"paused at {stop} s", reference, 60)  # noqa: B023
         graph.spin(0.3)
