@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from cardbox_tracker import __version__
 from cardbox_tracker.body.model_file import load_body_model, save_body_model
@@ -23,6 +22,7 @@ from cardbox_tracker.offline.initialize import describe, initialize_from_recordi
 from cardbox_tracker.offline.result_bag import ResultBag
 from cardbox_tracker.offline.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.offline.track import track_recording
+from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.ros.bag_reader import BagReader
 
 
@@ -154,14 +154,14 @@ def _demo(options: argparse.Namespace) -> None:
 def _synthesize(options: argparse.Namespace) -> None:
     from cardbox_tracker.simulation.session import synthesize_session
 
-    with tqdm(total=100, desc="synthesize", unit="%") as bar:
+    with progress_bar("synthesize") as show:
         synthesize_session(
             options.output,
             motion=options.motion,
             seed=options.seed,
             storage=options.storage,
             compressed=options.compressed,
-            progress=lambda done: bar.update(round(100 * done) - bar.n),
+            progress=show,
         )
     print(f"wrote {options.output}")
 
@@ -179,10 +179,8 @@ def _initialize(options: argparse.Namespace) -> None:
     spans = {name: getattr(options, name) for name in ("front", "side", "arms")}
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
-        with tqdm(total=100, desc="initialize", unit="%") as bar:
-            result = initialize_from_recording(
-                source, spans, config, lambda done: bar.update(round(100 * done) - bar.n)
-            )
+        with progress_bar("initialize") as show:
+            result = initialize_from_recording(source, spans, config, show)
     save_body_model(result.body, options.output)
     print(describe(result))
     print(f"wrote {options.output}")
@@ -195,10 +193,11 @@ def _track(options: argparse.Namespace) -> None:
         config = config.with_particles(options.particles)
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
-        total = bag.duration_s - options.start
-        with ResultBag(options.bag, body, source.frame_id) as results, tqdm(
-            total=max(0.0, round(total, 3)), desc="track", unit="s"
-        ) as bar:
+        total_s = max(1e-9, bag.duration_s - options.start)
+        with (
+            ResultBag(options.bag, body, source.frame_id) as results,
+            progress_bar("track") as show,
+        ):
             summary = track_recording(
                 source,
                 body,
@@ -209,9 +208,7 @@ def _track(options: argparse.Namespace) -> None:
                 options.video,
                 observers=(
                     results.add,
-                    lambda frame, *_: bar.update(
-                        min(bar.total, round(frame.time_s - options.start, 3)) - bar.n
-                    ),
+                    lambda frame, *_: show((frame.time_s - options.start) / total_s),
                 ),
             )
     print(

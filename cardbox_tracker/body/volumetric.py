@@ -48,9 +48,7 @@ def volumetric_faces(body: BodyModel, postures: FloatArray) -> FloatArray:
     waist_m, top_m = size("waist_height"), size("waist_height") + size("torso_height")
     chin_m = top_m + size("neck_length")
     depth = size("torso_depth")
-    torso = _box(
-        depth, depth, size("torso_bottom_width"), size("torso_top_width"), waist_m, top_m
-    )
+    torso = _box(depth, depth, size("torso_bottom_width"), size("torso_top_width"), waist_m, top_m)
     waist = _prism(size("waist_depth"), size("waist_width"), 0.0, waist_m)
     head = _prism(size("head_depth"), size("head_width"), chin_m, chin_m + size("head_height"))
     head[:, 0] += size("head_offset")

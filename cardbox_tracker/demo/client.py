@@ -12,6 +12,7 @@ from geometry_msgs.msg import PoseArray
 from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
+from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -62,9 +63,7 @@ class Client:
             self._node.create_subscription(
                 kind, topic, self._recorder(topic, kind, name), profile, raw=True
             )
-        self._node.create_subscription(
-            String, "play_bag/status", self._note_status, qos.LATCHED
-        )
+        self._node.create_subscription(String, "play_bag/status", self._note_status, qos.LATCHED)
 
     def _recorder(self, topic: str, kind: Any, name: str) -> Callable[[bytes], None]:
         def record(raw: bytes) -> None:
@@ -147,4 +146,4 @@ class Client:
         """Leave the graph."""
         self._executor.shutdown()
         self._node.destroy_node()
-        rclpy.try_shutdown()
+        try_shutdown()

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
@@ -15,6 +14,7 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.demo.processes import Nodes, isolate, running_nodes
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
+from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.ros.bag_writer import BagWriter
 from cardbox_tracker.simulation.session import synthesize_session
 
@@ -61,10 +61,8 @@ def run_demo(output: Path, preset: str, seed: int) -> None:
     except OSError as error:
         raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
     session = output / "session"
-    with tqdm(total=100, desc="synthesize", unit="%") as bar:
-        synthesize_session(
-            session, "all", seed, progress=lambda done: bar.update(round(100 * done) - bar.n)
-        )
+    with progress_bar("synthesize") as show:
+        synthesize_session(session, "all", seed, progress=show)
     result = track_through_nodes(session, output, preset, seed)
     write_report(result, session, output, preset, seed)
 
@@ -97,11 +95,13 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
                 str(session),
                 *("--rate", f"{_RATE:g}", "--topics", *_TOPICS, "--pause-at", *stops),
             )
-            for name, at_s in tqdm(pauses.items(), desc="references", unit="posture"):
+            for name, at_s in pauses.items():
                 client.wait_for_pause(at_s)
+                print(f"initializer/capture_{name}", flush=True)
                 client.call(f"initializer/capture_{name}")
                 client.call("play_bag/resume")
             client.wait_for_pause(start_s)
+            print("initializer/initialize", flush=True)
             answer = client.call("initializer/initialize")
             client.wait(lambda: bool(client.body_model), "the body model")
             client.rest(1.0)
@@ -109,13 +109,13 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
             first = len(client.arrivals_s)
             client.call("play_bag/resume")
             end_s = max(end for _, end in truth.spans.values())
-            with tqdm(total=round(end_s - start_s), desc="track", unit="s") as bar:
+            with progress_bar("track") as show:
                 while nodes.is_running("play_bag"):
                     client.rest(0.5)
                     nodes.check()
                     if client.postures:
-                        done_s = (max(client.postures) - truth.start_ns) / 1e9 - start_s
-                        bar.update(min(bar.total, max(0, int(done_s))) - bar.n)
+                        time_s = (max(client.postures) - truth.start_ns) / 1e9
+                        show((time_s - start_s) / (end_s - start_s))
             client.rest(1.0)
         finally:
             client.close()

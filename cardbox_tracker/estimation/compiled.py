@@ -1,6 +1,7 @@
-"""The cost of :mod:`cardbox_tracker.estimation.cost`, compiled: equal results, a fraction of the time.
+"""The cost of equation (2), compiled: equal results, a fraction of the time.
 
-See :mod:`cardbox_tracker.estimation.kernels` for how it works.
+What it equals is in :mod:`cardbox_tracker.estimation.cost`; see
+:mod:`cardbox_tracker.estimation.kernels` for how it works.
 """
 
 from __future__ import annotations
@@ -139,7 +140,7 @@ class CompiledCost:
         return cost, common / union if union else 0.0
 
     def bodies(self, sizes: FloatArray, postures: FloatArray) -> CostArray:
-        """Costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12), in the same place."""
+        """Costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12), in one place."""
         costs = np.empty(len(sizes), np.int64)
         kernels.body_costs(
             np.ascontiguousarray(sizes, dtype=np.float64),

@@ -5,7 +5,7 @@
 Only the rows above the hips count: a model of the upper body says nothing about legs. The middle of
 the hips never moves up or down, so the first row below it is a constant of body and camera.
 
-:class:`SilhouetteCost` is the interface; :class:`ReferenceCost` implements it as the equation reads.
+:class:`SilhouetteCost` is the interface; :class:`ReferenceCost` does just what the equation says.
 The trackers use the compiled one in :mod:`cardbox_tracker.estimation.compiled`.
 """
 
@@ -158,4 +158,3 @@ class ReferenceCost:
             model = render(drawn, self.camera, self.rows)
             costs[i] = cv2.countNonZero(cv2.bitwise_xor(model, self._silhouette))
         return costs
-

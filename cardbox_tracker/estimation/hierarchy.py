@@ -15,7 +15,7 @@ import numpy as np
 from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, N_JOINTS, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost import ARMS, SilhouetteCost
+from cardbox_tracker.estimation.cost import ARMS, CostArray, SilhouetteCost
 from cardbox_tracker.estimation.particle_filter import ParticleFilter
 from cardbox_tracker.estimation.resampling import STRATEGIES
 
@@ -120,20 +120,19 @@ class HierarchicalFilter:
         return particle_filter.estimate(self._config.average, self._scale)
 
     def _rate_torso(self, particles: FloatArray) -> FloatArray:
-        return self._cost.torso(particles) + self._prior(particles, TORSO)
+        return self._with_prior(self._cost.torso(particles), particles, TORSO)
 
     def _rate_arm(self, side: str) -> Callable[[FloatArray], FloatArray]:
         def rate(particles: FloatArray) -> FloatArray:
-            return self._cost.arm(side, particles) + self._prior(particles, ARMS[side])
+            return self._with_prior(self._cost.arm(side, particles), particles, ARMS[side])
 
         return rate
 
-    def _prior(self, particles: FloatArray, joints: slice) -> FloatArray | float:
-        """Cost (N,) in px that grows with the square of each angle's distance from rest."""
-        if self._config.prior == 0.0:
-            return 0.0
-        weight_px = self._config.prior * self._cost.silhouette_px
-        scaled = particles * _PRIOR_SCALE[joints]
-        return weight_px * np.einsum("ij,ij->i", scaled, scaled)
-
-
+    def _with_prior(self, costs: CostArray, particles: FloatArray, joints: slice) -> FloatArray:
+        """Add to costs (N,) what grows with the square of each angle's distance from rest, px."""
+        rated: FloatArray = costs.astype(np.float64)
+        if self._config.prior > 0.0:
+            scaled = particles * _PRIOR_SCALE[joints]
+            weight_px = self._config.prior * self._cost.silhouette_px
+            rated += weight_px * np.einsum("ij,ij->i", scaled, scaled)
+        return rated

@@ -1,4 +1,4 @@
-"""Measure the 18 body sizes from three silhouettes (paper, algorithm "Offline Model Initialization").
+"""Measure the 18 body sizes from three silhouettes (paper, "Offline Model Initialization").
 
 In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset are drawn around the
 best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy is
@@ -179,7 +179,7 @@ class _Search:
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
             self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
-        self._rounds = {subset: 0 for subset in SUBSETS}
+        self._rounds = dict.fromkeys(SUBSETS, 0)
 
     def step(self, subset: str, name: str) -> None:
         """Estimate one subset of the sizes, and the posture of the reference that shows it."""
@@ -218,7 +218,8 @@ class _Search:
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
-        return cost.bodies(sizes, postures) + weight_px * prior
+        rated: FloatArray = cost.bodies(sizes, postures) + weight_px * prior
+        return rated
 
     def result(self) -> InitializationResult:
         """Return the sizes rounded to a tenth of a millimetre, and the fit."""

@@ -137,8 +137,8 @@ def _sum_union(spans: Any, extent: Any, count: int, table: Any, starts: Any, end
             else:
                 first = min(first, extent[k, 0])
                 last = max(last, extent[k, 1])
-    total = 0
-    area = 0
+    total = np.int64(0)
+    area = np.int64(0)
     for v in range(first, last):
         # Insertion sort by start: two or three runs meet in a row, and most come in order.
         n = 0
@@ -194,8 +194,15 @@ def _torso_pose(torso: Any, place: Any, view: Any, rotation: Any, hip: Any) -> N
 
 @_compile
 def _upright(
-    quad: Any, rotation: Any, axis: int, origin: Any, half_low: float, half_high: float,
-    low: float, high: float, shift: float,
+    quad: Any,
+    rotation: Any,
+    axis: int,
+    origin: Any,
+    half_low: float,
+    half_high: float,
+    low: float,
+    high: float,
+    shift: float,
 ) -> None:
     """Corners of a trapezoid through Z of a part, spreading along X (``axis`` 0) or Y (1).
 
@@ -212,8 +219,15 @@ def _upright(
 
 @_compile
 def _put_trunk(
-    rotation: Any, hip: Any, sizes: Any, view: Any, quad: Any, spans: Any, extent: Any,
-    rows: int, width: int,
+    rotation: Any,
+    hip: Any,
+    sizes: Any,
+    view: Any,
+    quad: Any,
+    spans: Any,
+    extent: Any,
+    rows: int,
+    width: int,
 ) -> None:
     """Store torso, waist and head as patches 0 to 6."""
     waist = sizes[4]
@@ -245,7 +259,7 @@ def _put_trunk(
 
 @_compile
 def _turn_limb(parent: Any, abduction: float, flexion: float, rotation: Any) -> None:
-    """rotation = parent Rx(abduction) Ry(-flexion)."""
+    """Rotation = parent Rx(abduction) Ry(-flexion)."""
     ca, sa = cos(abduction), sin(abduction)
     cf, sf = cos(flexion), sin(flexion)
     for c in range(3):
@@ -259,8 +273,21 @@ def _turn_limb(parent: Any, abduction: float, flexion: float, rotation: Any) -> 
 
 @_compile
 def _put_arm(
-    angles: Any, side: float, torso: Any, hip: Any, sizes: Any, view: Any, k: int,
-    upper: Any, fore: Any, origin: Any, quad: Any, spans: Any, extent: Any, rows: int, width: int,
+    angles: Any,
+    side: float,
+    torso: Any,
+    hip: Any,
+    sizes: Any,
+    view: Any,
+    k: int,
+    upper: Any,
+    fore: Any,
+    origin: Any,
+    quad: Any,
+    spans: Any,
+    extent: Any,
+    rows: int,
+    width: int,
 ) -> None:
     """Store one arm as patches ``k`` to ``k`` + 3; ``side`` is +1 for the left, -1 for the right."""
     height = sizes[4] + sizes[2] - sizes[13]
@@ -316,7 +343,7 @@ def _cover(spans: Any, extent: Any, count: int, covered: Any) -> None:
 
 
 @_compile
-def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> int:
+def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> Any:
     """Write ``table`` without the gain under the trunk to ``covered``; return what was taken."""
     rows, width = table.shape[0], table.shape[1] - 1
     spans = np.empty((7, 2, rows), np.int32)
@@ -331,7 +358,7 @@ def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, cover
 
 
 @_compile
-def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> int:
+def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> Any:
     """Write ``table`` without the gain under both arms to ``covered``; return what was taken."""
     rows, width = table.shape[0], table.shape[1] - 1
     spans = np.empty((8, 2, rows), np.int32)
@@ -342,8 +369,21 @@ def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, cove
     _torso_pose(posture, place, view, rotation, hip)
     for arm in range(2):
         _put_arm(
-            posture[4 + 4 * arm : 8 + 4 * arm], 1.0 - 2.0 * arm, rotation, hip, sizes, view,
-            4 * arm, upper, fore, origin, quad, spans, extent, rows, width,
+            posture[4 + 4 * arm : 8 + 4 * arm],
+            1.0 - 2.0 * arm,
+            rotation,
+            hip,
+            sizes,
+            view,
+            4 * arm,
+            upper,
+            fore,
+            origin,
+            quad,
+            spans,
+            extent,
+            rows,
+            width,
         )
     covered[:] = table
     _cover(spans, extent, 8, covered)
@@ -352,8 +392,15 @@ def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, cove
 
 @_compile
 def arm_costs(
-    postures: Any, side: float, torso: Any, sizes: Any, place: Any, view: Any, covered: Any,
-    base: int, costs: Any,
+    postures: Any,
+    side: float,
+    torso: Any,
+    sizes: Any,
+    place: Any,
+    view: Any,
+    covered: Any,
+    base: int,
+    costs: Any,
 ) -> None:
     """Costs (N,) of arms (N, 4) beside a trunk that ``covered`` accounts for, of cost ``base``."""
     rows, width = covered.shape[0], covered.shape[1] - 1
@@ -365,8 +412,21 @@ def arm_costs(
     _torso_pose(torso, place, view, rotation, hip)
     for i in range(postures.shape[0]):
         _put_arm(
-            postures[i], side, rotation, hip, sizes, view, 0,
-            upper, fore, origin, quad, spans, extent, rows, width,
+            postures[i],
+            side,
+            rotation,
+            hip,
+            sizes,
+            view,
+            0,
+            upper,
+            fore,
+            origin,
+            quad,
+            spans,
+            extent,
+            rows,
+            width,
         )
         costs[i] = base + _sum_union(spans, extent, 4, covered, starts, ends)[0]
 
@@ -387,8 +447,21 @@ def full_costs(
         _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
         for arm in range(2):
             _put_arm(
-                postures[i, 4 + 4 * arm : 8 + 4 * arm], 1.0 - 2.0 * arm, rotation, hip, sizes, view,
-                7 + 4 * arm, upper, fore, origin, quad, spans, extent, rows, width,
+                postures[i, 4 + 4 * arm : 8 + 4 * arm],
+                1.0 - 2.0 * arm,
+                rotation,
+                hip,
+                sizes,
+                view,
+                7 + 4 * arm,
+                upper,
+                fore,
+                origin,
+                quad,
+                spans,
+                extent,
+                rows,
+                width,
             )
         gain, area = _sum_union(spans, extent, 15, table, starts, ends)
         costs[i] = total + gain

@@ -62,8 +62,9 @@ def srs_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
     Computed relative to the best particle, so that large costs do not make all of them 0.
     """
     exponents = -(costs.astype(np.float64) ** 2) / (2.0 * sigma_gamma_px**2)
-    weights: FloatArray = np.exp(exponents - exponents.max())
-    return weights / weights.sum()
+    weights = np.exp(exponents - exponents.max())
+    normalized: FloatArray = weights / weights.sum()
+    return normalized
 
 
 def stratified(

@@ -66,9 +66,7 @@ def stature_m(
     return float(np.clip(np.average(guesses, weights=weights), *_RANGE_M))
 
 
-def _shoulder_height_m(
-    arms: NDArray[np.uint8], camera: Camera, distance_m: float
-) -> float:
+def _shoulder_height_m(arms: NDArray[np.uint8], camera: Camera, distance_m: float) -> float:
     """Height of the shoulder joints: the arms' middle line, followed back to the shoulders."""
     columns = np.nonzero(np.any(arms, axis=0))[0]
     first, last = columns[0], columns[-1]

@@ -125,6 +125,8 @@ def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> T
         float(distances.mean()),
         dict(zip(KEYPOINT_NAMES, distances.mean(axis=0).tolist(), strict=True)),
         {name: float(np.mean(values)) for name, values in segments.items()},
-        *(float(value) for value in along),
+        float(along[0]),
+        float(along[1]),
+        float(along[2]),
         len(stamps),
     )

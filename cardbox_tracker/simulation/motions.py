@@ -99,9 +99,7 @@ def timeline(motion: str, side_turn: str = "left") -> list[Segment]:
         CardboxError: the motion is unknown.
     """
     if motion != "all" and motion not in MOTIONS:
-        raise CardboxError(
-            f"motion '{motion}' is unknown; expected {', '.join(MOTIONS)} or all"
-        )
+        raise CardboxError(f"motion '{motion}' is unknown; expected {', '.join(MOTIONS)} or all")
     references = {n: reference_posture(n, side_turn) for n in ("front", "side", "arms")}
     front = references["front"]
     aside = front.copy()

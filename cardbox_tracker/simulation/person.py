@@ -86,7 +86,11 @@ def _trunk(body: BodyModel, frames: BodyFrames) -> Part:
         (waist + 0.55 * (top - waist), 0.48 * size("torso_top_width"), 0.5 * size("torso_depth")),
         (waist + 0.85 * (top - waist), 0.5 * size("torso_top_width"), 0.44 * size("torso_depth")),
         (top, 0.4 * size("torso_top_width"), 0.3 * size("torso_depth")),
-        (top + 0.3 * size("neck_length"), 0.2 * size("torso_top_width"), 0.25 * size("torso_depth")),
+        (
+            top + 0.3 * size("neck_length"),
+            0.2 * size("torso_top_width"),
+            0.25 * size("torso_depth"),
+        ),
     ]
     return Part(_rings(profile, frames.torso_rotation, frames.hip), SHIRT)
 
@@ -141,7 +145,7 @@ def _tube(
 ) -> Part:
     """Round part from ``start`` to ``end``; ``profile`` has (place along it, factor on radius)."""
     axis = end - start
-    length = np.linalg.norm(axis)
+    length = float(np.linalg.norm(axis))
     z = axis / length
     helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     y = np.cross(z, helper)

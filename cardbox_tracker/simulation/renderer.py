@@ -44,9 +44,7 @@ class Renderer:
         self._scene = scene
         self._rng = rng
         coarse = rng.normal(0.0, 1.0, (camera.height // 20 + 2, camera.width // 20 + 2))
-        blotches = cv2.resize(
-            coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC
-        )
+        blotches = cv2.resize(coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
         self.wall = np.clip(scene.wall + scene.texture * blotches, 0, 255).astype(np.float32)
 
     def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> Picture:
@@ -81,9 +79,7 @@ class Renderer:
             points = camera.reference_to_optical(part.rings)
             if np.any(points[..., 2] < 0.1):
                 continue
-            pixels = np.asarray(
-                np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32
-            )
+            pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
             for i, pair in enumerate(zip(pixels[:-1], pixels[1:], strict=True)):
                 hull = cv2.convexHull(np.concatenate(pair))
                 # A little light from above, so that a part is no flat patch.

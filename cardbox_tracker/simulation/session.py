@@ -176,9 +176,7 @@ def _session(
         },
         "side_posture_turns_to": body.side_turn,
         "fps": fps,
-        "segments": [
-            {"name": s.name, "start_s": s.start_s, "end_s": s.end_s} for s in segments
-        ],
+        "segments": [{"name": s.name, "start_s": s.start_s, "end_s": s.end_s} for s in segments],
         "scene": {"seed": seed},
         "frames": frames,
     }

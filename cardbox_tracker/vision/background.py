@@ -150,7 +150,7 @@ class SilhouetteExtractor:
         if config.smoothing_px > 0:
             signed = cv2.GaussianBlur(signed, (0, 0), config.smoothing_px)
         score = cv2.max(cv2.multiply(signed, self._brighter), cv2.multiply(signed, self._darker))
-        limit = cv2.max(cv2.dilate(score, _KERNEL) * config.edge, 1.0)
+        limit = np.maximum(cv2.dilate(score, _KERNEL) * np.float32(config.edge), np.float32(1.0))
         foreground = cv2.compare(score, limit, cv2.CMP_GE)
         return clean_silhouette(
             np.asarray(foreground, dtype=np.uint8), config.min_area, config.max_hole
@@ -193,4 +193,4 @@ def _drop_small(picture: Picture, area_px: float) -> Picture:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(picture, connectivity=4)
     keep = np.zeros(count, np.uint8)
     keep[1:] = np.where(stats[1:, cv2.CC_STAT_AREA] >= area_px, 255, 0)
-    return keep[labels]
+    return np.asarray(keep[labels], dtype=np.uint8)

@@ -145,9 +145,7 @@ class Calibration:
                 k, self.distortion[:4].reshape(4, 1), np.eye(3), k, size, cv2.CV_16SC2
             )
         else:
-            maps = cv2.initUndistortRectifyMap(
-                k, self.distortion, np.eye(3), k, size, cv2.CV_16SC2
-            )
+            maps = cv2.initUndistortRectifyMap(k, self.distortion, np.eye(3), k, size, cv2.CV_16SC2)
         return Rectifier(*maps)
 
     def _check(self) -> None:

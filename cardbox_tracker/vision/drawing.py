@@ -62,14 +62,15 @@ def draw_overlay(
     """
     height, width = picture.shape[:2]
     size = (scale * width, scale * height)
-    canvas = cv2.resize(_bgr(picture), size, interpolation=cv2.INTER_LINEAR)
+    resized = cv2.resize(_bgr(picture), size, interpolation=cv2.INTER_LINEAR)
+    canvas = np.asarray(resized, dtype=np.uint8)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
         view = camera.scaled(*size)
         draw_model(canvas, body, view, estimate.posture)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text)
-    return np.asarray(canvas, dtype=np.uint8)
+    return canvas
 
 
 def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
@@ -110,18 +111,16 @@ def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatA
 def draw_text(canvas: Picture, text: str, line: int = 0) -> None:
     """Write ``text`` into the upper left corner of ``canvas``, in place; ``line`` counts down."""
     scale = canvas.shape[1] / 700
-    place = (round(10 * scale), round((26 + 28 * line) * scale))
-    for color, extra in (((0, 0, 0), 2), (TEXT_BGR, 0)):
-        cv2.putText(
-            canvas,
-            text,
-            place,
-            cv2.FONT_HERSHEY_SIMPLEX,
-            0.75 * scale,
-            color,
-            max(1, round(1.5 * scale)) + extra,
-            cv2.LINE_AA,
-        )
+    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
+    (width, height), below = cv2.getTextSize(text, font, size, thickness)
+    margin = round(8 * scale)
+    left, bottom = margin, margin + height + line * (height + below + margin)
+    # On a dark ground the text stays readable before any wall.
+    corner = (left + width + margin // 2, bottom + below)
+    cv2.rectangle(
+        canvas, (left - margin // 2, bottom - height - margin // 2), corner, (0, 0, 0), -1
+    )
+    cv2.putText(canvas, text, (left, bottom), font, size, TEXT_BGR, thickness, cv2.LINE_AA)
 
 
 def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
