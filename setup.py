@@ -17,6 +17,7 @@ TEST = [
     "ruff>=0.6",
     "types-PyYAML",
     "types-tqdm",
+    "yourdfpy>=0.0.56",
 ]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]

@@ -1,0 +1,197 @@
+"""The nodes behind a source of pictures: background, initializer, tracker, and TF and RViz.
+
+Included by live.launch.py and replay.launch.py; start it alone beside a camera driver of your own:
+
+    ros2 launch cardbox_tracker nodes.launch.py image:=/camera/image_raw \
+        camera_info:=/camera/camera_info person_distance_m:=2.0
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import (
+    PackageNotFoundError,
+    get_package_prefix,
+    get_package_share_directory,
+)
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    LogInfo,
+    OpaqueFunction,
+    SetEnvironmentVariable,
+)
+from launch.substitutions import EnvironmentVariable, LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.ros_adapters import get_ros_node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+
+SHARE = Path(get_package_share_directory("cardbox_tracker"))
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+ARGUMENTS = {
+    "namespace": ("", "namespace of all nodes, one per camera"),
+    "config_dir": (str(SHARE / "config"), "folder of the nodes' YAML files"),
+    "image": ("image_raw", "topic of the pictures (without /compressed)"),
+    "camera_info": ("camera_info", "topic of their CameraInfo"),
+    "image_transport": ("raw", "raw, or compressed for the topic IMAGE/compressed"),
+    "person_distance_m": ("2.0", "level distance from the camera to the person"),
+    "camera_pitch_deg": ("0.0", "how far the camera looks down"),
+    "side_turn": ("left", "which way the person turns for the side reference: left or right"),
+    "model_file": ("", "body model: read if it exists, written by every initialization"),
+    "preset": ("default", "tracker settings: paper or default"),
+    "publish_tf": ("true", "start robot_state_publisher"),
+    "rviz": ("false", "start RViz"),
+}
+# Nobody until somebody is measured: robot_state_publisher does not start without a description.
+NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
+
+
+def generate_launch_description() -> LaunchDescription:
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, (default, text) in ARGUMENTS.items()
+    ]
+    profiles = EnvironmentVariable(
+        PROFILES, default_value=str(SHARE / "config" / "fastdds_large_images.xml")
+    )
+    return LaunchDescription(
+        [
+            *declared,
+            # Without it Fast DDS loses most large pictures; a profile of the user's own stays.
+            SetEnvironmentVariable(PROFILES, profiles),
+            _node(
+                "background",
+                {"image_transport": str},
+                remappings=[
+                    ("image_raw", LaunchConfiguration("image")),
+                    ("image_raw/compressed", [LaunchConfiguration("image"), "/compressed"]),
+                    ("camera_info", LaunchConfiguration("camera_info")),
+                ],
+            ),
+            _node(
+                "initializer",
+                {
+                    "person_distance_m": float,
+                    "camera_pitch_deg": float,
+                    "side_turn": str,
+                    "model_file": str,
+                },
+            ),
+            _node("tracker", {"preset": str}),
+            OpaqueFunction(function=_robot_state_publisher),
+            OpaqueFunction(function=_rviz),
+        ]
+    )
+
+
+def _node(name: str, parameters: dict[str, type], **options: object) -> Node:
+    """A node of this package: its YAML file, and on top the launch arguments of the same names."""
+    given = {
+        parameter: ParameterValue(LaunchConfiguration(parameter), value_type=kind)
+        for parameter, kind in parameters.items()
+    }
+    return Node(
+        package="cardbox_tracker",
+        executable=name,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], given],
+        output="screen",
+        **options,
+    )
+
+
+def _robot_state_publisher(context: LaunchContext) -> list[object]:
+    if not _wanted(context, "publish_tf"):
+        return []
+    if not _installed("robot_state_publisher"):
+        return [_hint("robot_state_publisher", "so there is no TF of the person")]
+    _pass_on_description(context)
+    return [
+        Node(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            name="robot_state_publisher",
+            namespace=LaunchConfiguration("namespace"),
+            # A recording's stamps go back when it starts over.
+            parameters=[
+                {
+                    "robot_description": ParameterValue(NOBODY, value_type=str),
+                    "ignore_timestamp": True,
+                    # It thins out joint states to this rate.
+                    "publish_frequency": 200.0,
+                }
+            ],
+            # Its own copy of the description would compete with the initializer's.
+            remappings=[("robot_description", "robot_state_publisher/robot_description")],
+            output="screen",
+        )
+    ]
+
+
+def _pass_on_description(context: LaunchContext) -> None:
+    """Set what the initializer publishes as robot_state_publisher's parameter.
+
+    It takes a new description as a parameter at any time, but does not listen to the topic.
+    """
+    node = get_ros_node(context)
+    namespace = LaunchConfiguration("namespace").perform(context).strip("/")
+    prefix = f"/{namespace}" if namespace else ""
+    client = AsyncParameterClient(node, f"{prefix}/robot_state_publisher")
+    waiting: list[str] = []
+
+    def send() -> None:
+        # The description may come before robot_state_publisher is up: tried again by the timer.
+        if waiting and client.services_are_ready():
+            client.set_parameters([Parameter("robot_description", value=waiting.pop())])
+
+    def receive(message: String) -> None:
+        waiting[:] = [message.data]
+        send()
+
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_subscription(String, f"{prefix}/robot_description", receive, latched)
+    node.create_timer(0.5, send)
+
+
+def _rviz(context: LaunchContext) -> list[object]:
+    if not _wanted(context, "rviz"):
+        return []
+    if not _installed("rviz2"):
+        return [_hint("rviz2", "so RViz is not started")]
+    layout = SHARE / "config" / "cardbox.rviz"
+    return [
+        Node(
+            package="rviz2",
+            executable="rviz2",
+            name="rviz",
+            namespace=LaunchConfiguration("namespace"),
+            arguments=["-d", str(layout)] if layout.exists() else ["-f", "camera_level"],
+            output="log",
+        )
+    ]
+
+
+def _wanted(context: LaunchContext, name: str) -> bool:
+    value = LaunchConfiguration(name).perform(context).lower()
+    if value not in ("true", "false"):
+        raise ValueError(f"launch argument {name} is '{value}'; expected true or false")
+    return value == "true"
+
+
+def _installed(package: str) -> bool:
+    try:
+        get_package_prefix(package)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def _hint(package: str, consequence: str) -> LogInfo:
+    debian = package.replace("_", "-")
+    return LogInfo(
+        msg=f"{package} is not installed, {consequence}; 'sudo apt install ros-jazzy-{debian}'"
+    )
