@@ -1,8 +1,8 @@
 """Measure the 18 body sizes from three silhouettes (paper, "Offline Model Initialization").
 
 In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset are drawn around the
-best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy is
-reached. Beyond the paper:
+best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy
+is reached. Beyond the paper:
 
 - sigma_alpha starts at the paper's 5 cm and shrinks whenever a round finds nothing better; the
   accuracy is reached when it falls below ``accuracy_m``.

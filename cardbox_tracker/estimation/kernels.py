@@ -91,7 +91,7 @@ def _put_quad(quad: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, 
 
 @_compile
 def _clip_row(y: float, rows: int) -> int:
-    return int(ceil(min(max(y, 0.0), float(rows))))
+    return ceil(min(max(y, 0.0), float(rows)))
 
 
 @_compile
@@ -289,7 +289,7 @@ def _put_arm(
     rows: int,
     width: int,
 ) -> None:
-    """Store one arm as patches ``k`` to ``k`` + 3; ``side`` is +1 for the left, -1 for the right."""
+    """Store one arm as patches ``k`` to ``k`` + 3; ``side`` is +1 for left, -1 for right."""
     height = sizes[4] + sizes[2] - sizes[13]
     for c in range(3):
         origin[c] = hip[c] + side * sizes[12] / 2 * torso[c, 1] + height * torso[c, 2]

@@ -22,6 +22,12 @@ FloatArray = NDArray[np.float64]
 _RING_POINTS = 16
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)
 
+_FOREARM = [
+    *((-0.1, 0.6), (0.0, 1.05), (0.25, 1.15), (0.62, 0.85), (0.72, 0.75)),
+    *((0.8, 1.0), (0.92, 1.0), (1.0, 0.6)),
+]
+"""Profile of forearm and fist: place along it, factor on its radius."""
+
 SKIN, SHIRT, TROUSERS = 125, 70, 45
 """Brightness of the parts, grey levels."""
 
@@ -54,8 +60,7 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[Part]:
             _tube(
                 arm.elbow,
                 arm.hand,
-                [(-0.1, 0.6), (0.0, 1.05), (0.25, 1.15), (0.62, 0.85), (0.72, 0.75)]
-                + [(0.8, 1.0), (0.92, 1.0), (1.0, 0.6)],
+                _FOREARM,
                 fore,
                 SKIN,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -54,7 +55,7 @@ class Renderer:
     def picture(
         self, body: BodyModel | None = None, posture: NDArray[np.float64] | None = None
     ) -> tuple[Picture, Picture]:
-        """Return a noisy picture (H, W) and its exact silhouette; without a body the empty scene."""
+        """Return a noisy picture (H, W) and its silhouette; without a body the empty scene."""
         scene = self._scene
         clean = self.wall
         mask = np.zeros(clean.shape, np.uint8)
@@ -80,7 +81,7 @@ class Renderer:
             if np.any(points[..., 2] < 0.1):
                 continue
             pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
-            for i, pair in enumerate(zip(pixels[:-1], pixels[1:], strict=True)):
+            for i, pair in enumerate(pairwise(pixels)):
                 hull = cv2.convexHull(np.concatenate(pair))
                 # A little light from above, so that a part is no flat patch.
                 level = part.brightness + 6 * (i % 3)

@@ -77,7 +77,7 @@ def synthesize_session(
     camera = session_camera(width, height).with_pitch(body.camera_pitch_rad)
     rng = np.random.default_rng(seed)
     renderer = Renderer(camera, scene or Scene(), rng.spawn(1)[0])
-    count = int(round(segments[-1].end_s * fps))
+    count = round(segments[-1].end_s * fps)
     truth: list[dict[str, Any]] = []
     masks = np.zeros((count, height * width), np.uint8)
     sway = 0.0
