@@ -51,14 +51,13 @@ def _snap(pixel: float) -> float:
 
 
 @_compile
-def _put_quad(quad: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, width: int) -> None:
+def _put_quad(quad: Any, pixels: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, width: int) -> None:
     """Project a quadrilateral (4, 3) of the optical frame and store its runs as patch ``k``.
 
     ``spans`` (K, 2, rows) receives first and last + 1 column of each row, ``extent`` (K, 2) the
     first and last + 1 row.
     """
-    xs = np.empty(MAX_CORNERS)
-    ys = np.empty(MAX_CORNERS)
+    xs, ys = pixels[0], pixels[1]
     n = 0
     fx, fy, cx, cy = view[0], view[1], view[2], view[3]
     if (
@@ -109,10 +108,21 @@ def _put_polygon(
     first, last = _clip_row(lowest, rows), _clip_row(highest, rows)
     extent[k, 0] = first
     extent[k, 1] = last
-    left, right = spans[k, 0], spans[k, 1]
-    for v in range(first, last):
-        left[v] = width
-        right[v] = 0
+    # Going round a convex polygon, the edges that go down are all on one side and those that go up
+    # on the other, so each row is written once a side. Rounding to the grid may dent a sliver; then
+    # the crossings of a row are compared, as in the definition.
+    turns_left = turns_right = False
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        m = j + 1 if j + 1 < n else 0
+        turn = (xs[j] - xs[i]) * (ys[m] - ys[j]) - (ys[j] - ys[i]) * (xs[m] - xs[j])
+        turns_left |= turn < 0.0
+        turns_right |= turn > 0.0
+    is_convex = not (turns_left and turns_right)
+    if not is_convex:
+        for v in range(first, last):
+            spans[k, 0, v] = width
+            spans[k, 1, v] = 0
     limit = float(width)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -120,52 +130,102 @@ def _put_polygon(
         if y0 == y1:
             continue
         slope = (x1 - x0) / (y1 - y0)
-        for v in range(_clip_row(min(y0, y1), rows), _clip_row(max(y0, y1), rows)):
-            u = np.int32(ceil(min(max(x0 + (v - y0) * slope, 0.0), limit)))
-            left[v] = min(left[v], u)
-            right[v] = max(right[v], u)
+        # 32-bit counters and np.ceil, for these have vector instructions.
+        low = np.int32(_clip_row(min(y0, y1), rows))
+        high = np.int32(_clip_row(max(y0, y1), rows))
+        if is_convex:
+            side = 0 if (y1 < y0) == turns_right else 1
+            for v in range(low, high):
+                x = x0 + (np.float64(v) - y0) * slope
+                spans[k, side, v] = np.int32(np.ceil(min(max(x, 0.0), limit)))
+        else:
+            for v in range(low, high):
+                x = x0 + (np.float64(v) - y0) * slope
+                u = np.int32(np.ceil(min(max(x, 0.0), limit)))
+                spans[k, 0, v] = min(spans[k, 0, v], u)
+                spans[k, 1, v] = max(spans[k, 1, v], u)
 
 
 @_compile
-def _sum_union(spans: Any, extent: Any, count: int, table: Any, starts: Any, ends: Any) -> Any:
-    """Sum ``table`` over the union of the first ``count`` patches; also its area in pixels."""
-    first, last = extent[0, 0], extent[0, 1]
-    for k in range(1, count):
+def _sum_union(
+    spans: Any, extent: Any, count: int, table: Any, starts: Any, ends: Any, active: Any
+) -> Any:
+    """Sum ``table`` over the union of the first ``count`` patches; also its area in pixels.
+
+    The rows fall into bands within which the same patches are met, so that a row does not ask each
+    patch whether it reaches there. ``starts``, ``ends`` and ``active`` (K,) are scratch.
+    """
+    rows = table.shape[0]
+    v = rows
+    for k in range(count):
         if extent[k, 0] < extent[k, 1]:
-            if first >= last:
-                first, last = extent[k, 0], extent[k, 1]
-            else:
-                first = min(first, extent[k, 0])
-                last = max(last, extent[k, 1])
+            v = min(v, extent[k, 0])
     total = np.int64(0)
     area = np.int64(0)
-    for v in range(first, last):
-        # Insertion sort by start: two or three runs meet in a row, and most come in order.
-        n = 0
+    while v < rows:
+        band_end = rows
+        n_active = 0
         for k in range(count):
-            if extent[k, 0] <= v < extent[k, 1]:
-                start, end = spans[k, 0, v], spans[k, 1, v]
-                if start < end:
-                    i = n
-                    while i > 0 and starts[i - 1] > start:
-                        starts[i] = starts[i - 1]
-                        ends[i] = ends[i - 1]
-                        i -= 1
-                    starts[i] = start
-                    ends[i] = end
-                    n += 1
-        if n == 0:
+            first, last = extent[k, 0], extent[k, 1]
+            if first < last:
+                if first > v:
+                    band_end = min(band_end, first)
+                elif last > v:
+                    band_end = min(band_end, last)
+                    active[n_active] = k
+                    n_active += 1
+        if n_active == 0:
+            v = band_end
             continue
-        start, end = starts[0], ends[0]
-        for i in range(1, n):
-            if starts[i] <= end:
-                end = max(end, ends[i])
-            else:
-                total += np.int64(table[v, end]) - np.int64(table[v, start])
-                area += end - start
-                start, end = starts[i], ends[i]
-        total += np.int64(table[v, end]) - np.int64(table[v, start])
-        area += end - start
+        if n_active == 1:
+            k = active[0]
+            for row in range(v, band_end):
+                start, end = spans[k, 0, row], spans[k, 1, row]
+                if start < end:
+                    total += np.int64(table[row, end]) - np.int64(table[row, start])
+                    area += end - start
+        elif n_active == 2:
+            k, j = active[0], active[1]
+            for row in range(v, band_end):
+                begin, stop = spans[k, 0, row], max(spans[k, 0, row], spans[k, 1, row])
+                start, end = spans[j, 0, row], max(spans[j, 0, row], spans[j, 1, row])
+                if max(begin, start) <= min(stop, end):
+                    begin = min(begin, start)
+                    stop = max(stop, end)
+                else:
+                    total += np.int64(table[row, end]) - np.int64(table[row, start])
+                    area += end - start
+                total += np.int64(table[row, stop]) - np.int64(table[row, begin])
+                area += stop - begin
+        else:
+            for row in range(v, band_end):
+                # Insertion sort by start: two or three runs meet, and most come in order.
+                n = 0
+                for j in range(n_active):
+                    k = active[j]
+                    start, end = spans[k, 0, row], spans[k, 1, row]
+                    if start < end:
+                        i = n
+                        while i > 0 and starts[i - 1] > start:
+                            starts[i] = starts[i - 1]
+                            ends[i] = ends[i - 1]
+                            i -= 1
+                        starts[i] = start
+                        ends[i] = end
+                        n += 1
+                if n == 0:
+                    continue
+                begin, stop = starts[0], ends[0]
+                for i in range(1, n):
+                    if starts[i] <= stop:
+                        stop = max(stop, ends[i])
+                    else:
+                        total += np.int64(table[row, stop]) - np.int64(table[row, begin])
+                        area += stop - begin
+                        begin, stop = starts[i], ends[i]
+                total += np.int64(table[row, stop]) - np.int64(table[row, begin])
+                area += stop - begin
+        v = band_end
     return total, area
 
 
@@ -224,6 +284,7 @@ def _put_trunk(
     sizes: Any,
     view: Any,
     quad: Any,
+    pixels: Any,
     spans: Any,
     extent: Any,
     rows: int,
@@ -235,9 +296,9 @@ def _put_trunk(
     chin = top + sizes[7]
     crown = chin + sizes[6]
     _upright(quad, rotation, 1, hip, sizes[1] / 2, sizes[0] / 2, waist, top, 0.0)
-    _put_quad(quad, view, 0, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 0, spans, extent, rows, width)
     _upright(quad, rotation, 0, hip, sizes[8] / 2, sizes[8] / 2, waist, top, 0.0)
-    _put_quad(quad, view, 1, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 1, spans, extent, rows, width)
     x, y = sizes[8] / 2, sizes[0] / 2
     for c in range(3):
         middle = hip[c] + top * rotation[c, 2]
@@ -246,15 +307,15 @@ def _put_trunk(
         quad[1, c] = middle + forward - aside
         quad[2, c] = middle + forward + aside
         quad[3, c] = middle - forward + aside
-    _put_quad(quad, view, 2, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 2, spans, extent, rows, width)
     _upright(quad, rotation, 1, hip, sizes[3] / 2, sizes[3] / 2, 0.0, waist, 0.0)
-    _put_quad(quad, view, 3, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 3, spans, extent, rows, width)
     _upright(quad, rotation, 0, hip, sizes[9] / 2, sizes[9] / 2, 0.0, waist, 0.0)
-    _put_quad(quad, view, 4, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 4, spans, extent, rows, width)
     _upright(quad, rotation, 1, hip, sizes[5] / 2, sizes[5] / 2, chin, crown, sizes[11])
-    _put_quad(quad, view, 5, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 5, spans, extent, rows, width)
     _upright(quad, rotation, 0, hip, sizes[10] / 2, sizes[10] / 2, chin, crown, sizes[11])
-    _put_quad(quad, view, 6, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, 6, spans, extent, rows, width)
 
 
 @_compile
@@ -284,6 +345,7 @@ def _put_arm(
     fore: Any,
     origin: Any,
     quad: Any,
+    pixels: Any,
     spans: Any,
     extent: Any,
     rows: int,
@@ -295,16 +357,16 @@ def _put_arm(
         origin[c] = hip[c] + side * sizes[12] / 2 * torso[c, 1] + height * torso[c, 2]
     _turn_limb(torso, side * angles[0], angles[1], upper)
     _upright(quad, upper, 1, origin, sizes[15] / 2, sizes[15] / 2, -sizes[14], 0.0, 0.0)
-    _put_quad(quad, view, k, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, k, spans, extent, rows, width)
     _upright(quad, upper, 0, origin, sizes[15] / 2, sizes[15] / 2, -sizes[14], 0.0, 0.0)
-    _put_quad(quad, view, k + 1, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, k + 1, spans, extent, rows, width)
     for c in range(3):
         origin[c] -= sizes[14] * upper[c, 2]
     _turn_limb(upper, side * angles[2], angles[3], fore)
     _upright(quad, fore, 1, origin, sizes[17] / 2, sizes[17] / 2, -sizes[16], 0.0, 0.0)
-    _put_quad(quad, view, k + 2, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, k + 2, spans, extent, rows, width)
     _upright(quad, fore, 0, origin, sizes[17] / 2, sizes[17] / 2, -sizes[16], 0.0, 0.0)
-    _put_quad(quad, view, k + 3, spans, extent, rows, width)
+    _put_quad(quad, pixels, view, k + 3, spans, extent, rows, width)
 
 
 @_compile
@@ -316,11 +378,12 @@ def trunk_costs(
     spans = np.empty((7, 2, rows), np.int32)
     extent = np.empty((7, 2), np.int64)
     starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
+    active, pixels = np.empty(7, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     for i in range(postures.shape[0]):
         _torso_pose(postures[i], place, view, rotation, hip)
-        _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
-        costs[i] = total + _sum_union(spans, extent, 7, table, starts, ends)[0]
+        _put_trunk(rotation, hip, sizes, view, quad, pixels, spans, extent, rows, width)
+        costs[i] = total + _sum_union(spans, extent, 7, table, starts, ends, active)[0]
 
 
 @_compile
@@ -349,12 +412,13 @@ def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, cover
     spans = np.empty((7, 2, rows), np.int32)
     extent = np.empty((7, 2), np.int64)
     starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
+    active, pixels = np.empty(7, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     _torso_pose(torso, place, view, rotation, hip)
-    _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
+    _put_trunk(rotation, hip, sizes, view, quad, pixels, spans, extent, rows, width)
     covered[:] = table
     _cover(spans, extent, 7, covered)
-    return _sum_union(spans, extent, 7, table, starts, ends)[0]
+    return _sum_union(spans, extent, 7, table, starts, ends, active)[0]
 
 
 @_compile
@@ -364,6 +428,7 @@ def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, cove
     spans = np.empty((8, 2, rows), np.int32)
     extent = np.empty((8, 2), np.int64)
     starts, ends = np.empty(8, np.int64), np.empty(8, np.int64)
+    active, pixels = np.empty(8, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     _torso_pose(posture, place, view, rotation, hip)
@@ -380,6 +445,7 @@ def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, cove
             fore,
             origin,
             quad,
+            pixels,
             spans,
             extent,
             rows,
@@ -387,7 +453,7 @@ def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, cove
         )
     covered[:] = table
     _cover(spans, extent, 8, covered)
-    return _sum_union(spans, extent, 8, table, starts, ends)[0]
+    return _sum_union(spans, extent, 8, table, starts, ends, active)[0]
 
 
 @_compile
@@ -407,6 +473,7 @@ def arm_costs(
     spans = np.empty((4, 2, rows), np.int32)
     extent = np.empty((4, 2), np.int64)
     starts, ends = np.empty(4, np.int64), np.empty(4, np.int64)
+    active, pixels = np.empty(4, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     _torso_pose(torso, place, view, rotation, hip)
@@ -423,12 +490,13 @@ def arm_costs(
             fore,
             origin,
             quad,
+            pixels,
             spans,
             extent,
             rows,
             width,
         )
-        costs[i] = base + _sum_union(spans, extent, 4, covered, starts, ends)[0]
+        costs[i] = base + _sum_union(spans, extent, 4, covered, starts, ends, active)[0]
 
 
 @_compile
@@ -440,11 +508,12 @@ def full_costs(
     spans = np.empty((15, 2, rows), np.int32)
     extent = np.empty((15, 2), np.int64)
     starts, ends = np.empty(15, np.int64), np.empty(15, np.int64)
+    active, pixels = np.empty(15, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     for i in range(postures.shape[0]):
         _torso_pose(postures[i], place, view, rotation, hip)
-        _put_trunk(rotation, hip, sizes, view, quad, spans, extent, rows, width)
+        _put_trunk(rotation, hip, sizes, view, quad, pixels, spans, extent, rows, width)
         for arm in range(2):
             _put_arm(
                 postures[i, 4 + 4 * arm : 8 + 4 * arm],
@@ -458,12 +527,13 @@ def full_costs(
                 fore,
                 origin,
                 quad,
+                pixels,
                 spans,
                 extent,
                 rows,
                 width,
             )
-        gain, area = _sum_union(spans, extent, 15, table, starts, ends)
+        gain, area = _sum_union(spans, extent, 15, table, starts, ends, active)
         costs[i] = total + gain
         areas[i] = area
 
@@ -488,7 +558,8 @@ def polygon_costs(corners: Any, view: Any, table: Any, total: int, costs: Any) -
     spans = np.empty((count, 2, rows), np.int32)
     extent = np.empty((count, 2), np.int64)
     starts, ends = np.empty(count, np.int64), np.empty(count, np.int64)
+    active, pixels = np.empty(count, np.int64), np.empty((2, MAX_CORNERS))
     for i in range(corners.shape[0]):
         for k in range(count):
-            _put_quad(corners[i, k], view, k, spans, extent, rows, width)
-        costs[i] = total + _sum_union(spans, extent, count, table, starts, ends)[0]
+            _put_quad(corners[i, k], pixels, view, k, spans, extent, rows, width)
+        costs[i] = total + _sum_union(spans, extent, count, table, starts, ends, active)[0]
