@@ -27,6 +27,9 @@ from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, SUBPIXELS
 
 MAX_CORNERS = 5  # of a quadrilateral cut at the near plane
 
+# An index of this type is never negative, so no code is made to count from an array's end.
+_index = np.uint64
+
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
@@ -51,7 +54,9 @@ def _snap(pixel: float) -> float:
 
 
 @_compile
-def _put_quad(quad: Any, pixels: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, width: int) -> None:
+def _put_quad(
+    quad: Any, pixels: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, width: int
+) -> None:
     """Project a quadrilateral (4, 3) of the optical frame and store its runs as patch ``k``.
 
     ``spans`` (K, 2, rows) receives first and last + 1 column of each row, ``extent`` (K, 2) the
@@ -95,17 +100,18 @@ def _clip_row(y: float, rows: int) -> int:
 
 @_compile
 def _put_polygon(
-    xs: Any, ys: Any, n: int, k: int, spans: Any, extent: Any, rows: int, width: int
+    xs: Any, ys: Any, n: int, patch: int, spans: Any, extent: Any, rows: int, width: int
 ) -> None:
-    """Store the runs of a convex polygon of ``n`` snapped corners as patch ``k``."""
+    """Store the runs of a convex polygon of ``n`` snapped corners as patch ``patch``."""
     if n < 3:
-        extent[k, 0] = extent[k, 1] = 0
+        extent[patch, 0] = extent[patch, 1] = 0
         return
     lowest = highest = ys[0]
     for i in range(1, n):
         lowest = min(lowest, ys[i])
         highest = max(highest, ys[i])
     first, last = _clip_row(lowest, rows), _clip_row(highest, rows)
+    k = _index(patch)
     extent[k, 0] = first
     extent[k, 1] = last
     # Going round a convex polygon, the edges that go down are all on one side and those that go up
@@ -124,26 +130,29 @@ def _put_polygon(
             spans[k, 0, v] = width
             spans[k, 1, v] = 0
     limit = float(width)
-    for i in range(n):
-        j = i + 1 if i + 1 < n else 0
-        x0, y0, x1, y1 = xs[i], ys[i], xs[j], ys[j]
+    for edge in range(n):
+        j = edge + 1 if edge + 1 < n else 0
+        x0, y0, x1, y1 = xs[edge], ys[edge], xs[j], ys[j]
         if y0 == y1:
             continue
         slope = (x1 - x0) / (y1 - y0)
-        # 32-bit counters and np.ceil, for these have vector instructions.
-        low = np.int32(_clip_row(min(y0, y1), rows))
-        high = np.int32(_clip_row(max(y0, y1), rows))
+        low = _clip_row(min(y0, y1), rows)
+        # 32-bit counters and np.ceil, for these have vector instructions. On the grid of corners
+        # the differences are exact, so this is v - y0 of the definition to the last bit.
+        count = np.int32(_clip_row(max(y0, y1), rows) - low)
+        below = low - y0
+        base = _index(low)
         if is_convex:
-            side = 0 if (y1 < y0) == turns_right else 1
-            for v in range(low, high):
-                x = x0 + (np.float64(v) - y0) * slope
-                spans[k, side, v] = np.int32(np.ceil(min(max(x, 0.0), limit)))
+            side = _index(0) if (y1 < y0) == turns_right else _index(1)
+            for i in range(count):
+                x = x0 + (np.float64(i) + below) * slope
+                spans[k, side, base + _index(i)] = np.int32(np.ceil(min(max(x, 0.0), limit)))
         else:
-            for v in range(low, high):
-                x = x0 + (np.float64(v) - y0) * slope
-                u = np.int32(np.ceil(min(max(x, 0.0), limit)))
-                spans[k, 0, v] = min(spans[k, 0, v], u)
-                spans[k, 1, v] = max(spans[k, 1, v], u)
+            for i in range(count):
+                x = x0 + (np.float64(i) + below) * slope
+                u = np.uint32(np.int32(np.ceil(min(max(x, 0.0), limit))))
+                spans[k, 0, base + _index(i)] = min(spans[k, 0, base + _index(i)], u)
+                spans[k, 1, base + _index(i)] = max(spans[k, 1, base + _index(i)], u)
 
 
 @_compile
@@ -178,15 +187,15 @@ def _sum_union(
             v = band_end
             continue
         if n_active == 1:
-            k = active[0]
-            for row in range(v, band_end):
+            k = _index(active[0])
+            for row in range(_index(v), _index(band_end)):
                 start, end = spans[k, 0, row], spans[k, 1, row]
                 if start < end:
                     total += np.int64(table[row, end]) - np.int64(table[row, start])
-                    area += end - start
+                    area += np.int64(end) - np.int64(start)
         elif n_active == 2:
-            k, j = active[0], active[1]
-            for row in range(v, band_end):
+            k, j = _index(active[0]), _index(active[1])
+            for row in range(_index(v), _index(band_end)):
                 begin, stop = spans[k, 0, row], max(spans[k, 0, row], spans[k, 1, row])
                 start, end = spans[j, 0, row], max(spans[j, 0, row], spans[j, 1, row])
                 if max(begin, start) <= min(stop, end):
@@ -194,15 +203,15 @@ def _sum_union(
                     stop = max(stop, end)
                 else:
                     total += np.int64(table[row, end]) - np.int64(table[row, start])
-                    area += end - start
+                    area += np.int64(end) - np.int64(start)
                 total += np.int64(table[row, stop]) - np.int64(table[row, begin])
-                area += stop - begin
+                area += np.int64(stop) - np.int64(begin)
         else:
-            for row in range(v, band_end):
+            for row in range(_index(v), _index(band_end)):
                 # Insertion sort by start: two or three runs meet, and most come in order.
                 n = 0
                 for j in range(n_active):
-                    k = active[j]
+                    k = _index(active[_index(j)])
                     start, end = spans[k, 0, row], spans[k, 1, row]
                     if start < end:
                         i = n
@@ -221,10 +230,10 @@ def _sum_union(
                         stop = max(stop, ends[i])
                     else:
                         total += np.int64(table[row, stop]) - np.int64(table[row, begin])
-                        area += stop - begin
+                        area += np.int64(stop) - np.int64(begin)
                         begin, stop = starts[i], ends[i]
                 total += np.int64(table[row, stop]) - np.int64(table[row, begin])
-                area += stop - begin
+                area += np.int64(stop) - np.int64(begin)
         v = band_end
     return total, area
 
@@ -375,9 +384,9 @@ def trunk_costs(
 ) -> None:
     """Costs (N,) of trunks (N, 4)."""
     rows, width = table.shape[0], table.shape[1] - 1
-    spans = np.empty((7, 2, rows), np.int32)
+    spans = np.empty((7, 2, rows), np.uint32)
     extent = np.empty((7, 2), np.int64)
-    starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
+    starts, ends = np.empty(7, np.uint32), np.empty(7, np.uint32)
     active, pixels = np.empty(7, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     for i in range(postures.shape[0]):
@@ -409,9 +418,9 @@ def _cover(spans: Any, extent: Any, count: int, covered: Any) -> None:
 def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> Any:
     """Write ``table`` without the gain under the trunk to ``covered``; return what was taken."""
     rows, width = table.shape[0], table.shape[1] - 1
-    spans = np.empty((7, 2, rows), np.int32)
+    spans = np.empty((7, 2, rows), np.uint32)
     extent = np.empty((7, 2), np.int64)
-    starts, ends = np.empty(7, np.int64), np.empty(7, np.int64)
+    starts, ends = np.empty(7, np.uint32), np.empty(7, np.uint32)
     active, pixels = np.empty(7, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     _torso_pose(torso, place, view, rotation, hip)
@@ -425,9 +434,9 @@ def cover_trunk(torso: Any, sizes: Any, place: Any, view: Any, table: Any, cover
 def cover_arms(posture: Any, sizes: Any, place: Any, view: Any, table: Any, covered: Any) -> Any:
     """Write ``table`` without the gain under both arms to ``covered``; return what was taken."""
     rows, width = table.shape[0], table.shape[1] - 1
-    spans = np.empty((8, 2, rows), np.int32)
+    spans = np.empty((8, 2, rows), np.uint32)
     extent = np.empty((8, 2), np.int64)
-    starts, ends = np.empty(8, np.int64), np.empty(8, np.int64)
+    starts, ends = np.empty(8, np.uint32), np.empty(8, np.uint32)
     active, pixels = np.empty(8, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
@@ -470,9 +479,9 @@ def arm_costs(
 ) -> None:
     """Costs (N,) of arms (N, 4) beside a trunk that ``covered`` accounts for, of cost ``base``."""
     rows, width = covered.shape[0], covered.shape[1] - 1
-    spans = np.empty((4, 2, rows), np.int32)
+    spans = np.empty((4, 2, rows), np.uint32)
     extent = np.empty((4, 2), np.int64)
-    starts, ends = np.empty(4, np.int64), np.empty(4, np.int64)
+    starts, ends = np.empty(4, np.uint32), np.empty(4, np.uint32)
     active, pixels = np.empty(4, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
@@ -505,9 +514,9 @@ def full_costs(
 ) -> None:
     """Costs and drawn areas (N,) of whole postures (N, 12)."""
     rows, width = table.shape[0], table.shape[1] - 1
-    spans = np.empty((15, 2, rows), np.int32)
+    spans = np.empty((15, 2, rows), np.uint32)
     extent = np.empty((15, 2), np.int64)
-    starts, ends = np.empty(15, np.int64), np.empty(15, np.int64)
+    starts, ends = np.empty(15, np.uint32), np.empty(15, np.uint32)
     active, pixels = np.empty(15, np.int64), np.empty((2, MAX_CORNERS))
     rotation, hip, quad = np.empty((3, 3)), np.empty(3), np.empty((4, 3))
     upper, fore, origin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
@@ -555,9 +564,9 @@ def polygon_costs(corners: Any, view: Any, table: Any, total: int, costs: Any) -
     """Costs (N,) of any quadrilaterals (N, K, 4, 3) of the optical frame, such as a box model's."""
     rows, width = table.shape[0], table.shape[1] - 1
     count = corners.shape[1]
-    spans = np.empty((count, 2, rows), np.int32)
+    spans = np.empty((count, 2, rows), np.uint32)
     extent = np.empty((count, 2), np.int64)
-    starts, ends = np.empty(count, np.int64), np.empty(count, np.int64)
+    starts, ends = np.empty(count, np.uint32), np.empty(count, np.uint32)
     active, pixels = np.empty(count, np.int64), np.empty((2, MAX_CORNERS))
     for i in range(corners.shape[0]):
         for k in range(count):
