@@ -89,7 +89,7 @@ def decode_compressed(data: Any, grey: bool = True) -> Picture:
     raw = np.frombuffer(data, np.uint8)
     flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
-        picture = cv2.imdecode(raw, flag) if len(raw) else None
+        picture = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
     except cv2.error:
         picture = None
     if picture is None:
@@ -98,6 +98,14 @@ def decode_compressed(data: Any, grey: bool = True) -> Picture:
             "PNG data: check the camera's transport"
         )
     return np.asarray(picture, np.uint8)
+
+
+def _is_cut_off(raw: Picture) -> bool:
+    """Whether data is empty or a JPEG without its end, which older OpenCV fills with grey."""
+    data = raw.tobytes()
+    # The marker cannot occur within a scan; a thumbnail, which has one too, lies before it.
+    is_jpeg = data.startswith(b"\xff\xd8")
+    return not data or (is_jpeg and data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"))
 
 
 def _pixels(

@@ -127,8 +127,8 @@ def test_every_encoding_gives_bytes_of_the_pictures_size(encoding: str) -> None:
     step = W * BYTES_PER_PIXEL.get(encoding, 1) + 4
     data = bytes(H * step)
     grey, bgr = (decode(data, H, W, step, encoding) for decode in (decode_grey, decode_bgr))
-    assert (grey.shape, grey.dtype) == ((H, W), np.uint8)
-    assert (bgr.shape, bgr.dtype) == ((H, W, 3), np.uint8)
+    assert (grey.shape, grey.dtype.name) == ((H, W), "uint8")
+    assert (bgr.shape, bgr.dtype.name) == ((H, W, 3), "uint8")
 
 
 @pytest.mark.parametrize("encoding", ["32FC1", "", "MONO8", "yuv420"])
