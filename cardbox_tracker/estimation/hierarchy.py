@@ -29,6 +29,9 @@ _PRIOR_UNITS = np.where([name.endswith("flexion") for name in JOINT_NAMES], _RAN
 _PRIOR_UNITS[0] = np.inf
 _PRIOR_UNITS[1:4] = np.radians([20.0, 26.0, 20.0])
 _PRIOR_SCALE = 1.0 / _PRIOR_UNITS
+# A bow and leaning back lower the head alike in the picture, but people bow.
+_PITCH = JOINT_NAMES.index("torso_pitch")
+_BACKWARD_FACTOR = 3.0
 
 
 class HierarchyResult(NamedTuple):
@@ -133,6 +136,9 @@ class HierarchicalFilter:
         rated: FloatArray = costs.astype(np.float64)
         if self._config.prior > 0.0:
             scaled = particles * _PRIOR_SCALE[joints]
+            if joints == TORSO:
+                pitch = scaled[:, _PITCH]
+                pitch[pitch < 0.0] *= _BACKWARD_FACTOR
             weight_px = self._config.prior * self._cost.silhouette_px
             rated += weight_px * np.einsum("ij,ij->i", scaled, scaled)
         return rated
