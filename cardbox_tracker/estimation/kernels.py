@@ -187,17 +187,19 @@ def _sum_union(
             v = band_end
             continue
         if n_active == 1:
-            k = _index(active[0])
+            only = _index(active[0])
             for row in range(_index(v), _index(band_end)):
-                start, end = spans[k, 0, row], spans[k, 1, row]
+                start, end = spans[only, 0, row], spans[only, 1, row]
                 if start < end:
                     total += np.int64(table[row, end]) - np.int64(table[row, start])
                     area += np.int64(end) - np.int64(start)
         elif n_active == 2:
-            k, j = _index(active[0]), _index(active[1])
+            first_k, second_k = _index(active[0]), _index(active[1])
             for row in range(_index(v), _index(band_end)):
-                begin, stop = spans[k, 0, row], max(spans[k, 0, row], spans[k, 1, row])
-                start, end = spans[j, 0, row], max(spans[j, 0, row], spans[j, 1, row])
+                begin = spans[first_k, 0, row]
+                stop = max(begin, spans[first_k, 1, row])
+                start = spans[second_k, 0, row]
+                end = max(start, spans[second_k, 1, row])
                 if max(begin, start) <= min(stop, end):
                     begin = min(begin, start)
                     stop = max(stop, end)
@@ -211,8 +213,8 @@ def _sum_union(
                 # Insertion sort by start: two or three runs meet, and most come in order.
                 n = 0
                 for j in range(n_active):
-                    k = _index(active[_index(j)])
-                    start, end = spans[k, 0, row], spans[k, 1, row]
+                    this = _index(active[_index(j)])
+                    start, end = spans[this, 0, row], spans[this, 1, row]
                     if start < end:
                         i = n
                         while i > 0 and starts[i - 1] > start:
