@@ -51,17 +51,22 @@ class CompiledCost:
         self._beside_arms = np.zeros_like(self._table)
         self._torso = np.zeros(4)
         self._base = 0
-        self.observe(np.zeros((camera.height, camera.width), np.uint8))
         self.warm_up()
 
     def warm_up(self) -> None:
         """Run every kernel once, so that no live picture waits for the compiler."""
+        empty = np.zeros((self.camera.height, self.camera.width), np.uint8)
+        self.observe(empty)
+        # Pixels out of a message are read-only, which is another type to the compiler.
+        empty.setflags(write=False)
+        self.observe(empty)
         self.fix_arms(np.zeros(12))
         self.torso(np.zeros((1, 4)))
         self.fix_arms(None)
         self.fix_torso(np.zeros(4))
         self.arm("left", np.zeros((1, 4)))
         self.full(np.zeros((1, 12)))
+        self.bodies(self._sizes[None], np.zeros((1, 12)))
 
     def observe(self, silhouette: Silhouette) -> None:
         """See :class:`SilhouetteCost`."""
@@ -168,3 +173,12 @@ class CompiledCost:
             areas,
         )
         return costs, areas
+
+
+def compile_all() -> None:
+    """Compile every kernel into the cache on disk, as installation and tests do beforehand."""
+    CompiledCost(BodyModel(), Camera(32, 24, 33.0, 33.0, 15.5, 11.5))
+
+
+if __name__ == "__main__":
+    compile_all()
