@@ -45,6 +45,12 @@ def _envelope(t: float, duration_s: float, ramp_s: float) -> float:
     return smooth(t / ramp_s) * smooth((duration_s - t) / ramp_s)
 
 
+def _ramp(angle_rad: float) -> float:
+    """max(0, angle) without its kink, where an arm's speed would jump; 0 at 0."""
+    rounding_rad = np.radians(5.0)
+    return float((angle_rad + np.hypot(angle_rad, rounding_rad) - rounding_rad) / 2.0)
+
+
 WAVE_S, BEND_S, BOW_S = 10.0, 12.0, 7.0
 
 
@@ -65,8 +71,8 @@ def bend(t: float) -> FloatArray:
     roll = np.radians(22.0) * np.sin(2.0 * np.pi * 2.0 * t / BEND_S) * _envelope(t, BEND_S, 1.0)
     posture[1] = roll
     # The arms keep hanging: the one on the bent side moves away from the body.
-    posture[4] += max(0.0, -roll)
-    posture[8] += max(0.0, roll)
+    posture[4] += _ramp(-roll)
+    posture[8] += _ramp(roll)
     return posture
 
 

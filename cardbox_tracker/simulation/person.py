@@ -40,7 +40,7 @@ class Part(NamedTuple):
 
 
 def person_parts(body: BodyModel, posture: FloatArray) -> list[Part]:
-    """Return the parts of ``body`` in ``posture`` (12,), the farthest from the chest first."""
+    """Return the parts of ``body`` in ``posture`` (12,)."""
     frames = forward_kinematics(body, posture)
     parts = [*_legs(body, frames)]
     parts += [_trunk(body, frames), _neck(body, frames), _head(body, frames)]

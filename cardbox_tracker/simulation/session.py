@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.ros.bag_writer import BagWriter
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -29,6 +30,7 @@ CAMERA_INFO_TOPIC = "/camera/camera_info"
 TRUTH_TOPIC = "/ground_truth/joint_states"
 FRAME_ID = "camera_optical_frame"
 
+_ENCODINGS = ("mono8", "rgb8", "bgr8")
 _SWAY_M = 0.003
 _FOCAL_OF_WIDTH = 330.0 / 320.0
 
@@ -37,6 +39,18 @@ def session_camera(width: int = 320, height: int = 240) -> Camera:
     """Return the level camera of a session, f = 330 px at a width of 320."""
     focal = _FOCAL_OF_WIDTH * width
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+
+
+def random_camera(rng: np.random.Generator, width: int = 320, height: int = 240) -> Camera:
+    """Return a camera with another lens: f = 290 to 370 px at a width of 320, up to 5 degrees down.
+
+    At 2 m it keeps a person of :func:`~cardbox_tracker.simulation.person.random_body` with hanging
+    arms in the picture.
+    """
+    focal = rng.uniform(290.0, 370.0) / 320.0 * width
+    pitch_rad = np.radians(rng.uniform(0.0, 5.0))
+    cx, cy = (width - 1) / 2, (height - 1) / 2
+    return Camera(width, height, focal, focal, cx, cy, float(pitch_rad))
 
 
 def synthesize_session(
@@ -70,8 +84,12 @@ def synthesize_session(
         progress: called with the finished fraction.
 
     Raises:
-        CardboxError: the motion is unknown, or the folder cannot be written.
+        CardboxError: the motion or the encoding is unknown, or the folder cannot be written.
     """
+    if encoding not in _ENCODINGS:
+        raise EncodingError(
+            f"encoding '{encoding}' cannot be synthesized; expected {', '.join(_ENCODINGS)}"
+        )
     body = body or BodyModel(hip_height_m=-0.51)
     segments = timeline(motion, body.side_turn)
     camera = session_camera(width, height).with_pitch(body.camera_pitch_rad)
