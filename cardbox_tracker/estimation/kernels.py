@@ -156,6 +156,18 @@ def _put_polygon(
 
 
 @_compile
+def _insert(starts: Any, ends: Any, n: int, start: Any, end: Any) -> None:
+    """Insert a run into the first ``n`` runs, which are ordered by start."""
+    i = n
+    while i > 0 and starts[i - 1] > start:
+        starts[i] = starts[i - 1]
+        ends[i] = ends[i - 1]
+        i -= 1
+    starts[i] = start
+    ends[i] = end
+
+
+@_compile
 def _sum_union(
     spans: Any, extent: Any, count: int, table: Any, starts: Any, ends: Any, active: Any
 ) -> Any:
@@ -210,30 +222,32 @@ def _sum_union(
                 area += np.int64(stop) - np.int64(begin)
         else:
             for row in range(_index(v), _index(band_end)):
-                # Insertion sort by start: two or three runs meet, and most come in order.
+                # The patches of one part come one after the other and overlap, so most rows need no
+                # more than this; what does not join is kept, in order, for the sweep below.
                 n = 0
+                begin = stop = np.uint32(0)
                 for j in range(n_active):
                     this = _index(active[_index(j)])
                     start, end = spans[this, 0, row], spans[this, 1, row]
                     if start < end:
-                        i = n
-                        while i > 0 and starts[i - 1] > start:
-                            starts[i] = starts[i - 1]
-                            ends[i] = ends[i - 1]
-                            i -= 1
-                        starts[i] = start
-                        ends[i] = end
-                        n += 1
-                if n == 0:
-                    continue
-                begin, stop = starts[0], ends[0]
-                for i in range(1, n):
-                    if starts[i] <= stop:
-                        stop = max(stop, ends[i])
-                    else:
-                        total += np.int64(table[row, stop]) - np.int64(table[row, begin])
-                        area += np.int64(stop) - np.int64(begin)
-                        begin, stop = starts[i], ends[i]
+                        if start <= stop and begin <= end and begin < stop:
+                            begin = min(begin, start)
+                            stop = max(stop, end)
+                        else:
+                            if begin < stop:
+                                _insert(starts, ends, n, begin, stop)
+                                n += 1
+                            begin, stop = start, end
+                if n > 0:
+                    _insert(starts, ends, n, begin, stop)
+                    begin, stop = starts[0], ends[0]
+                    for i in range(1, n + 1):
+                        if starts[i] <= stop:
+                            stop = max(stop, ends[i])
+                        else:
+                            total += np.int64(table[row, stop]) - np.int64(table[row, begin])
+                            area += np.int64(stop) - np.int64(begin)
+                            begin, stop = starts[i], ends[i]
                 total += np.int64(table[row, stop]) - np.int64(table[row, begin])
                 area += np.int64(stop) - np.int64(begin)
         v = band_end
