@@ -62,7 +62,7 @@ def run_demo(output: Path, preset: str, seed: int) -> None:
         raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
     session = output / "session"
     with progress_bar("synthesize") as show:
-        synthesize_session(session, "all", seed, progress=show)
+        synthesize_session(session, "all", seed, overwrite=True, progress=show)
     result = track_through_nodes(session, output, preset, seed)
     write_report(result, session, output, preset, seed)
 
@@ -84,7 +84,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     truth = load_ground_truth(session / "ground_truth.json")
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
-    with running_nodes(output) as nodes, BagWriter(output / "bag") as bag:
+    with running_nodes(output) as nodes, BagWriter(output / "bag", overwrite=True) as bag:
         client = Client(nodes, bag)
         try:
             _start_nodes(nodes, truth, preset, seed)

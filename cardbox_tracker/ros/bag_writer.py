@@ -25,21 +25,27 @@ STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 class BagWriter:
     """Context of a new recording: a folder that appears, complete, when the context ends."""
 
-    def __init__(self, path: str | os.PathLike[str], storage: str = "mcap") -> None:
-        """Name the folder; an existing recording there is replaced.
+    def __init__(
+        self, path: str | os.PathLike[str], storage: str = "mcap", overwrite: bool = False
+    ) -> None:
+        """Name the folder.
+
+        Args:
+            path: folder to make.
+            storage: ``mcap`` or ``sqlite3``.
+            overwrite: replace a recording of that name; nothing else is ever replaced.
 
         Raises:
-            BagError: the storage is unknown, or something that is no recording is in the way.
+            BagError: the storage is unknown, or something is in the way.
         """
         self.path = Path(path)
         if storage not in STORAGES:
             raise BagError(f"storage '{storage}' is unknown; expected {' or '.join(STORAGES)}")
-        if self.path.exists() and not (self.path / "metadata.yaml").exists():
-            empty = self.path.is_dir() and not any(self.path.iterdir())
-            if not empty:
-                raise BagError(
-                    f"{self.path} exists and is no recording; choose another name or remove it"
-                )
+        is_free = not self.path.exists() or (self.path.is_dir() and not any(self.path.iterdir()))
+        is_recording = (self.path / "metadata.yaml").exists()
+        if not is_free and not (overwrite and is_recording):
+            what = "a recording already" if is_recording else "no recording"
+            raise BagError(f"{self.path} exists and is {what}; choose another name or remove it")
         self._storage = STORAGES[storage]
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._connections: dict[str, Connection] = {}

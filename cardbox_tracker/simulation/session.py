@@ -65,6 +65,7 @@ def synthesize_session(
     compressed: bool = False,
     encoding: str = "mono8",
     scene: Scene | None = None,
+    overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Write a session and return its ground truth.
@@ -81,6 +82,7 @@ def synthesize_session(
         compressed: JPEG pictures on ``/camera/image_raw/compressed`` instead of raw ones.
         encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw pictures.
         scene: wall and sensor.
+        overwrite: replace a recording of that name.
         progress: called with the finished fraction.
 
     Raises:
@@ -99,7 +101,7 @@ def synthesize_session(
     truth: list[dict[str, Any]] = []
     masks = np.zeros((count, height * width), np.uint8)
     sway = 0.0
-    with BagWriter(output, storage) as bag:
+    with BagWriter(output, storage, overwrite) as bag:
         for number in range(count):
             time_s = number / fps
             stamp_ns = START_NS + round(number * 1e9 / fps)

@@ -302,7 +302,7 @@ def test_an_error_leaves_nothing_behind(tmp_path: Path, storage: str) -> None:
 
 def test_an_error_keeps_the_recording_that_was_there(tmp_path: Path) -> None:
     record(tmp_path / "bag")
-    with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag") as bag:
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag", overwrite=True) as bag:
         bag.write_string("/text", START_NS, "x")
         raise RuntimeError
     with BagReader(tmp_path / "bag") as bag:
@@ -317,6 +317,16 @@ def test_a_recording_appears_only_when_it_is_whole(tmp_path: Path) -> None:
         assert not (tmp_path / "bag").exists()
     assert (tmp_path / "bag" / "notes.txt").read_text() == "beside"
     assert (tmp_path / "bag" / "bag.mcap").exists()
+
+
+def test_a_recording_is_replaced_only_when_asked_to(tmp_path: Path) -> None:
+    record(tmp_path / "bag")
+    with pytest.raises(BagError, match="a recording already"):
+        BagWriter(tmp_path / "bag")
+    with BagWriter(tmp_path / "bag", overwrite=True) as bag:
+        bag.write_string("/text", START_NS, "x")
+    with BagReader(tmp_path / "bag") as bag:
+        assert bag.count() == 1
 
 
 @pytest.mark.parametrize("is_file", [True, False])
