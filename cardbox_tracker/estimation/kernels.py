@@ -31,6 +31,7 @@ MAX_CORNERS = 5  # of a quadrilateral cut at the near plane
 _index = np.uint64
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
@@ -48,12 +49,12 @@ def running_sums(silhouette: Any, table: Any) -> int:
     return total
 
 
-@_compile
+@_inline
 def _snap(pixel: float) -> float:
     return floor(pixel * SUBPIXELS + 0.5) / SUBPIXELS
 
 
-@_compile
+@_inline
 def _put_quad(
     quad: Any, pixels: Any, view: Any, k: int, spans: Any, extent: Any, rows: int, width: int
 ) -> None:
@@ -72,8 +73,9 @@ def _put_quad(
         and quad[3, 2] >= NEAR_PLANE_M
     ):
         for i in range(4):
-            xs[i] = _snap(fx * quad[i, 0] / quad[i, 2] + cx)
-            ys[i] = _snap(fy * quad[i, 1] / quad[i, 2] + cy)
+            nearness = 1.0 / quad[i, 2]
+            xs[i] = _snap(fx * quad[i, 0] * nearness + cx)
+            ys[i] = _snap(fy * quad[i, 1] * nearness + cy)
         n = 4
     else:
         for i in range(4):
@@ -93,12 +95,12 @@ def _put_quad(
     _put_polygon(xs, ys, n, k, spans, extent, rows, width)
 
 
-@_compile
+@_inline
 def _clip_row(y: float, rows: int) -> int:
     return ceil(min(max(y, 0.0), float(rows)))
 
 
-@_compile
+@_inline
 def _put_polygon(
     xs: Any, ys: Any, n: int, patch: int, spans: Any, extent: Any, rows: int, width: int
 ) -> None:
@@ -155,7 +157,7 @@ def _put_polygon(
                 spans[k, 1, base + _index(i)] = max(spans[k, 1, base + _index(i)], u)
 
 
-@_compile
+@_inline
 def _insert(starts: Any, ends: Any, n: int, start: Any, end: Any) -> None:
     """Insert a run into the first ``n`` runs, which are ordered by start."""
     i = n
@@ -254,7 +256,7 @@ def _sum_union(
     return total, area
 
 
-@_compile
+@_inline
 def _torso_pose(torso: Any, place: Any, view: Any, rotation: Any, hip: Any) -> None:
     """Torso rotation (3, 3) and mid-hip (3,) in the optical frame for d1..d4."""
     cr, sr = cos(torso[1]), sin(torso[1])
@@ -277,7 +279,7 @@ def _torso_pose(torso: Any, place: Any, view: Any, rotation: Any, hip: Any) -> N
     hip[2] = -sv * place[1] + cv * place[0]
 
 
-@_compile
+@_inline
 def _upright(
     quad: Any,
     rotation: Any,
@@ -343,7 +345,7 @@ def _put_trunk(
     _put_quad(quad, pixels, view, 6, spans, extent, rows, width)
 
 
-@_compile
+@_inline
 def _turn_limb(parent: Any, abduction: float, flexion: float, rotation: Any) -> None:
     """Rotation = parent Rx(abduction) Ry(-flexion)."""
     ca, sa = cos(abduction), sin(abduction)
