@@ -360,6 +360,15 @@ def test_a_restarted_tracker_goes_on_with_the_latched_model(
         "the new tracker",
     )
     graph.diagnosis("tracker", "waiting for silhouettes")
+    first = len(session.joint_states)
+
+    def sees() -> bool:
+        # The background node may find the new tracker later than this test does.
+        session.show("front")
+        graph.spin(0.1)
+        return len(session.joint_states) > first
+
+    graph.wait(sees, "the new tracker's first joint state")
     states = session.track("front", 3)
     assert len(states) >= 3
 
