@@ -30,18 +30,7 @@ class CompiledCost:
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
         self.silhouette_px = 0
-        self._sizes = np.array(body.sizes)
-        self._place = np.array([body.distance_m, body.hip_height_m])
-        self._view = np.array(
-            [
-                camera.fx,
-                camera.fy,
-                camera.cx,
-                camera.cy,
-                np.cos(camera.pitch_rad),
-                np.sin(camera.pitch_rad),
-            ]
-        )
+        self._sizes, self._place, self._view = _constants(body, camera)
         # Sums along a row fit 16 bits for any picture narrower than 32768 px, and stay in cache.
         sums = np.int16 if camera.width < 2**15 else np.int32
         self._table = np.zeros((self.rows, camera.width + 1), sums)
@@ -175,9 +164,34 @@ class CompiledCost:
         return costs, areas
 
 
+class CompiledKeypoints:
+    """Keypoints as :func:`cardbox_tracker.body.kinematics.keypoints_m` has them, but optical."""
+
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
+        """Prepare for one body before one camera, and compile the kernel if it is not yet."""
+        self._constants = _constants(body, camera)
+        self(np.zeros(12))
+
+    def __call__(self, posture: FloatArray) -> FloatArray:
+        """Return the keypoints (6, 3) of a posture (12,), metres in the optical frame."""
+        points = np.empty((6, 3))
+        kernels.keypoints(np.array(posture, dtype=np.float64), *self._constants, points)
+        return points
+
+
+def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sizes, place and view as the kernels take them."""
+    pitch = camera.pitch_rad
+    view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
+    place = (body.distance_m, body.hip_height_m)
+    return np.array(body.sizes), np.array(place), np.array(view)
+
+
 def compile_all() -> None:
     """Compile every kernel into the cache on disk, as installation and tests do beforehand."""
-    CompiledCost(BodyModel(), Camera(32, 24, 33.0, 33.0, 15.5, 11.5))
+    camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
+    CompiledCost(BodyModel(), camera)
+    CompiledKeypoints(BodyModel(), camera)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,13 +31,6 @@ _PRIOR_SCALE = 1.0 / _PRIOR_UNITS
 # A bow and leaning back lower the head alike in the picture, but people bow.
 _PITCH = JOINT_NAMES.index("torso_pitch")
 _BACKWARD_FACTOR = 3.0
-
-
-class HierarchyResult(NamedTuple):
-    """Posture and its standard deviation, each (12,), rad and metres."""
-
-    posture: FloatArray
-    stddev: FloatArray
 
 
 class HierarchicalFilter:
@@ -73,8 +65,12 @@ class HierarchicalFilter:
         self._last: FloatArray | None = None
         self._pool = ThreadPoolExecutor(1, "left_arm") if config.parallel_arms else None
 
-    def scatter(self, posture: FloatArray, noise_scale: float = 1.0) -> HierarchyResult:
-        """Start all filters around ``posture`` (12,) on the silhouette observed last."""
+    def scatter(self, posture: FloatArray, noise_scale: float = 1.0) -> FloatArray:
+        """Start all filters around ``posture`` (12,) on the silhouette observed last.
+
+        Returns:
+            The estimate (12,), rad and metres.
+        """
         self._last = posture
         return self._run(
             lambda: self.torso.scatter(posture[TORSO], self._rate_torso, noise_scale),
@@ -83,12 +79,15 @@ class HierarchicalFilter:
             ),
         )
 
-    def cycle(self, noise_scale: float = 1.0, explore: float = 0.0) -> HierarchyResult:
+    def cycle(self, noise_scale: float = 1.0, explore: float = 0.0) -> FloatArray:
         """Run one estimation cycle of all filters on the silhouette observed last.
 
         Args:
             noise_scale: factor on sigma_beta.
             explore: fraction of the arms' particles to draw from anywhere.
+
+        Returns:
+            The estimate (12,), rad and metres.
         """
         explorers = int(explore * self._config.arm.particles)
         return self._run(
@@ -98,14 +97,12 @@ class HierarchicalFilter:
             ),
         )
 
-    def _run(
-        self, run_torso: Callable[[], None], run_arm: Callable[[str], None]
-    ) -> HierarchyResult:
+    def _run(self, run_torso: Callable[[], None], run_arm: Callable[[str], None]) -> FloatArray:
         if self._config.torso_beside_arms:
             self._cost.fix_arms(self._last)
         run_torso()
-        posture, stddev = np.empty(N_JOINTS), np.empty(N_JOINTS)
-        posture[TORSO], stddev[TORSO] = self._estimate(self.torso)
+        posture = np.empty(N_JOINTS)
+        posture[TORSO] = self.torso.mean(self._config.average, self._scale)
         self._cost.fix_torso(posture[TORSO])
         if self._pool is None:
             run_arm("left")
@@ -115,12 +112,17 @@ class HierarchicalFilter:
             run_arm("right")
             left.result()
         for side, joints in ARMS.items():
-            posture[joints], stddev[joints] = self._estimate(self.arms[side])
+            posture[joints] = self.arms[side].mean(self._config.average, self._scale)
         self._last = posture
-        return HierarchyResult(posture, stddev)
+        return posture
 
-    def _estimate(self, particle_filter: ParticleFilter) -> tuple[FloatArray, FloatArray]:
-        return particle_filter.estimate(self._config.average, self._scale)
+    def stddev(self, posture: FloatArray) -> FloatArray:
+        """Return the standard deviation (12,) of the survivors around ``posture`` (12,)."""
+        stddev = np.empty(N_JOINTS)
+        stddev[TORSO] = self.torso.stddev(posture[TORSO], self._scale)
+        for side, joints in ARMS.items():
+            stddev[joints] = self.arms[side].stddev(posture[joints], self._scale)
+        return stddev
 
     def _rate_torso(self, particles: FloatArray) -> FloatArray:
         return self._with_prior(self._cost.torso(particles), particles, TORSO)

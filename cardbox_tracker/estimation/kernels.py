@@ -590,3 +590,22 @@ def polygon_costs(corners: Any, view: Any, table: Any, total: int, costs: Any) -
         for k in range(count):
             _put_quad(corners[i, k], pixels, view, k, spans, extent, rows, width)
         costs[i] = total + _sum_union(spans, extent, count, table, starts, ends, active)[0]
+
+
+@_compile
+def keypoints(posture: Any, sizes: Any, place: Any, view: Any, points: Any) -> None:
+    """Write shoulder, elbow, hand of the left, then the right arm to ``points`` (6, 3), optical."""
+    torso, hip, limb = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    fore = np.empty((3, 3))
+    _torso_pose(posture, place, view, torso, hip)
+    height = sizes[4] + sizes[2] - sizes[13]
+    for arm in range(2):
+        side = 1.0 - 2.0 * arm
+        first = 4 + 4 * arm
+        _turn_limb(torso, side * posture[first], posture[first + 1], limb)
+        _turn_limb(limb, side * posture[first + 2], posture[first + 3], fore)
+        for c in range(3):
+            shoulder = hip[c] + side * sizes[12] / 2 * torso[c, 1] + height * torso[c, 2]
+            points[3 * arm, c] = shoulder
+            points[3 * arm + 1, c] = shoulder - sizes[14] * limb[c, 2]
+            points[3 * arm + 2, c] = points[3 * arm + 1, c] - sizes[16] * fore[c, 2]

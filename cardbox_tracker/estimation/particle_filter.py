@@ -95,21 +95,36 @@ class ParticleFilter:
         best: FloatArray = self.particles[np.argmin(self.costs)]
         return best
 
-    def estimate(self, count: int, spread_scale: float = 1.0) -> tuple[FloatArray, FloatArray]:
-        """Return mean and standard deviation, each (D,), of the ``count`` best particles.
+    def mean(self, count: int, spread_scale: float = 1.0) -> FloatArray:
+        """Return the mean (D,) of the ``count`` best particles; with 1 it is the best one.
 
-        They are weighted by exp(-(W - W_best) / spread); with a count of 1 the mean is the best
-        particle, and the deviation is that of the survivors.
+        They are weighted by exp(-(W - W_best) / spread).
         """
-        survivors = max(count, int(self.config.survival_rate * len(self.costs)), 2)
-        if survivors < len(self.costs):
-            chosen = np.argpartition(self.costs, survivors - 1)[:survivors]
+        if count == 1:
+            return self.best()
+        particles, weights = self._weighted(count, spread_scale)
+        mean: FloatArray = weights @ particles
+        return mean
+
+    def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
+        """Return the standard deviation (D,) of the survivors around ``mean`` (D,).
+
+        They are weighted as for the mean: it says how far one could go without fitting worse.
+        """
+        survivors = max(2, int(self.config.survival_rate * len(self.costs)))
+        particles, weights = self._weighted(survivors, spread_scale)
+        particles -= mean
+        particles *= particles
+        stddev: FloatArray = np.sqrt(weights @ particles)
+        return stddev
+
+    def _weighted(self, count: int, spread_scale: float) -> tuple[FloatArray, FloatArray]:
+        """A copy of the ``count`` best particles (count, D), and their weights; these sum to 1."""
+        if count < len(self.costs):
+            chosen = np.argpartition(self.costs, count - 1)[:count]
         else:
             chosen = np.arange(len(self.costs))
         costs = self.costs[chosen]
-        order = np.argsort(costs, kind="stable")
-        particles = self.particles[chosen[order]]
-        weights = np.exp((costs[order[0]] - costs[order]) / (SPREAD_PX * spread_scale))
-        mean = weights[:count] @ particles[:count] / weights[:count].sum()
-        variance = weights @ (particles - mean) ** 2 / weights.sum()
-        return mean, np.sqrt(variance)
+        weights = np.exp((costs.min() - costs) / (SPREAD_PX * spread_scale))
+        weights /= weights.sum()
+        return self.particles[chosen], weights

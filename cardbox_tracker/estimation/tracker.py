@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import clip_to_limits, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.compiled import CompiledCost
+from cardbox_tracker.estimation.compiled import CompiledCost, CompiledKeypoints
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost import Silhouette, SilhouetteCost
-from cardbox_tracker.estimation.hierarchy import HierarchicalFilter, HierarchyResult
+from cardbox_tracker.estimation.hierarchy import HierarchicalFilter
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -77,6 +76,7 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._cost = cost or CompiledCost(body, self.camera)
+        self._keypoints = CompiledKeypoints(body, self.camera)
         self._reference = reference_posture("front")
         self._reference[0] = body.lateral_m
         model = render(cardbox_patches(body, self._reference), self.camera, self._cost.rows)
@@ -103,33 +103,39 @@ class Tracker:
                 # Whoever comes back may stand elsewhere: begin again when somebody is there.
                 self._started = False
             return Estimate(NO_PERSON)
-        result = self._start(silhouette) if not self._started else self._follow()
-        cost_px, iou = self._cost.overlap(result.posture)
+        posture = self._start(silhouette) if not self._started else self._follow()
+        cost_px, iou = self._cost.overlap(posture)
         self._poor_frames = self._poor_frames + 1 if iou < self.config.lost_iou else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.recover:
                 self._started = False
             return Estimate(LOST)
-        keypoints = self.camera.reference_to_optical(keypoints_m(self.body, result.posture))
-        return Estimate(TRACKING, result.posture, result.stddev, keypoints, cost_px, iou)
+        return Estimate(
+            TRACKING,
+            posture,
+            self._filter.stddev(posture),
+            self._keypoints(posture),
+            cost_px,
+            iou,
+        )
 
-    def _follow(self) -> HierarchyResult:
+    def _follow(self) -> FloatArray:
         for cycle in range(self.config.cycles):
             explore = self.config.explore if cycle == 0 else 0.0
-            result = self._filter.cycle(self.config.noise_decay**cycle, explore)
-        return result
+            posture = self._filter.cycle(self.config.noise_decay**cycle, explore)
+        return posture
 
-    def _start(self, silhouette: Silhouette) -> HierarchyResult:
+    def _start(self, silhouette: Silhouette) -> FloatArray:
         """Scatter around the front reference where the person stands, then settle."""
         self._started = True
         reference = self._reference.copy()
         if self.config.recover:
             reference[0] = self._lateral_m(silhouette)
-        result = self._filter.scatter(clip_to_limits(reference))
+        posture = self._filter.scatter(clip_to_limits(reference))
         if self.config.recover:
             for cycle in range(_RECOVERY_CYCLES):
-                result = self._filter.cycle(_RECOVERY_NOISE * self.config.noise_decay**cycle)
-        return result
+                posture = self._filter.cycle(_RECOVERY_NOISE * self.config.noise_decay**cycle)
+        return posture
 
     def _lateral_m(self, silhouette: Silhouette) -> float:
         """``torso_y`` under which the silhouette's median column lies."""

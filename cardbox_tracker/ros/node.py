@@ -102,6 +102,8 @@ class CardboxNode(Node):
         """Release what the node holds besides its ROS entities."""
 
     def _unexpected(self, where: str, error: Exception) -> None:
+        if not self.context.ok():
+            return  # a signal ended the node in the middle of it
         self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
         self.get_logger().debug(traceback.format_exc())
 
