@@ -1,0 +1,90 @@
+"""Reference postures and joint limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cardbox_tracker.body.posture import (
+    JOINT_LIMITS,
+    JOINT_NAMES,
+    LEFT_ARM,
+    REFERENCE_NAMES,
+    RIGHT_ARM,
+    TORSO,
+    clip_to_limits,
+    reference_posture,
+)
+
+
+def test_the_slices_hold_the_joints_of_their_part() -> None:
+    assert len(JOINT_NAMES) == 12
+    assert all(name.startswith("torso_") for name in JOINT_NAMES[TORSO])
+    assert all(name.startswith("left_") for name in JOINT_NAMES[LEFT_ARM])
+    assert all(name.startswith("right_") for name in JOINT_NAMES[RIGHT_ARM])
+    left = [name.removeprefix("left_") for name in JOINT_NAMES[LEFT_ARM]]
+    assert left == [name.removeprefix("right_") for name in JOINT_NAMES[RIGHT_ARM]]
+
+
+@pytest.mark.parametrize(
+    ("name", "turn", "degrees"),
+    [
+        ("front", "left", [0, 0, 0, 0, 20, 0, 0, 0, 20, 0, 0, 0]),
+        ("front", "right", [0, 0, 0, 0, 20, 0, 0, 0, 20, 0, 0, 0]),
+        ("side", "left", [0, 0, 0, 90, 20, 0, 0, 0, 20, 0, 0, 0]),
+        ("side", "right", [0, 0, 0, -90, 20, 0, 0, 0, 20, 0, 0, 0]),
+        ("arms", "left", [0, 0, 0, 0, 80, 0, 0, 0, 80, 0, 0, 0]),
+    ],
+)
+def test_reference_postures(name: str, turn: str, degrees: list[float]) -> None:
+    np.testing.assert_allclose(np.degrees(reference_posture(name, turn)), degrees, atol=1e-9)
+
+
+def test_a_reference_posture_is_a_copy() -> None:
+    assert REFERENCE_NAMES == ("front", "side", "arms")
+    changed = reference_posture("front")
+    changed[0] = 1.0
+    assert reference_posture("front")[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "turn", "text"),
+    [("back", "left", "posture 'back'"), ("", "left", "posture ''"), ("side", "up", "turn 'up'")],
+)
+def test_an_unknown_name_is_refused_with_those_that_are_known(
+    name: str, turn: str, text: str
+) -> None:
+    with pytest.raises(ValueError, match=f"{text} is unknown; it is one of"):
+        reference_posture(name, turn)
+
+
+def test_limits_are_ordered_around_rest_and_alike_for_both_arms() -> None:
+    assert JOINT_LIMITS.shape == (12, 2)
+    assert np.all(JOINT_LIMITS[:, 0] < 0)
+    assert np.all(JOINT_LIMITS[:, 1] > 0)
+    np.testing.assert_array_equal(JOINT_LIMITS[LEFT_ARM], JOINT_LIMITS[RIGHT_ARM])
+    # No joint but torso_y is metres: a limit beyond half a turn would be degrees.
+    assert np.abs(JOINT_LIMITS[1:]).max() <= np.pi
+    with pytest.raises(ValueError, match="read-only"):
+        JOINT_LIMITS[0, 0] = 0.0
+
+
+@pytest.mark.parametrize("name", ["front", "arms"])
+def test_facing_references_lie_inside_the_limits(name: str) -> None:
+    posture = reference_posture(name)
+    np.testing.assert_array_equal(clip_to_limits(posture), posture)
+
+
+@given(arrays(np.float64, (2, 3, 12), elements=st.floats(-10, 10)))
+def test_clipping_moves_into_the_limits_and_only_what_is_outside(postures: np.ndarray) -> None:
+    clipped = clip_to_limits(postures)
+    low, high = JOINT_LIMITS.T
+    assert np.all((clipped >= low) & (clipped <= high))
+    inside = (postures >= low) & (postures <= high)
+    np.testing.assert_array_equal(clipped[inside], postures[inside])
+    np.testing.assert_array_equal(clip_to_limits(clipped), clipped)
+    limits = np.broadcast_to(np.where(postures < low, low, high), postures.shape)
+    np.testing.assert_array_equal(clipped[~inside], limits[~inside])
