@@ -134,18 +134,22 @@ def _put_polygon(
     limit = float(width)
     for edge in range(n):
         j = edge + 1 if edge + 1 < n else 0
-        x0, y0, x1, y1 = xs[edge], ys[edge], xs[j], ys[j]
-        if y0 == y1:
+        if ys[edge] == ys[j]:
             continue
+        side = _index(0) if (ys[j] < ys[edge]) == turns_right else _index(1)
+        # From the upper end to the lower, as in the definition.
+        if ys[edge] < ys[j]:
+            x0, y0, x1, y1 = xs[edge], ys[edge], xs[j], ys[j]
+        else:
+            x0, y0, x1, y1 = xs[j], ys[j], xs[edge], ys[edge]
         slope = (x1 - x0) / (y1 - y0)
-        low = _clip_row(min(y0, y1), rows)
+        low = _clip_row(y0, rows)
         # 32-bit counters and np.ceil, for these have vector instructions. On the grid of corners
         # the differences are exact, so this is v - y0 of the definition to the last bit.
-        count = np.int32(_clip_row(max(y0, y1), rows) - low)
+        count = np.int32(_clip_row(y1, rows) - low)
         below = low - y0
         base = _index(low)
         if is_convex:
-            side = _index(0) if (y1 < y0) == turns_right else _index(1)
             for i in range(count):
                 x = x0 + (np.float64(i) + below) * slope
                 spans[k, side, base + _index(i)] = np.int32(np.ceil(min(max(x, 0.0), limit)))

@@ -2,9 +2,10 @@
 
 A pixel is covered where its centre lies inside the projected patch. Corners are first moved to a
 grid of 1/256 px, so that two programs that compute them with different rounding still agree on
-every pixel. For row v and each edge from (x0, y0) to (x1, y1) that crosses it, the half-open rule
+every pixel. For row v and each edge that crosses it, from its upper end
+(x0, y0) to its lower end (x1, y1), the half-open rule
 
-    min(y0, y1) <= v < max(y0, y1),    x(v) = x0 + (v - y0) (x1 - x0) / (y1 - y0)
+    y0 <= v < y1,    x(v) = x0 + (v - y0) (x1 - x0) / (y1 - y0)
 
 gives the crossing, and the columns ceil(min x) <= u < ceil(max x) are covered. Neighbouring patches
 that share an edge therefore neither overlap nor leave a gap.
@@ -60,8 +61,10 @@ def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
     bottom = int(np.clip(np.ceil(polygon_px[:, 1].max()), 0, height))
     for v in range(top, bottom):
         crossings = []
-        for (x0, y0), (x1, y1) in zip(polygon_px, np.roll(polygon_px, -1, axis=0), strict=True):
-            if min(y0, y1) <= v < max(y0, y1):
+        for ends in zip(polygon_px, np.roll(polygon_px, -1, axis=0), strict=True):
+            # From the upper end whichever patch the edge belongs to: both round to one crossing.
+            (x0, y0), (x1, y1) = sorted(ends, key=lambda corner: corner[1])
+            if y0 <= v < y1:
                 crossings.append(x0 + (v - y0) * ((x1 - x0) / (y1 - y0)))
         first, last = np.clip(np.ceil([min(crossings), max(crossings)]), 0, width).astype(int)
         mask[v, first:last] = 255
