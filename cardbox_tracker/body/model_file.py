@@ -30,12 +30,18 @@ def dumps_body_model(model: BodyModel) -> str:
         "units: {length: m, angle: rad}",
     ]
     for name, (_, _, _, meaning) in CONSTANTS.items():
-        lines.append(f"{name}: {float(getattr(model, name))!r}  # {meaning}")
+        lines.append(f"{name}: {_yaml_number(getattr(model, name))}  # {meaning}")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
-        lines.append(f"  {size.name}: {float(value)!r}  # {size.description}")
+        lines.append(f"  {size.name}: {_yaml_number(value)}  # {size.description}")
     return "\n".join(lines) + "\n"
+
+
+def _yaml_number(value: float) -> str:
+    """Every digit of ``value``, as YAML 1.1 reads a number: 1.0e-05, where 1e-05 is a text."""
+    mantissa, e, exponent = repr(float(value)).partition("e")
+    return f"{mantissa}.0{e}{exponent}" if e and "." not in mantissa else mantissa + e + exponent
 
 
 def loads_body_model(text: str, source: str = "body model") -> BodyModel:
@@ -50,7 +56,7 @@ def loads_body_model(text: str, source: str = "body model") -> BodyModel:
     """
     try:
         data = yaml.load(text, Loader=_StrictLoader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:  # such as of a date that no calendar has
         raise BodyModelError(f"{source} is not valid YAML: {error}") from None
     except BodyModelError as error:
         raise BodyModelError(f"{source}: {error}") from None
@@ -156,4 +162,7 @@ def _number(value: object, key: str) -> float:
         raise BodyModelError(
             f"'{key}' is {value!r}; expected a plain number in the unit of the file, such as 0.27"
         )
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise BodyModelError(f"'{key}' is too large; expected a value in metres or rad") from None

@@ -207,7 +207,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             f"cannot read the calibration {name}: {reason}; give a YAML file as "
             "camera_calibration writes it"
         ) from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:  # such as of a date that no calendar has
         raise CameraError(f"calibration {name} is not valid YAML: {error}") from None
     if not isinstance(data, dict):
         raise CameraError(f"calibration {name}: expected a mapping as camera_calibration writes it")
@@ -226,7 +226,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             f"calibration {name}: missing key {error}; expected a file as camera_calibration "
             "writes it"
         ) from None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise CameraError(f"calibration {name}: malformed value: {error}") from None
     try:
         calibration.camera(calibration.width, calibration.height)

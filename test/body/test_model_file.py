@@ -41,17 +41,12 @@ def replaced(old: str, new: str) -> str:
     return "\n".join(lines)
 
 
-# Zero or at least 0.1 mm: what repr writes with an exponent has a test of its own below.
-def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.floats(low, high).filter(lambda value: value == 0 or abs(value) >= 1e-4)
-
-
 @given(
     st.lists(st.floats(0, 1), min_size=18, max_size=18),
-    numbers(0.3, 20),
-    numbers(-5, 5),
-    numbers(-5, 5),
-    numbers(-1.4, 1.4),
+    st.floats(0.3, 20),
+    st.floats(-5, 5),
+    st.floats(-5, 5),
+    st.floats(-1.4, 1.4),
     st.sampled_from(["left", "right"]),
 )
 def test_any_body_is_read_back_to_the_last_bit(
@@ -59,12 +54,10 @@ def test_any_body_is_read_back_to_the_last_bit(
 ) -> None:
     low, high = SIZE_LIMITS.T
     sizes = np.clip(low + np.array(share) * (high - low), low, high)
-    sizes[np.abs(sizes) < 1e-4] = 0
     model = BodyModel(sizes, distance, height, lateral, pitch, turn)
     assert loads_body_model(dumps_body_model(model)) == model
 
 
-@pytest.mark.xfail(raises=BodyModelError, reason="YAML 1.1 reads 1e-05, without a point, as a text")
 @pytest.mark.parametrize("name", ["lateral_m", "camera_pitch_rad", "hip_height_m"])
 @pytest.mark.parametrize("value", [1e-05, -2e-17])
 def test_a_body_with_a_tiny_value_is_read_back(name: str, value: float) -> None:
@@ -150,14 +143,8 @@ def test_what_is_wrong_is_named(text: str, named: str) -> None:
         TEXT + "1: 2\n",
         TEXT + "<<: 5\n",
         "a: &a [*a]",
-        pytest.param(
-            replaced(FOREARM, "  forearm_length: 2001-99-99"),
-            marks=pytest.mark.xfail(raises=ValueError, reason="an impossible date is not caught"),
-        ),
-        pytest.param(
-            replaced(FOREARM, "  forearm_length: " + "9" * 400),
-            marks=pytest.mark.xfail(raises=OverflowError, reason="float() of it is not caught"),
-        ),
+        replaced(FOREARM, "  forearm_length: 2001-99-99"),
+        replaced(FOREARM, "  forearm_length: " + "9" * 400),
     ],
 )
 def test_strange_yaml_is_refused_in_words(text: str) -> None:
