@@ -24,6 +24,7 @@ class FilterConfig:
         translation_noise_m: sigma_beta of the translation; the arms have none.
         sigma_gamma_px: sigma_gamma, the width of the Gaussian that turns costs into the weights of
             SRS, pixels at 320x240; it grows with the picture's area.
+        elite: the first particle of a cycle is the best of the one before, unchanged.
     """
 
     particles: int = 200
@@ -31,6 +32,7 @@ class FilterConfig:
     rotation_noise_rad: float = 0.25
     translation_noise_m: float = 0.0
     sigma_gamma_px: float = 4000.0
+    elite: bool = True
 
     def __post_init__(self) -> None:
         """Check the ranges.
@@ -52,7 +54,7 @@ class TrackerConfig:
     Attributes:
         torso: filter of d1..d4 (Table I).
         arm: filter of each arm (Table I).
-        strategy: ``drs`` or ``srs``.
+        strategy: a name of ``resampling.STRATEGIES``.
         cycles: estimation cycles a frame.
         noise_decay: factor on the noise from one cycle of a frame to the next.
         prior: cost of an angle one unit from rest (see ``hierarchy``), as a fraction of the

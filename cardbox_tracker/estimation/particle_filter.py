@@ -74,6 +74,7 @@ class ParticleFilter:
             self.config.survival_rate,
             self.config.sigma_gamma_px * sigma_scale,
             self._rng,
+            self.config.elite,
         )
         self._rate(self.particles[ancestors], noise_scale, rate, explorers)
 
@@ -82,7 +83,8 @@ class ParticleFilter:
     ) -> None:
         steps = self._rng.standard_normal(self.particles.shape)
         steps *= self.noise * noise_scale
-        steps[0] = 0.0
+        if self.config.elite:
+            steps[0] = 0.0
         steps += ancestors
         if explorers > 0:
             low, high = self._limits.T

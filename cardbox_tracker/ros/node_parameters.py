@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from cardbox_tracker.body.posture import SIDE_TURNS
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
@@ -235,7 +236,8 @@ class TrackerParameters(NodeParameters):
         given = {
             entry.name: getattr(self, f"{part}_{entry.name}", 0) for entry in fields(FilterConfig)
         }
-        return replace(base, **{name: value for name, value in given.items() if value})
+        chosen: dict[str, Any] = {name: value for name, value in given.items() if value}
+        return replace(base, **chosen)
 
     def check(self) -> None:
         """Raise ValueError where values do not go together."""
