@@ -92,11 +92,14 @@ class InitializationResult:
         body: the measured person.
         iou: fit of each reference, by name.
         rounds: rounds that were needed, by subset, both passes together.
+        costs_px: cost and prior of the best hypothesis before the first and after each round, one
+            tuple a pass, by subset.
     """
 
     body: BodyModel
     iou: dict[str, float]
     rounds: dict[str, int]
+    costs_px: dict[str, list[tuple[float, ...]]]
 
     @property
     def mean_iou(self) -> float:
@@ -180,6 +183,7 @@ class _Search:
             self._postures[name] = self._asked[name].copy()
             self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
         self._rounds = dict.fromkeys(SUBSETS, 0)
+        self._history: dict[str, list[tuple[float, ...]]] = {subset: [] for subset in SUBSETS}
 
     def step(self, subset: str, name: str) -> None:
         """Estimate one subset of the sizes, and the posture of the reference that shows it."""
@@ -192,6 +196,7 @@ class _Search:
         sizes, posture = self._sizes, self._postures[name]
         best = float(self._rate(name, sizes[None], posture[None])[0])
         scale = 1.0
+        history = [best]
         for _ in range(config.max_rounds):
             self._rounds[subset] += 1
             noise = self._rng.standard_normal((config.hypotheses, N_SIZES + N_JOINTS)) * scale
@@ -208,8 +213,10 @@ class _Search:
                 best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
             else:
                 scale *= 0.7
-                if scale * config.sigma_alpha_m < config.accuracy_m:
-                    break
+            history.append(best)
+            if scale * config.sigma_alpha_m < config.accuracy_m:
+                break
+        self._history[subset].append(tuple(history))
         self._sizes, self._postures[name] = sizes, posture
 
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
@@ -235,7 +242,7 @@ class _Search:
             fitted = CompiledCost(body, cost.camera)
             fitted.observe(self._references[name])
             iou[name] = fitted.overlap(self._postures[name])[1]
-        return InitializationResult(body, iou, self._rounds)
+        return InitializationResult(body, iou, self._rounds, self._history)
 
 
 def _loose_joints(name: str) -> FloatArray:

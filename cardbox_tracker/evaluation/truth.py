@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 
 FloatArray = NDArray[np.float64]
@@ -20,11 +21,19 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrueFrame:
-    """One picture with a person: its segment and keypoints (6, 3), metres, optical frame."""
+    """One picture with a person.
+
+    Attributes:
+        segment: what the person does.
+        keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
+        posture: d1..d12 (12,), where the person is a model of ours.
+        torso_rad: roll, pitch and yaw of the torso (3,), where they are known.
+    """
 
     segment: str
     keypoints_m: FloatArray
     posture: FloatArray | None
+    torso_rad: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -62,8 +71,12 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
                 continue
             joints = entry["joints_m"]
             points = np.array([joints[name] for name in KEYPOINT_NAMES])
-            posture = np.array(list(entry["posture"].values())) if "posture" in entry else None
-            frames[int(entry["stamp_ns"])] = TrueFrame(entry["segment"], points, posture)
+            posture = torso = None
+            if "posture" in entry:
+                posture = np.array([entry["posture"][name] for name in JOINT_NAMES])
+            if "torso_rpy_deg" in entry:
+                torso = np.radians(entry["torso_rpy_deg"])
+            frames[int(entry["stamp_ns"])] = TrueFrame(entry["segment"], points, posture, torso)
         spans: dict[str, tuple[float, float]] = {}
         for segment in data["segments"]:
             spans.setdefault(segment["name"], (segment["start_s"], segment["end_s"]))
