@@ -96,6 +96,16 @@ def build_parser() -> argparse.ArgumentParser:
     track.add_argument("--video", type=Path, default=None, help="overlay video to write, .mp4")
     track.add_argument("--seed", type=_seed, default=0, help="seed of the filters")
 
+    evaluate = command("evaluate", _evaluate, "Repeat the paper's experiments; can be resumed.")
+    evaluate.add_argument("--runs", type=_runs, default=100, help="of each strategy and motion")
+    evaluate.add_argument("--output", type=Path, required=True, help="folder of results")
+    evaluate.add_argument("--quick", action="store_true", help="everything smaller, in two minutes")
+    evaluate.add_argument(
+        "--session", type=Path, default=None, help="a recording with ground_truth.json instead"
+    )
+    evaluate.add_argument("--jobs", type=_jobs, default=None, help="processes; all cores without")
+    evaluate.add_argument("--seed", type=_seed, default=0, help="seed of sessions and filters")
+
     urdf = command("urdf", _urdf, "Print the URDF of a measured person.")
     urdf.add_argument("model", type=Path, help="body model")
     return parser
@@ -131,6 +141,14 @@ def _seed(text: str) -> int:
 
 def _count(text: str) -> int:
     return _integer(text, 2, "number of particles")
+
+
+def _runs(text: str) -> int:
+    return _integer(text, 2, "number of runs")
+
+
+def _jobs(text: str) -> int:
+    return _integer(text, 1, "number of processes")
 
 
 def _integer(text: str, lowest: int, what: str) -> int:
@@ -218,6 +236,21 @@ def _track(options: argparse.Namespace) -> None:
     for path in (options.csv, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")
+
+
+def _evaluate(options: argparse.Namespace) -> None:
+    from cardbox_tracker.evaluation.evaluate import evaluate
+    from cardbox_tracker.evaluation.runner import default_jobs
+
+    evaluate(
+        options.output,
+        options.runs,
+        options.seed,
+        options.quick,
+        options.session,
+        options.jobs or default_jobs(),
+    )
+    print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
 
 
 def _urdf(options: argparse.Namespace) -> None:

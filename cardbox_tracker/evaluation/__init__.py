@@ -1,1 +1,1 @@
-"""How good it is: metrics, experiments, benchmarks, plots."""
+"""How good it is: metrics, the paper's experiments, benchmarks, plots, reports."""

@@ -1,0 +1,72 @@
+"""Error measures, by their standard names.
+
+``MPJPE`` is the mean distance between estimated and true joints. ``PA-MPJPE`` is the same after the
+best similarity transform (Procrustes): what is left of the error when place, size and heading of
+the person do not count. Everything takes leading dimensions, such as runs and pictures.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+AXES = ("lateral", "vertical", "depth")
+"""The axes x, y and z of the camera optical frame."""
+
+
+def distances_m(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
+    """Return the distance of each joint (..., k) of ``estimates_m`` (..., k, 3) from the truth."""
+    distances: FloatArray = np.linalg.norm(estimates_m - truth_m, axis=-1)
+    return distances
+
+
+def mpjpe_m(estimates_m: FloatArray, truth_m: FloatArray) -> float:
+    """Return the mean distance of all joints (..., k, 3), metres."""
+    return float(distances_m(estimates_m, truth_m).mean())
+
+
+def pa_mpjpe_m(estimates_m: FloatArray, truth_m: FloatArray) -> float:
+    """Return the mean distance of joints (..., k, 3) after :func:`align`, metres."""
+    return mpjpe_m(align(estimates_m, truth_m), truth_m)
+
+
+def align(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
+    """Move, turn and scale each set of joints (..., k, 3) to lie as near to the truth as it can.
+
+    The least-squares solution of Umeyama (1991): with both sets centred and U S V^T the singular
+    value decomposition of truth^T estimate, the rotation is U D V^T, where D mirrors the last axis
+    back if U V^T were a reflection, and the scale is trace(S D) / |estimate|^2. Joints that all lie
+    in one point cannot be scaled and end in the middle of the truth.
+    """
+    middle_m = truth_m.mean(axis=-2, keepdims=True)
+    target = truth_m - middle_m
+    source = estimates_m - estimates_m.mean(axis=-2, keepdims=True)
+    u, s, vt = np.linalg.svd(np.swapaxes(target, -1, -2) @ source)
+    mirror = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    s[..., -1] *= mirror
+    u[..., :, -1] *= mirror[..., None]
+    extent = np.sum(source**2, axis=(-1, -2))
+    scale = np.divide(s.sum(axis=-1), extent, out=np.zeros_like(extent), where=extent > 0)
+    aligned: FloatArray = scale[..., None, None] * source @ np.swapaxes(u @ vt, -1, -2) + middle_m
+    return aligned
+
+
+def errors_along_axes_m(estimates_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
+    """Return the mean absolute error along each of ``AXES`` of joints (..., k, 3), metres."""
+    along = np.abs(estimates_m - truth_m).mean(axis=tuple(range(np.ndim(estimates_m) - 1)))
+    return dict(zip(AXES, along.tolist(), strict=True))
+
+
+def angle_errors_deg(estimates_rad: FloatArray, truth_rad: FloatArray) -> FloatArray:
+    """Return how far angles (...) are apart, the shorter way round, 0 to 180 degrees."""
+    turns = (np.asarray(estimates_rad) - truth_rad + np.pi) % (2.0 * np.pi) - np.pi
+    errors: FloatArray = np.abs(np.degrees(turns))
+    return errors
+
+
+def stddev_over_runs(values: FloatArray) -> FloatArray:
+    """Return the sample standard deviation (...) of ``values`` (runs, ...) over the runs."""
+    stddev: FloatArray = np.std(values, axis=0, ddof=1)
+    return stddev

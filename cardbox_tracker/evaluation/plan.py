@@ -1,0 +1,61 @@
+"""How large an evaluation is: numbers of runs, and the values that are swept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sizes of the experiments.
+
+    Attributes:
+        runs: of experiments 1 to 3, each motion and strategy.
+        side_runs: of each setting of experiments 4 and 9.
+        particle_runs: of each setting of experiment 5.
+        model_runs: of each model of experiment 6.
+        model_every: experiment 6 tracks only each picture of this number.
+        bodies: random people of experiment 8.
+        seeds: seeds of experiment 8.
+        survival_rates: e of experiment 4.
+        particles: N of each filter in experiment 5.
+        speeds: name and stride of experiment 4: each picture, or each third one.
+        fps: pictures a second of the synthetic sessions.
+        size: their width and height, px.
+        timing_rounds: repetitions of the timing of experiment 6.
+    """
+
+    runs: int
+    side_runs: int
+    particle_runs: int
+    model_runs: int
+    bodies: int = 50
+    seeds: int = 50
+    model_every: int = 1
+    survival_rates: tuple[float, ...] = (0.005, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+    particles: tuple[int, ...] = (25, 50, 100, 200, 400, 800, 1600, 3200)
+    speeds: tuple[tuple[str, int], ...] = (("slow", 1), ("fast", 3))
+    fps: float = 15.0
+    size: tuple[int, int] = (320, 240)
+    timing_rounds: int = 50
+
+
+def full_plan(runs: int) -> Plan:
+    """Return the plan of the committed report; side experiments take fewer runs than ``runs``."""
+    return Plan(runs, min(runs, 20), min(runs, 10), min(runs, 10))
+
+
+def quick_plan(runs: int) -> Plan:
+    """Return a plan of under two minutes: the same experiments, fewer runs, bodies and values."""
+    return Plan(
+        runs=min(runs, 6),
+        side_runs=min(runs, 3),
+        particle_runs=2,
+        model_runs=2,
+        bodies=6,
+        seeds=6,
+        model_every=4,
+        survival_rates=(0.005, 0.2, 0.4, 1.0),
+        particles=(25, 100, 400),
+        timing_rounds=10,
+    )
