@@ -187,7 +187,8 @@ def _survival(results: Mapping[str, Any]) -> list[Claim]:
         }
         found.append(
             Claim(
-                f"The survival rate is a compromise: both extremes are worse ({speed} motion).",
+                f"The survival rate is a compromise: both extremes are worse ({_words(speed)} "
+                "motion).",
                 best not in clear and all(clear.values()),
                 f"least 3D error {errors[best]:.1f} cm at e = {best:g}, least cost "
                 f"{costs[cheapest]:.0f} px at e = {cheapest:g}; e = {lowest:g} (the best alone): "

@@ -105,7 +105,7 @@ class _Evaluation:
         tasks = {
             motion: Task(
                 f"session-{motion}",
-                _synthesize,
+                synthesize,
                 (motion, self._seed, plan.fps, plan.size),
                 effort=duration_s,
             )
@@ -149,7 +149,7 @@ class _Evaluation:
             digest = hashlib.sha256(truth.read_bytes()).hexdigest()
         else:
             digest = ""
-        task = Task("session", _read, (str(folder.resolve()), digest, self._seed))
+        task = Task("session", read_session, (str(folder.resolve()), digest, self._seed))
         self._run("session", [task])
         path = self._parts.path(task)
         session = load_session(path)
@@ -212,11 +212,13 @@ class _Evaluation:
         return 1e3 * self._processor_s(self._main) / frames
 
 
-def _synthesize(folder: Path, motion: str, seed: int, fps: float, size: tuple[int, int]) -> Arrays:
+def synthesize(folder: Path, motion: str, seed: int, fps: float, size: tuple[int, int]) -> Arrays:
+    """Task: a synthetic session."""
     return synthetic_session(motion, seed, fps, size).to_arrays()
 
 
-def _read(folder: Path, session: str, digest: str, seed: int) -> Arrays:
+def read_session(folder: Path, session: str, digest: str, seed: int) -> Arrays:
+    """Task: the recorded session in the folder ``session``, whose truth has that ``digest``."""
     return recorded_session(Path(session), seed).to_arrays()
 
 

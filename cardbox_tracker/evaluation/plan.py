@@ -19,7 +19,7 @@ class Plan:
         seeds: seeds of experiment 8.
         survival_rates: e of experiment 4.
         particles: N of each filter in experiment 5.
-        speeds: name and stride of experiment 4: each picture, or each third one.
+        speeds: name and stride of experiment 4: each picture, each third, each sixth.
         fps: pictures a second of the synthetic sessions.
         size: their width and height, px.
         timing_rounds: repetitions of the timing of experiment 6.
@@ -34,7 +34,7 @@ class Plan:
     model_every: int = 1
     survival_rates: tuple[float, ...] = (0.005, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
     particles: tuple[int, ...] = (25, 50, 100, 200, 400, 800, 1600, 3200)
-    speeds: tuple[tuple[str, int], ...] = (("slow", 1), ("fast", 3))
+    speeds: tuple[tuple[str, int], ...] = (("slow", 1), ("fast", 3), ("very_fast", 6))
     fps: float = 15.0
     size: tuple[int, int] = (320, 240)
     timing_rounds: int = 50

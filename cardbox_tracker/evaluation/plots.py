@@ -107,7 +107,7 @@ def plot_survival(results: Mapping[str, Any], path: Path) -> None:
                 (axes[0, 1], "mean_cost_px", 1.0),
             ):
                 axis.plot(rates, [scale * v["mean"][name] for v in by_rate.values()], "o-")
-            axes[0, 0].lines[-1].set_label(f"{speed} motion")
+            axes[0, 0].lines[-1].set_label(f"{speed.replace('_', ' ')} motion")
         paper = paper_preset()
         for axis, what in zip(axes[0], ("3D error [cm]", "mean cost [px]"), strict=True):
             for rate in (paper.torso.survival_rate, paper.arm.survival_rate):

@@ -102,7 +102,7 @@ def _main(results: Mapping[str, Any]) -> Iterator[str]:
     cells = [(m, s, results[m][s]) for m in motions for s in ("drs", "srs")]
     yield from ("## 1. Ground truth", "", "Mean 3D error of each joint, cm:", "")
     yield from _table(
-        ["motion", "", *(name.replace("_", " ") for name in KEYPOINT_NAMES)],
+        ["motion", "", *(_words(name) for name in KEYPOINT_NAMES)],
         ([m, s.upper(), *(_cm(c["error_m"][n]) for n in KEYPOINT_NAMES)] for m, s, c in cells),
     )
     yield from (
@@ -181,12 +181,13 @@ def _survival(results: Mapping[str, Any]) -> Iterator[str]:
         "## 4. Survival rate",
         "",
         "The same e in all three filters. Slow: every picture; fast: each third one, which is the "
-        "same motion three times as fast. MPJPE in cm and cost in px, means over the motions:",
+        "same motion three times as fast; very fast: each sixth. MPJPE in cm and cost in px, "
+        "means over the motions:",
         "",
     )
     speeds = list(results)
     yield from _table(
-        ["e", *(f"{speed} {what}" for speed in speeds for what in ("MPJPE", "cost"))],
+        ["e", *(f"{_words(speed)} {what}" for speed in speeds for what in ("MPJPE", "cost"))],
         (
             [rate, *(cell for speed in speeds for cell in _pair(results[speed][rate]["mean"]))]
             for rate in results[speeds[0]]
@@ -376,6 +377,10 @@ def _triple(figures: Mapping[str, float]) -> list[str]:
 
 def _cm(value_m: float) -> str:
     return f"{100 * value_m:.1f}"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _sentence(text: str) -> str:

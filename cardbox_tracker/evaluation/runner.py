@@ -14,6 +14,7 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -76,8 +77,10 @@ class Parts:
                 f"cannot make the folder {folder}: {error.strerror}; "
                 "give --output a folder that can be written"
             ) from None
+        # Tell at once, and not after the first result, that nothing can be written.
         with atomic_path(folder / "writable"):
             pass
+        (folder / "writable").unlink(missing_ok=True)
 
     def path(self, task: Task) -> Path:
         """Return where the result of ``task`` is, or will be."""
@@ -87,12 +90,12 @@ class Parts:
 
     def load(self, task: Task) -> Arrays:
         """Return the result of a finished task."""
-        with np.load(self.path(task)) as arrays:
+        with self.path(task).open("rb") as file, np.load(file) as arrays:
             return {name: arrays[name] for name in arrays}
 
     def seconds(self, task: Task) -> float:
         """Return how long a finished task took."""
-        with np.load(self.path(task)) as arrays:
+        with self.path(task).open("rb") as file, np.load(file) as arrays:
             return float(arrays["seconds"])
 
     def is_done(self, task: Task) -> bool:
@@ -112,6 +115,9 @@ class Parts:
             tasks: the same task may be among them more than once.
             jobs: number of processes.
             progress: called with the finished fraction of what was to be done.
+
+        Raises:
+            CardboxError: a task fails, or a process was killed.
         """
         todo = {
             path: task for task in tasks if not self.is_done(task) for path in [self.path(task)]
@@ -141,6 +147,11 @@ class Parts:
             for future in as_completed(efforts):
                 future.result()
                 advance(efforts[future])
+        except BrokenProcessPool:
+            raise CardboxError(
+                "a process of the evaluation was ended from outside, as happens when memory runs "
+                "out; the same command goes on where it stopped, with --jobs 1 in a single process"
+            ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 

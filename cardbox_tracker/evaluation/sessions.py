@@ -192,7 +192,7 @@ def _session(
     folder: Path,
 ) -> Session:
     n = len(frames)
-    segments = ["" for _ in frames]
+    segments = ["neutral"] * n
     keypoints_m = np.full((n, 6, 3), np.nan)
     postures = np.full((n, 12), np.nan)
     torso_rad = np.full((n, 3), np.nan)
@@ -207,7 +207,6 @@ def _session(
         if true.torso_rad is not None:
             torso_rad[i] = true.torso_rad
     names = np.array(segments)
-    names[names == ""] = "neutral"
     motions = motions_of(names)
     if not motions:
         raise CardboxError(
