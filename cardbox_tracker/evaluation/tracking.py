@@ -188,6 +188,7 @@ def brief(motion: MotionRuns) -> dict[str, float]:
         "mpjpe_m": float(errors_m.mean()),
         "elbow_hand_error_m": float(errors_m[..., [1, 2, 4, 5]].mean()),
         "stderr_mpjpe_m": _standard_error(errors_m.mean(axis=(1, 2))),
+        "stderr_cost_px": _standard_error(motion.runs.costs_px.mean(axis=1)),
         "mean_std_angles_rad": float(stddev_over_runs(motion.runs.postures)[:, 1:].mean()),
     }
 
@@ -195,9 +196,11 @@ def brief(motion: MotionRuns) -> dict[str, float]:
 def mean_brief(figures: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the means over motions of what :func:`brief` gives for each."""
     means = {name: float(np.mean([f[name] for f in figures])) for name in figures[0]}
-    # The motions are tracked apart from each other, so their errors are independent.
-    squares = np.sum([f["stderr_mpjpe_m"] ** 2 for f in figures])
-    return means | {"stderr_mpjpe_m": float(np.sqrt(squares) / len(figures))}
+    for name in ("stderr_mpjpe_m", "stderr_cost_px"):
+        # The motions are tracked apart from each other, so their errors are independent.
+        squares = np.sum([f[name] ** 2 for f in figures])
+        means[name] = float(np.sqrt(squares) / len(figures))
+    return means
 
 
 def per_frame(motion: MotionRuns) -> dict[str, FloatArray]:
