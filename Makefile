@@ -53,7 +53,7 @@ $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyp
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@echo "compiling the tracker's inner loop, once, for about half a minute"
-	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.compiled
+	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.precompile
 	@touch $@
 
 .PHONY: setup

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cardbox_tracker.estimation.compiled import compile_all
+from cardbox_tracker.estimation.precompile import compile_all
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -19,6 +19,7 @@ from cardbox_tracker.estimation.cost import (
 )
 from cardbox_tracker.vision.camera import Camera
 
+_NO_WORDS = np.zeros((1, 0), np.uint64)
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
 
 
@@ -61,7 +62,8 @@ class CompiledCost:
         """See :class:`SilhouetteCost`."""
         check_silhouette(silhouette, self.camera)
         seen = np.ascontiguousarray(silhouette[: self.rows])
-        self.silhouette_px = int(kernels.running_sums(seen, self._table))
+        words = seen.view(np.uint64) if seen.shape[1] % 8 == 0 else _NO_WORDS
+        self.silhouette_px = int(kernels.running_sums(seen, words, self._table))
         self.fix_arms(None)
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
@@ -185,14 +187,3 @@ def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray,
     view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
     place = (body.distance_m, body.hip_height_m)
     return np.array(body.sizes), np.array(place), np.array(view)
-
-
-def compile_all() -> None:
-    """Compile every kernel into the cache on disk, as installation and tests do beforehand."""
-    camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
-    CompiledCost(BodyModel(), camera)
-    CompiledKeypoints(BodyModel(), camera)
-
-
-if __name__ == "__main__":
-    compile_all()

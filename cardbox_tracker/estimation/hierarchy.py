@@ -117,7 +117,7 @@ class HierarchicalFilter:
         return posture
 
     def stddev(self, posture: FloatArray) -> FloatArray:
-        """Return the standard deviation (12,) of the survivors around ``posture`` (12,)."""
+        """Return the standard deviation (12,) of the particles around ``posture`` (12,)."""
         stddev = np.empty(N_JOINTS)
         stddev[TORSO] = self.torso.stddev(posture[TORSO], self._scale)
         for side, joints in ARMS.items():

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import FilterConfig
-from cardbox_tracker.estimation.resampling import Resampler
+from cardbox_tracker.estimation.particle_kernels import propagate, weighted_stddev
+from cardbox_tracker.estimation.resampling import Ancestors, Resampler
 
 FloatArray = NDArray[np.float64]
 CostFunction = Callable[[FloatArray], FloatArray]
@@ -52,7 +53,8 @@ class ParticleFilter:
 
     def scatter(self, posture: FloatArray, rate: CostFunction, noise_scale: float = 1.0) -> None:
         """Start with particles around ``posture`` (D,), itself among them, and rate them."""
-        self._rate(np.broadcast_to(posture, self.particles.shape), noise_scale, rate)
+        self.particles[:] = posture
+        self._rate(np.arange(len(self.particles)), noise_scale, rate)
 
     def cycle(
         self,
@@ -76,20 +78,19 @@ class ParticleFilter:
             self._rng,
             self.config.elite,
         )
-        self._rate(self.particles[ancestors], noise_scale, rate, explorers)
+        self._rate(ancestors, noise_scale, rate, explorers)
 
     def _rate(
-        self, ancestors: FloatArray, noise_scale: float, rate: CostFunction, explorers: int = 0
+        self, ancestors: Ancestors, noise_scale: float, rate: CostFunction, explorers: int = 0
     ) -> None:
         steps = self._rng.standard_normal(self.particles.shape)
-        steps *= self.noise * noise_scale
         if self.config.elite:
             steps[0] = 0.0
-        steps += ancestors
+        propagate(steps, self.particles, ancestors, self.noise * noise_scale, self._limits)
         if explorers > 0:
             low, high = self._limits.T
             steps[-explorers:] = self._rng.uniform(low, high, (explorers, len(low)))
-        self.particles = np.clip(steps, self._limits[:, 0], self._limits[:, 1], out=steps)
+        self.particles = steps
         self.costs = rate(self.particles)
 
     def best(self) -> FloatArray:
@@ -109,15 +110,13 @@ class ParticleFilter:
         return mean
 
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
-        """Return the standard deviation (D,) of the survivors around ``mean`` (D,).
+        """Return the standard deviation (D,) of the particles around ``mean`` (D,).
 
         They are weighted as for the mean: it says how far one could go without fitting worse.
         """
-        survivors = max(2, int(self.config.survival_rate * len(self.costs)))
-        particles, weights = self._weighted(survivors, spread_scale)
-        particles -= mean
-        particles *= particles
-        stddev: FloatArray = np.sqrt(weights @ particles)
+        stddev: FloatArray = weighted_stddev(
+            self.particles, self.costs, mean, SPREAD_PX * spread_scale
+        )
         return stddev
 
     def _weighted(self, count: int, spread_scale: float) -> tuple[FloatArray, FloatArray]:

@@ -90,17 +90,13 @@ def deterministic(
     survivors come in no particular order: whoever is an ancestor once is so at any place in the
     list, so a partition does the work of a sort.
     """
-    n = len(costs)
-    survivors = max(1, int(survival_rate * n))
-    best = int(np.argmin(costs))
-    ancestors = np.full(n, best, dtype=np.intp)
-    if survivors < n:
-        kept = np.argpartition(costs, survivors - 1)[:survivors]
-    else:
-        kept = np.arange(n)
-    # Equal costs may leave the best one out of the partition; it has its place already.
-    others = kept[kept != best][: survivors - 1]
-    ancestors[1 : 1 + len(others)] = others
+    survivors = max(1, int(survival_rate * len(costs)))
+    ancestors: Ancestors = costs.argpartition(survivors - 1)
+    first = costs[ancestors[:survivors]].argmin()
+    best = ancestors[first]
+    ancestors[first] = ancestors[0]
+    ancestors[0] = best
+    ancestors[survivors:] = best
     return ancestors
 
 

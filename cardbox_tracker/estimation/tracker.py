@@ -36,7 +36,7 @@ class Estimate:
     Attributes:
         state: ``tracking``, ``no_person`` or ``lost``; the rest is None unless ``tracking``.
         posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviation of each joint over the best particles, (12,).
+        posture_stddev: standard deviation of each joint over the particles, weighted by fit, (12,).
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
         cost_px: equation (2) of the posture.

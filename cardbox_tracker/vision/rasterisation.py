@@ -1,16 +1,18 @@
 """Which pixels a planar patch covers: the definition, written for reading, not for speed.
 
-A pixel is covered where its centre lies inside the projected patch. Corners are first moved to a
-grid of 1/256 px, so that two programs that compute them with different rounding still agree on
-every pixel. For row v and each edge that crosses it, from its upper end
-(x0, y0) to its lower end (x1, y1), the half-open rule
+A pixel is covered where its centre lies inside the projected patch. To make that the same on every
+computer and in every program, coordinates are whole numbers: corners are moved to a grid of 1/256
+px, and an edge is a line that starts at the first row v0 of the picture below its upper end
+(x0, y0), and moves by the same whole number of 1/65536 px from row to row on to its lower end
+(x1, y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
 
-    y0 <= v < y1,    x(v) = x0 + (v - y0) (x1 - x0) / (y1 - y0)
+    X(v) = round(65536 (x0 + (v0 - y0) s)) + (v - v0) round(65536 s)
 
-gives the crossing, and the columns ceil(min x) <= u < ceil(max x) are covered. Neighbouring patches
+and the columns ceil(min X / 65536) <= u < ceil(max X / 65536) are covered. Neighbouring patches
 that share an edge therefore neither overlap nor leave a gap.
 
-The compiled cost in :mod:`cardbox_tracker.estimation.compiled` must agree with this pixel by pixel.
+The compiled cost in :mod:`cardbox_tracker.estimation.compiled` must agree with this pixel by pixel;
+32 bits are enough for it, as long as corners beyond 16000 px are moved to there.
 """
 
 from __future__ import annotations
@@ -24,6 +26,13 @@ NEAR_PLANE_M = 0.1
 """What is nearer to the camera's plane than this is cut off, and what lies behind it, too."""
 
 SUBPIXELS = 256.0
+"""Corners lie on a grid of so many points a pixel."""
+
+CROSSING_BITS = 16
+"""Edges cross rows at whole numbers of 2^-16 px."""
+
+FARTHEST_PX = 16000.0
+"""Corners beyond this, in either direction, are moved to it."""
 
 
 def clip_near(corners_m: FloatArray) -> FloatArray:
@@ -43,8 +52,10 @@ def clip_near(corners_m: FloatArray) -> FloatArray:
 
 
 def snap(pixels: FloatArray) -> FloatArray:
-    """Move pixel coordinates to the nearest point of the 1/256 px grid."""
-    return np.floor(np.asarray(pixels) * SUBPIXELS + 0.5) / SUBPIXELS
+    """Move pixel coordinates to the nearest point of the 1/256 px grid, and to within 16000 px."""
+    near = np.clip(np.asarray(pixels, dtype=np.float64), -FARTHEST_PX, FARTHEST_PX)
+    snapped: FloatArray = np.floor(near * SUBPIXELS + 0.5) / SUBPIXELS
+    return snapped
 
 
 def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
@@ -54,20 +65,27 @@ def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
         mask: changed in place.
         polygon_px: convex, shape (n, 2), snapped pixel coordinates; parts outside are ignored.
     """
-    height, width = mask.shape
+    height = mask.shape[0]
     if len(polygon_px) < 3:
         return
-    top = int(np.clip(np.ceil(polygon_px[:, 1].min()), 0, height))
-    bottom = int(np.clip(np.ceil(polygon_px[:, 1].max()), 0, height))
-    for v in range(top, bottom):
-        crossings = []
-        for ends in zip(polygon_px, np.roll(polygon_px, -1, axis=0), strict=True):
-            # From the upper end whichever patch the edge belongs to: both round to one crossing.
-            (x0, y0), (x1, y1) = sorted(ends, key=lambda corner: corner[1])
-            if y0 <= v < y1:
-                crossings.append(x0 + (v - y0) * ((x1 - x0) / (y1 - y0)))
-        first, last = np.clip(np.ceil([min(crossings), max(crossings)]), 0, width).astype(int)
-        mask[v, first:last] = 255
+    crossings: dict[int, list[int]] = {}
+    for ends in zip(polygon_px, np.roll(polygon_px, -1, axis=0), strict=True):
+        # From the upper end whichever patch the edge belongs to: both round to one crossing.
+        (x0, y0), (x1, y1) = sorted(ends, key=lambda corner: float(corner[1]))
+        first, end = (int(v) for v in np.clip(np.ceil([y0, y1]), 0, height))
+        if first < end:
+            slope = (x1 - x0) / (y1 - y0)
+            start, step = _fixed(x0 + (first - y0) * slope), _fixed(slope)
+            for v in range(first, end):
+                crossings.setdefault(v, []).append(start + (v - first) * step)
+    for v, found in crossings.items():
+        left, right = (-(-x >> CROSSING_BITS) for x in (min(found), max(found)))
+        mask[v, max(left, 0) : max(right, 0)] = 255
+
+
+def _fixed(pixels: float) -> int:
+    """Whole number of 2^-16 px."""
+    return int(np.floor(pixels * 2**CROSSING_BITS + 0.5))
 
 
 def render(patches_m: FloatArray, camera: Camera, height: int | None = None) -> NDArray[np.uint8]:
