@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.compiled import compile_all
 from cardbox_tracker.evaluation import experiments
 from cardbox_tracker.evaluation.experiments import Cell, CellFactory
 from cardbox_tracker.evaluation.measuring import person_tasks, seed_tasks, summarize_measuring
@@ -64,6 +65,8 @@ def evaluate(
     if runs < 2:
         raise CardboxError(f"runs is {runs}; expected 2 or more, to tell how they differ")
     start = time.perf_counter()
+    # Once and here, before several processes would do so at the same time.
+    compile_all()
     plan = plan or (quick_plan if quick else full_plan)(runs)
     parts = Parts(output / "parts")
     work = _Evaluation(parts, plan, seed, jobs, progress)

@@ -49,12 +49,12 @@ def quick_plan(runs: int) -> Plan:
     """Return a plan of under two minutes: the same experiments, fewer runs, bodies and values."""
     return Plan(
         runs=min(runs, 6),
-        side_runs=min(runs, 3),
+        side_runs=2,
         particle_runs=2,
         model_runs=2,
         bodies=6,
         seeds=6,
-        model_every=4,
+        model_every=6,
         survival_rates=(0.005, 0.2, 0.4, 1.0),
         particles=(25, 100, 400),
         timing_rounds=10,

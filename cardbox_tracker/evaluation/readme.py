@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,10 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
     """Return the text between the marks, from ``results.json`` of all and of each session."""
     quick = " (a quick run)" if results["quick"] else ""
     lines = [
-        f"Mean over {results['runs']} runs{quick} with the paper's parameters on a synthetic "
-        "person, exact truth; DRS is the paper's resampling, SRS what it is compared with:",
+        *_wrapped(
+            f"Mean over {results['runs']} runs{quick} with the paper's parameters on a synthetic "
+            "person, exact truth; DRS is the paper's resampling, SRS what it is compared with:"
+        ),
         "",
         "| motion | 3D error DRS | SRS | hands DRS | SRS | cost DRS | SRS |",
         "|---|---|---|---|---|---|---|",
@@ -34,14 +37,15 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
     for name, session in recorded.items():
         lines += [_row(f"{m} ({name})", session[m]) for m in motions_in(session)]
     variants = results["experiments"]["variants"]
-    lines += [
-        "",
-        "3D error: mean distance of shoulders, elbows and hands. "
-        + ("Rows with a session's name are recordings of a realistic body. " if recorded else "")
-        + f"With the preset `default` instead of the paper's the error on the synthetic motions "
-        f"is {_cm(variants['default']['mean']['mpjpe_m'])} instead of "
-        f"{_cm(variants['paper']['mean']['mpjpe_m'])}.",
-    ]
+    error = {name: _cm(variants[name]["mean"]["mpjpe_m"]) for name in ("paper", "default")}
+    text = "3D error: mean distance of shoulders, elbows and hands. "
+    if recorded:
+        text += "Rows with a session's name are recordings of a realistic body. "
+    text += (
+        "With the preset `default` instead of the paper's the error on the synthetic motions is "
+        f"{error['default']} instead of {error['paper']}."
+    )
+    lines += ["", *_wrapped(text)]
     return "\n".join(lines)
 
 
@@ -79,6 +83,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with atomic_path(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return 1 if given.check else 0
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False)
 
 
 def _row(name: str, motion: Mapping[str, Any]) -> str:
