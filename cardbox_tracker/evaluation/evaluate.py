@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.compiled import compile_all
+from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.evaluation import experiments
 from cardbox_tracker.evaluation.experiments import Cell, CellFactory
 from cardbox_tracker.evaluation.measuring import person_tasks, seed_tasks, summarize_measuring
