@@ -122,19 +122,19 @@ def assert_all_equal(case: Case) -> None:
             np.testing.assert_array_equal(compiled.arm(side, arms), reference.arm(side, arms))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(SMALL_CASES)
 def test_every_cost_of_small_pictures_is_equal(case: Case) -> None:
     assert_all_equal(case)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(LARGE_CASES)
 def test_every_cost_of_large_pictures_is_equal(case: Case) -> None:
     assert_all_equal(case)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(SMALL_CASES, st.integers(0, 2**32 - 1))
 def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -148,7 +148,7 @@ def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> 
     np.testing.assert_array_equal(compiled.bodies(sizes, case.postures), expected)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(SMALL_CASES)
 def test_the_model_itself_as_silhouette_leaves_no_pixel_over(case: Case) -> None:
     """Equal counts could hide pixels that differ; a cost of 0 cannot."""
@@ -161,7 +161,7 @@ def test_the_model_itself_as_silhouette_leaves_no_pixel_over(case: Case) -> None
         assert compiled.overlap(posture) == (0, 1.0 if silhouette.any() else 0.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(SMALL_CASES)
 def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
     compiled = CompiledKeypoints(case.body, case.camera)

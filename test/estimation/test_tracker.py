@@ -1,0 +1,294 @@
+"""Tracking from silhouette to silhouette: states, new starts, and the same bytes for one seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture
+from cardbox_tracker.estimation.compiled import CompiledCost
+from cardbox_tracker.estimation.config import (
+    FilterConfig,
+    TrackerConfig,
+    default_preset,
+    paper_preset,
+)
+from cardbox_tracker.estimation.cost import ReferenceCost
+from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Estimate, Tracker
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.simulation.renderer import Renderer, Scene
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
+
+CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
+BODY = BodyModel(hip_height_m=-0.51)
+NOBODY = np.zeros((120, 160), np.uint8)
+STILL = TrackerConfig(
+    torso=FilterConfig(rotation_noise_rad=0.0), arm=FilterConfig(rotation_noise_rad=0.0)
+)
+
+
+def front(torso_y_m: float = 0.0) -> np.ndarray:
+    posture = reference_posture("front")
+    posture[0] = torso_y_m
+    return posture
+
+
+def seen(posture: np.ndarray, body: BodyModel = BODY) -> np.ndarray:
+    """The model's own silhouette."""
+    camera = CAMERA.with_pitch(body.camera_pitch_rad)
+    return render(cardbox_patches(body, posture), camera)
+
+
+def stripes() -> np.ndarray:
+    """Plenty of foreground that nobody fits."""
+    silhouette = NOBODY.copy()
+    silhouette[:, ::5] = 255
+    return silhouette
+
+
+def waving(count: int) -> list[np.ndarray]:
+    return [seen(wave(i / 15.0)) for i in range(count)]
+
+
+def make(config: TrackerConfig | None = None, seed: int = 0, **rest: Any) -> Tracker:
+    return Tracker(BODY, CAMERA, config or paper_preset(), np.random.default_rng(seed), **rest)
+
+
+def assert_same(first: Estimate, second: Estimate) -> None:
+    assert (first.state, first.cost_px, first.iou) == (second.state, second.cost_px, second.iou)
+    for name in ("posture", "posture_stddev", "keypoints_m"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
+def test_an_estimate_says_where_it_is_and_how_well_it_fits(make_config: Any) -> None:
+    tracker = make(make_config())
+    reference = ReferenceCost(BODY, CAMERA)
+    for silhouette in waving(20):
+        estimate = tracker.track(silhouette)
+        assert estimate.state == TRACKING
+        posture = estimate.posture
+        assert np.all((posture >= JOINT_LIMITS[:, 0]) & (posture <= JOINT_LIMITS[:, 1]))
+        expected = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
+        np.testing.assert_allclose(estimate.keypoints_m, expected, atol=1e-9)
+        reference.observe(silhouette)
+        cost_px, iou = reference.overlap(posture)
+        assert estimate.cost_px == cost_px
+        assert estimate.iou == pytest.approx(iou)
+        assert estimate.iou > 0.7
+        assert estimate.posture_stddev.shape == (12,)
+        assert np.all(estimate.posture_stddev > 0)
+
+
+@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
+def test_the_seed_decides_every_number(make_config: Any) -> None:
+    silhouettes = waving(6)
+
+    def run(seed: int) -> list[Estimate]:
+        tracker = make(make_config(), seed)
+        return [tracker.track(silhouette) for silhouette in silhouettes]
+
+    for first, second in zip(run(5), run(5), strict=True):
+        assert_same(first, second)
+    assert not np.array_equal(run(5)[-1].posture, run(6)[-1].posture)
+
+
+def test_without_a_generator_runs_repeat_themselves() -> None:
+    runs = [Tracker(BODY, CAMERA).track(seen(front())) for _ in range(2)]
+    assert_same(*runs)
+
+
+def test_the_reference_cost_gives_the_same_estimates() -> None:
+    config = default_preset().with_particles(8)
+    compiled = make(config, 1, cost=CompiledCost(BODY, CAMERA))
+    reference = make(config, 1, cost=ReferenceCost(BODY, CAMERA))
+    for silhouette in waving(2):
+        assert_same(compiled.track(silhouette), reference.track(silhouette))
+
+
+@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
+def test_before_an_empty_scene_there_is_no_person_and_no_number(make_config: Any) -> None:
+    tracker = make(make_config())
+    for silhouette in (NOBODY, seen(front()), NOBODY, NOBODY):
+        estimate = tracker.track(silhouette)
+        if silhouette is NOBODY:
+            assert estimate == Estimate(NO_PERSON, None, None, None, None, None)
+        else:
+            assert estimate.state == TRACKING
+
+
+def test_a_quarter_of_the_person_is_needed() -> None:
+    tracker = make()
+    whole = seen(front())[: tracker._cost.rows]
+    count = int(0.25 * np.count_nonzero(whole))
+    pixels = np.flatnonzero(whole)
+    few, enough = NOBODY.copy(), NOBODY.copy()
+    few.ravel()[pixels[: count - 1]] = 255
+    enough.ravel()[pixels[:count]] = 255
+    assert tracker.track(few).state == NO_PERSON
+    assert tracker.track(enough).state == TRACKING
+
+
+def test_what_is_below_the_hips_is_nobody() -> None:
+    tracker = make()
+    legs = NOBODY.copy()
+    legs[tracker._cost.rows :] = 255
+    assert tracker.track(legs).state == NO_PERSON
+
+
+def test_whom_nothing_fits_is_lost_after_as_many_pictures() -> None:
+    tracker = make(replace(paper_preset(), lost_frames=3))
+    tracker.track(seen(front()))
+    states = [tracker.track(stripes()).state for _ in range(5)]
+    assert states == [TRACKING, TRACKING, LOST, LOST, LOST]
+    assert tracker.track(stripes()) == Estimate(LOST, None, None, None, None, None)
+
+
+def test_one_good_picture_begins_the_count_anew() -> None:
+    tracker = make(replace(STILL, lost_frames=2))
+    states = [
+        tracker.track(silhouette).state
+        for silhouette in (stripes(), seen(front()), stripes(), stripes(), seen(front()))
+    ]
+    assert states == [TRACKING, TRACKING, TRACKING, LOST, TRACKING]
+
+
+def test_the_fit_that_counts_as_lost_is_a_setting() -> None:
+    silhouette = seen(front())
+    silhouette[:, :80] = 0  # a fit of roughly a half
+    iou = make(STILL).track(silhouette).iou
+    assert 0.2 < iou < 0.8
+    for lost_iou, state in ((iou - 0.01, TRACKING), (iou + 0.01, LOST)):
+        tracker = make(replace(STILL, lost_iou=lost_iou, lost_frames=1))
+        assert tracker.track(silhouette).state == state
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("torso_y_m", [-0.45, 0.45])
+def test_whoever_comes_back_elsewhere_is_found(seed: int, torso_y_m: float) -> None:
+    tracker = make(default_preset(), seed)
+    tracker.track(seen(front()))
+    assert tracker.track(NOBODY).state == NO_PERSON
+    estimate = tracker.track(seen(front(torso_y_m)))
+    assert estimate.state == TRACKING
+    assert estimate.posture[0] == pytest.approx(torso_y_m, abs=0.05)
+    assert estimate.iou > 0.75
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whoever_was_lost_is_found(seed: int) -> None:
+    tracker = make(default_preset(), seed)
+    tracker.track(seen(front()))
+    states = [tracker.track(stripes()).state for _ in range(5)]
+    assert states[-1] == LOST
+    estimate = tracker.track(seen(front(0.4)))
+    assert estimate.state == TRACKING
+    assert estimate.posture[0] == pytest.approx(0.4, abs=0.05)
+
+
+def test_the_papers_tracker_goes_on_from_where_the_person_was() -> None:
+    """It knows no new search: one picture moves it by its noise of 2 cm and no further."""
+    tracker = make(paper_preset())
+    tracker.track(seen(front()))
+    tracker.track(NOBODY)
+    estimate = tracker.track(seen(front(0.45)))
+    assert abs(estimate.posture[0]) < 0.2
+
+
+def test_reset_begins_from_the_front_reference() -> None:
+    body = replace(BODY, lateral_m=0.1)
+    tracker = Tracker(body, CAMERA, STILL)
+    start = reference_posture("front")
+    start[0] = 0.1
+    raised = start.copy()
+    raised[4] = raised[8] = 1.2
+    # Without noise the first particle is all there is.
+    np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
+    tracker._filter.scatter(raised)
+    np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, raised)
+    tracker.reset()
+    np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
+
+
+def test_reset_forgets_the_pictures_that_did_not_fit() -> None:
+    tracker = make(replace(STILL, lost_frames=2))
+    states = [tracker.track(stripes()).state]
+    tracker.reset()
+    states += [tracker.track(stripes()).state for _ in range(2)]
+    assert states == [TRACKING, TRACKING, LOST]
+
+
+def test_the_camera_is_pitched_as_the_body_model_says() -> None:
+    body = replace(BODY, camera_pitch_rad=0.15)
+    estimate = Tracker(body, CAMERA, STILL).track(seen(front(), body))
+    assert estimate.cost_px == 0
+    assert estimate.iou == 1.0
+
+
+@pytest.mark.parametrize("shape", [(120, 161), (160, 120), (240, 320)])
+def test_a_silhouette_of_another_size_is_refused(shape: tuple[int, int]) -> None:
+    tracker = make()
+    with pytest.raises(ValueError, match=r"silhouette has shape .* camera's is \(120, 160\)"):
+        tracker.track(np.zeros(shape, np.uint8))
+    # It changes nothing for the next one.
+    assert_same(tracker.track(seen(front())), make().track(seen(front())))
+
+
+def test_a_read_only_silhouette_is_taken() -> None:
+    silhouette = seen(front())
+    silhouette.setflags(write=False)
+    assert make().track(silhouette).state == TRACKING
+
+
+class CountingCost(CompiledCost):
+    """How often torsos were rated, and where they were."""
+
+    def __init__(self) -> None:
+        super().__init__(BODY, CAMERA)
+        self.torsos: list[np.ndarray] = []
+
+    def torso(self, torso_postures: np.ndarray) -> np.ndarray:
+        if len(torso_postures) > 1:  # the first is the compiler's
+            self.torsos.append(torso_postures.copy())
+        return super().torso(torso_postures)
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_a_picture_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
+    config = replace(paper_preset(), cycles=cycles, noise_decay=0.1).with_particles(2000)
+    # One survivor, so that particles lie around it by the noise of one cycle.
+    config = replace(config, torso=replace(config.torso, survival_rate=1e-9))
+    cost = CountingCost()
+    tracker = make(config, cost=cost)
+    tracker.track(seen(front()))
+    assert len(cost.torsos) == 1
+    cost.torsos.clear()
+    tracker.track(seen(front()))
+    assert len(cost.torsos) == cycles
+    for cycle, torsos in enumerate(cost.torsos):
+        np.testing.assert_allclose(
+            torsos.std(axis=0), np.array([0.02, 0.1, 0.1, 0.1]) * 0.1**cycle, rtol=0.1
+        )
+
+
+def test_the_mean_of_the_best_is_steadier_than_the_best() -> None:
+    """The standard deviation over ten seeds of the torso's angles, of one still person."""
+    # A rounded body, which no posture of the model fits exactly.
+    person = Renderer(CAMERA, Scene(), np.random.default_rng(0)).silhouette(BODY, front())
+
+    def spread(average: int) -> float:
+        config = replace(paper_preset(), average=average)
+        found = []
+        for seed in range(10):
+            tracker = make(config, seed)
+            found.append([tracker.track(person).posture[TORSO] for _ in range(6)][-1])
+        return float(np.std(found, axis=0)[1:].sum())
+
+    assert spread(20) < spread(1)
