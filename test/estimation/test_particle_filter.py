@@ -194,8 +194,8 @@ def test_the_mean_by_hand(count: int, expected: float, spread_scale: float) -> N
 def test_the_standard_deviation_by_hand() -> None:
     half = SPREAD_PX * np.log(2.0)
     costs = 500.0 + np.array([1e6, half, 0.0, 1e6])
-    filters = with_particles(np.array([99.0, 1, 0, -99]), costs, survival_rate=0.5)
-    # Two survivors at 0 and 1 that weigh 2/3 and 1/3: variance 2/9 around their mean of 1/3.
+    filters = with_particles(np.array([99.0, 1, 0, -99]), costs)
+    # Those at 0 and 1 weigh 2/3 and 1/3: variance 2/9 around their mean of 1/3.
     mean = filters.mean(2)
     assert mean[0] == pytest.approx(1 / 3)
     assert filters.stddev(mean)[0] == pytest.approx(np.sqrt(2 / 9))
@@ -204,9 +204,11 @@ def test_the_standard_deviation_by_hand() -> None:
     assert filters.particles[:, 0].tolist() == [99, 1, 0, -99]
 
 
-def test_two_particles_at_least_make_a_standard_deviation() -> None:
-    filters = with_particles(np.array([0.0, 2, 50]), np.array([10.0, 10, 1e6]), survival_rate=1e-9)
-    assert filters.stddev(np.array([1.0]))[0] == pytest.approx(1.0)
+def test_a_larger_picture_spreads_the_weights_of_the_standard_deviation() -> None:
+    half = 4.0 * SPREAD_PX * np.log(2.0)
+    filters = with_particles(np.array([0.0, 1, 4]), 500.0 + np.array([0.0, half, 2 * half]))
+    # Weights 4/7, 2/7 and 1/7 around 0.
+    assert filters.stddev(np.zeros(1), 4.0)[0] == pytest.approx(np.sqrt(2 / 7 + 16 / 7))
 
 
 @pytest.mark.parametrize("count", [2, 50])
