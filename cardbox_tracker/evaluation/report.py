@@ -89,11 +89,13 @@ def _verdicts(
     results: Mapping[str, Any], curves: Curves, timing: Mapping[str, Any]
 ) -> Iterator[str]:
     yield from ("## Which claims of the paper hold here", "")
+    told: set[str] = set()
     for claim in claims(results, curves, timing):
         yield f"- **{'Holds' if claim.holds else 'Does not hold'}**: {claim.text}"
         yield f"  {_sentence(claim.evidence)}"
         if not claim.holds and claim.why:
-            yield f"  *Why:* {claim.why}"
+            yield f"  *Why:* {'as said above.' if claim.why in told else claim.why}"
+            told.add(claim.why)
     yield ""
 
 

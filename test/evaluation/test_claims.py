@@ -22,6 +22,7 @@ def strategy(cost_px: float, error_m: float, std_rad: float) -> dict[str, Any]:
         "error_m": errors,
         "std_dof": dict.fromkeys(JOINT_NAMES, std_rad),
         "mpjpe_m": error_m,
+        "stderr_mpjpe_m": 0.001,
         "axis_error_m": {"lateral": 0.0, "vertical": 0.0, "depth": error_m},
     }
 
@@ -109,6 +110,15 @@ def test_one_larger_deviation_is_named() -> None:
     assert "wave 12 of 12; bow 11 of 12" in claim.evidence
     assert "bow torso pitch (0.200 against 0.200)" in claim.evidence
     assert claim.why
+
+
+def test_bowing_may_be_worse_by_chance_only() -> None:
+    results, curves, timing = all_true()
+    results["bow"]["drs"]["mpjpe_m"] = 0.102
+    assert failing(results, curves, timing) == []
+    results["bow"]["drs"]["mpjpe_m"] = 0.104
+    (claim,) = failing(results, curves, timing)
+    assert "wave 10.0 ± 0.1 cm; bow 10.4 ± 0.1 cm" in claim.evidence
 
 
 def test_survival_rate_must_be_worse_at_both_ends_by_more_than_chance() -> None:
