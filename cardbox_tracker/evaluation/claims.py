@@ -165,7 +165,7 @@ def _hands_are_worst(results: Mapping[str, Any]) -> Claim:
 
     motions = motions_in(results)
     rows = {m: [mean(m, joint) for joint in ("shoulder", "elbow", "hand")] for m in motions}
-    same = "not quite" if "session" in results else "just"
+    same = "not quite" if "session" in results else "exactly"
     return Claim(
         "Hands are tracked worse than elbows and shoulders (DRS). The paper blames the different "
         f"hands of the two body models; here model and truth mean {same} the same point.",

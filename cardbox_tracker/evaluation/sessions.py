@@ -32,7 +32,7 @@ from cardbox_tracker.vision.camera import Camera
 FloatArray = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
-SEQUENCE_LENGTH = 6
+SEQUENCE_LENGTH = 7
 """So many pictures of each motion are kept for the image sequences."""
 
 _NOT_MOTIONS = ("empty", "enter", "front", "side", "arms", "transition", "neutral")
