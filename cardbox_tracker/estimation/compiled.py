@@ -149,6 +149,18 @@ class CompiledCost:
         )
         return costs
 
+    def polygons(self, corners_m: FloatArray) -> CostArray:
+        """Costs (N,) of any planar quadrilaterals (N, K, 4, 3), metres in the optical frame."""
+        costs = np.empty(len(corners_m), np.int64)
+        kernels.polygon_costs(
+            np.ascontiguousarray(corners_m, dtype=np.float64),
+            self._view,
+            self._table,
+            self.silhouette_px,
+            costs,
+        )
+        return costs
+
     def _full(self, postures: FloatArray) -> tuple[CostArray, CostArray]:
         contiguous = np.ascontiguousarray(postures, dtype=np.float64)
         costs = np.empty(len(contiguous), np.int64)

@@ -1,0 +1,317 @@
+"""How long the estimation takes: whole frames, their stages, and ratios taken in the same run.
+
+All of it runs in one process that is pinned to one core, but for what says otherwise. Whatever is
+compared takes turns picture by picture, so that a busy machine is unfair to nobody.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.posture import N_JOINTS, clip_to_limits, reference_posture
+from cardbox_tracker.body.volumetric import volumetric_faces
+from cardbox_tracker.estimation.compiled import CompiledCost
+from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
+from cardbox_tracker.estimation.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.particle_filter import ParticleFilter
+from cardbox_tracker.estimation.resampling import deterministic
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.benchmark_scene import BenchmarkScene, make_scene
+from cardbox_tracker.evaluation.models import make_cost
+from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
+
+RESOLUTIONS = ((160, 120), (320, 240), (640, 480), (1280, 960))
+PARTICLES = (60, 300, 600, 3000, 6000, 12_000, 20_001, 30_000, 60_000)
+FRAME_30HZ_MS = 1000.0 / 30.0
+
+_WARM_UP = 5
+_MOST_S = 3.0
+
+Times = NDArray[np.float64]
+
+
+@contextmanager
+def pinned(cores: int) -> Iterator[int]:
+    """Keep this thread, and those it starts, on the first ``cores`` cores; yields how many."""
+    before = os.sched_getaffinity(0)
+    chosen = sorted(before)[:cores]
+    os.sched_setaffinity(0, chosen)
+    try:
+        yield len(chosen)
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def summary(milliseconds: Times | list[float]) -> dict[str, float]:
+    """Return median and 95th percentile."""
+    return {
+        "median_ms": float(np.median(milliseconds)),
+        "p95_ms": float(np.percentile(milliseconds, 95)),
+    }
+
+
+def one_core(config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with the arms one after the other."""
+    return replace(config, parallel_arms=False)
+
+
+def frame_times_ms(
+    scene: BenchmarkScene, trackers: dict[str, Callable[[int], object]]
+) -> dict[str, Times]:
+    """Let each of ``trackers`` do picture after picture, in turns; milliseconds of each, (n,).
+
+    The first pictures, which warm the caches up, do not count.
+    """
+    times: dict[str, list[float]] = {name: [] for name in trackers}
+    for i in range(len(scene.silhouettes)):
+        for name, track in trackers.items():
+            start = time.perf_counter()
+            track(i)
+            times[name].append(1e3 * (time.perf_counter() - start))
+    return {name: np.array(values[_WARM_UP:]) for name, values in times.items()}
+
+
+def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
+    """Measure a whole frame: with the paper's settings, with OpenCV's cost, with the default ones.
+
+    ``picture_to_posture`` also cuts the silhouette out of the picture.
+    """
+    extractor = extractor_of(scene)
+
+    def follow(config: TrackerConfig, cost: str) -> Callable[[int], object]:
+        made = make_cost(cost, scene.body, scene.camera)
+        tracker = Tracker(scene.body, scene.camera, config, cost=made)
+        return lambda i: tracker.track(scene.silhouettes[i])
+
+    paper = one_core(paper_preset())
+    whole = Tracker(scene.body, scene.camera, paper)
+    times = frame_times_ms(
+        scene,
+        {
+            "paper": follow(paper, "compiled"),
+            "opencv": follow(paper, "cardbox"),
+            "default": follow(one_core(default_preset()), "compiled"),
+            "picture_to_posture": lambda i: whole.track(extractor(scene.pictures[i])),
+        },
+    )
+    ratios = times["opencv"] / times["paper"]
+    return {
+        "frames": {name: summary(values) for name, values in times.items()},
+        "ratio_opencv": float(np.median(ratios)),
+    }
+
+
+def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
+    """Compare both arms at the same time with one after the other, on two cores."""
+    with pinned(2) as cores:
+        alone = Tracker(scene.body, scene.camera, one_core(paper_preset()))
+        together = Tracker(scene.body, scene.camera, paper_preset())
+        times = frame_times_ms(
+            scene,
+            {
+                "one after the other": lambda i: alone.track(scene.silhouettes[i]),
+                "parallel": lambda i: together.track(scene.silhouettes[i]),
+            },
+        )
+    return {"cores": cores, **{name: summary(values) for name, values in times.items()}}
+
+
+def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
+    """Measure the steps of a frame one by one, on the particles of a tracker at work."""
+    extractor = extractor_of(scene)
+    paper = one_core(paper_preset())
+    cost = CompiledCost(scene.body, scene.camera)
+    probe = CompiledCost(scene.body, scene.camera)
+    filters = _Filters(paper, scene, cost)
+    times: dict[str, list[float]] = {}
+
+    def timed(name: str, work: Callable[[], object]) -> None:
+        start = time.perf_counter()
+        work()
+        times.setdefault(name, []).append(1e3 * (time.perf_counter() - start))
+
+    for picture, silhouette in zip(scene.pictures, scene.silhouettes, strict=True):
+        posture = filters.track(silhouette)
+        torso, left, right = filters.all
+        timed("silhouette from the picture", lambda p=picture: extractor(p))
+        timed("running sums of the silhouette", lambda s=silhouette: probe.observe(s))
+        timed("arms of the last frame taken out", lambda d=posture: probe.fix_arms(d))
+        timed("cost of 200 torsos", lambda f=torso: probe.torso(f.particles))
+        timed("torso taken out", lambda d=posture: probe.fix_torso(d[:4]))
+        timed("cost of 200 left arms", lambda f=left: probe.arm("left", f.particles))
+        timed("cost of 200 right arms", lambda f=right: probe.arm("right", f.particles))
+        timed("resampling, three filters", lambda: [_resample(f) for f in filters.all])
+        timed("noise, three filters", lambda: [_draw(f) for f in filters.all])
+        timed(
+            "standard deviations, three filters",
+            lambda d=posture: [
+                f.stddev(part) for f, part in zip(filters.all, np.split(d, 3), strict=True)
+            ],
+        )
+    return {name: summary(values[_WARM_UP:]) for name, values in times.items()}
+
+
+def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:
+    """Return how many times longer the box model takes than the cardbox, by equal compiled tools.
+
+    The corners are made beforehand: what counts is drawing 42 planes against 15.
+    """
+    rng = np.random.default_rng(0)
+    front = reference_posture("front")
+    postures = clip_to_limits(front + rng.normal(0.0, 0.25, (particles, N_JOINTS)))
+    corners = {
+        name: np.ascontiguousarray(scene.camera.reference_to_optical(make(scene.body, postures)))
+        for name, make in (("cardbox", cardbox_patches), ("volumetric", volumetric_faces))
+    }
+    cost = CompiledCost(scene.body, scene.camera)
+    cost.observe(scene.silhouettes[0])
+    ratios = []
+    for turn in range(rounds + 1):
+        seconds = {}
+        for name, planes in corners.items():
+            start = time.perf_counter()
+            cost.polygons(planes)
+            seconds[name] = time.perf_counter() - start
+        if turn > 0:
+            ratios.append(seconds["volumetric"] / seconds["cardbox"])
+    return float(np.median(ratios))
+
+
+def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, float]]:
+    """Measure a whole frame at several resolutions, by turns."""
+    trackers = [Tracker(s.body, s.camera, one_core(paper_preset())) for s in scenes]
+    times = frame_times_ms(
+        min(scenes, key=lambda s: len(s.silhouettes)),
+        {
+            f"{s.camera.width}x{s.camera.height}": lambda i, t=t, s=s: t.track(s.silhouettes[i])  # type: ignore[misc]
+            for s, t in zip(scenes, trackers, strict=True)
+        },
+    )
+    return {name: summary(values) for name, values in times.items()}
+
+
+def measure_particles(
+    scene: BenchmarkScene, counts: tuple[int, ...] = PARTICLES
+) -> dict[str, dict[str, float]]:
+    """Measure a frame on one core and on two for several numbers of particles in all filters."""
+    result: dict[str, dict[str, float]] = {}
+    for cores, config in ((1, one_core(paper_preset())), (2, paper_preset())):
+        with pinned(cores):
+            for count in counts:
+                settings = config.with_particles(count // 3)
+                tracker = Tracker(scene.body, scene.camera, settings)
+                times: list[float] = []
+                for silhouette in scene.silhouettes:
+                    start = time.perf_counter()
+                    tracker.track(silhouette)
+                    times.append(1e3 * (time.perf_counter() - start))
+                    if len(times) > 2 * _WARM_UP and sum(times) > 1e3 * _MOST_S:
+                        break
+                entry = result.setdefault(str(3 * (count // 3)), {})
+                entry[f"cores_{cores}_ms"] = float(np.median(times[_WARM_UP:]))
+    return result
+
+
+def particles_at_30hz(particles: dict[str, dict[str, float]]) -> int:
+    """Return how many particles two cores do in a thirtieth of a second, between those measured."""
+    counts = np.array([float(count) for count in particles])
+    times = np.array([entry["cores_2_ms"] for entry in particles.values()])
+    times = np.maximum.accumulate(times)
+    if times[0] > FRAME_30HZ_MS:
+        return 0
+    return int(np.interp(FRAME_30HZ_MS, times, counts))
+
+
+def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
+    """Return what cuts the person out, with the scene's background learned."""
+    learner = BackgroundLearner()
+    for picture in scene.empty:
+        learner.add(picture)
+    return SilhouetteExtractor(learner.model())
+
+
+def rss_mb() -> float:
+    """Return the memory that this process holds, in MB; not a number where the system hides it."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return float("nan")
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]:
+    """Measure all that needs no ROS; ``report`` is told the finished fraction."""
+    with pinned(1):
+        scene = make_scene(320, 240, frames)
+        results = measure_frames(scene)
+        memory = rss_mb()
+        report(0.3)
+        stages = measure_stages(scene)
+        volumetric = measure_models(scene)
+        report(0.4)
+        scenes = [make_scene(w, h, max(2 * _WARM_UP, frames // 3), 2) for w, h in RESOLUTIONS]
+        resolutions = measure_resolutions(scenes)
+        report(0.7)
+    parallel = measure_parallel(scene)
+    particles = measure_particles(scene)
+    report(1.0)
+    frame = results["frames"]["paper"]
+    double = resolutions["640x480"]["median_ms"] / resolutions["320x240"]["median_ms"]
+    return {
+        "frame_ms_median": frame["median_ms"],
+        "frame_ms_p95": frame["p95_ms"],
+        "ratio_opencv": results["ratio_opencv"],
+        "ratio_volumetric": volumetric,
+        "ratio_double_resolution": double,
+        "particles_at_30hz": particles_at_30hz(particles),
+        "rss_mb": memory,
+        "frames": results["frames"],
+        "stages": stages,
+        "parallel_arms": parallel,
+        "resolutions": resolutions,
+        "particles": particles,
+    }
+
+
+class _Filters:
+    """A tracker whose filters can be looked at."""
+
+    def __init__(self, config: TrackerConfig, scene: BenchmarkScene, cost: CompiledCost) -> None:
+        self._cost = cost
+        area = scene.camera.width * scene.camera.height
+        self._filter = HierarchicalFilter(cost, config, area, np.random.default_rng(0))
+        self._started = False
+
+    @property
+    def all(self) -> list[ParticleFilter]:
+        """Torso, left arm, right arm."""
+        return [self._filter.torso, *self._filter.arms.values()]
+
+    def track(self, silhouette: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Return the posture (12,) of the next silhouette."""
+        self._cost.observe(silhouette)
+        if self._started:
+            return self._filter.cycle()
+        self._started = True
+        return self._filter.scatter(reference_posture("front"))
+
+
+def _resample(of: ParticleFilter) -> object:
+    return deterministic(of.costs, of.config.survival_rate, 1.0, _NOISE)
+
+
+def _draw(of: ParticleFilter) -> object:
+    return _NOISE.standard_normal(of.particles.shape)
+
+
+_NOISE = np.random.default_rng(0)
