@@ -1,14 +1,15 @@
-"""Draw the model over a picture: outline, skeleton, and how well it fits."""
+"""Draw the model over a picture: parts, outline, skeleton, and how well it fits."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
@@ -17,12 +18,18 @@ from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near
 
 Picture = NDArray[np.uint8]
 
-OUTLINE_BGR = (60, 200, 60)
+OUTLINE_BGR = (60, 220, 60)
 SKELETON_BGR = (0, 140, 255)
 JOINT_BGR = (255, 255, 255)
 TEXT_BGR = (255, 255, 255)
+# The colours of the markers and of the URDF: torso, left, right.
+_PART_BGR = {"left": (102, 179, 51), "right": (51, 115, 217)}
+_TORSO_BGR = (191, 115, 64)
+_FILL = 0.4
+_STATE_BGR = {"tracking": (120, 255, 120), "lost": (90, 110, 255)}
 
 _SHIFT = 4
+OUTLINE_SHIFT = 1
 
 
 class Drawable(Protocol):
@@ -60,55 +67,59 @@ def draw_overlay(
     Returns:
         (scale H, scale W, 3) bgr.
     """
-    height, width = picture.shape[:2]
-    size = (scale * width, scale * height)
-    resized = cv2.resize(_bgr(picture), size, interpolation=cv2.INTER_LINEAR)
-    canvas = np.asarray(resized, dtype=np.uint8)
+    canvas = enlarged(picture, scale)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
-        view = camera.scaled(*size)
-        draw_model(canvas, body, view, estimate.posture)
+        draw_model(canvas, body, camera.scaled(*canvas.shape[1::-1]), estimate.posture)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
-    draw_text(canvas, text)
+    draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
 
 
 def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
-    """Draw outline and skeleton of ``posture`` (12,) into ``canvas`` (H, W, 3), in place."""
-    model = np.zeros(canvas.shape[:2], np.uint8)
-    for corners in camera.reference_to_optical(cardbox_patches(body, posture)):
-        polygon = clip_near(corners)
-        if len(polygon) > 2:
-            pixels = _subpixels(camera.project(polygon))
-            cv2.fillConvexPoly(model, pixels, 255, cv2.LINE_8, _SHIFT)
-    outlines, _ = cv2.findContours(model, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
+
+    Tinted patches by side, the outline of them all, and the skeleton.
+    """
+    tint = canvas.copy()
+    # The torso first: an arm before it stays visible.
+    parts = sorted(_polygons(body, camera, posture), key=lambda part: part[0] in _PART_BGR)
+    for name, polygon in parts:
+        colour = _PART_BGR.get(name, _TORSO_BGR)
+        cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
+    cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
     thickness = max(1, round(camera.width / 400))
-    cv2.drawContours(canvas, outlines, -1, OUTLINE_BGR, thickness, cv2.LINE_AA)
+    outlines = outlines_of(body, camera, posture)
+    cv2.polylines(canvas, outlines, True, OUTLINE_BGR, thickness, cv2.LINE_AA, OUTLINE_SHIFT)
+    _draw_skeleton(canvas, body, camera, posture, thickness)
+
+
+def _draw_skeleton(
+    canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray, thickness: int
+) -> None:
     frames = forward_kinematics(body, posture)
     chains = [
         [frames.hip, frames.neck, frames.head],
         [frames.neck, *frames.left[:3]],
         [frames.neck, *frames.right[:3]],
     ]
+    joints = []
     for chain in chains:
         points = camera.reference_to_optical(np.array(chain))
         if np.any(points[:, 2] < NEAR_PLANE_M):
             continue
         pixels = _subpixels(camera.project(points))
         cv2.polylines(canvas, [pixels], False, SKELETON_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)
-        for pixel in pixels:
-            cv2.circle(
-                canvas,
-                (int(pixel[0]), int(pixel[1])),
-                (thickness + 1) << _SHIFT,
-                JOINT_BGR,
-                -1,
-                cv2.LINE_AA,
-                _SHIFT,
-            )
+        joints.extend(pixels.tolist())
+    for colour, rim in (((0, 0, 0), 1), (JOINT_BGR, 0)):
+        radius = (thickness + 1 + rim) << _SHIFT
+        for joint in joints:
+            cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
 
 
-def draw_text(canvas: Picture, text: str, line: int = 0) -> None:
+def draw_text(
+    canvas: Picture, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
+) -> None:
     """Write ``text`` into the upper left corner of ``canvas``, in place; ``line`` counts down."""
     scale = canvas.shape[1] / 700
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
@@ -120,7 +131,38 @@ def draw_text(canvas: Picture, text: str, line: int = 0) -> None:
     cv2.rectangle(
         canvas, (left - margin // 2, bottom - height - margin // 2), corner, (0, 0, 0), -1
     )
-    cv2.putText(canvas, text, (left, bottom), font, size, TEXT_BGR, thickness, cv2.LINE_AA)
+    cv2.putText(canvas, text, (left, bottom), font, size, colour, thickness, cv2.LINE_AA)
+
+
+def _polygons(
+    body: BodyModel, camera: Camera, posture: FloatArray
+) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
+    patches = camera.reference_to_optical(cardbox_patches(body, posture))
+    for name, corners in zip(PATCH_NAMES, patches, strict=True):
+        polygon = clip_near(corners)
+        if len(polygon) > 2:
+            yield name.split("_")[0], camera.project(polygon)
+
+
+def outlines_of(body: BodyModel, camera: Camera, posture: FloatArray) -> list[NDArray[np.int32]]:
+    """Return the outlines of all patches together, px with ``OUTLINE_SHIFT`` fractional bits."""
+    fine = camera.scaled(*(size << OUTLINE_SHIFT for size in (camera.width, camera.height)))
+    model = np.zeros((fine.height, fine.width), np.uint8)
+    for _, polygon in _polygons(body, fine, posture):
+        cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
+    # A patch seen edge-on is a whisker, which tells nothing of where the part ends.
+    whisker = max(3, fine.width // 128)
+    opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
+    found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return [np.asarray(cv2.approxPolyDP(outline, 1.0, True), np.int32) for outline in found]
+
+
+def enlarged(picture: Picture, scale: int) -> Picture:
+    """Return a copy of (H, W) or (H, W, 3) as (scale H, scale W, 3), bgr."""
+    height, width = picture.shape[:2]
+    size = (scale * width, scale * height)
+    return np.array(cv2.resize(_bgr(picture), size, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
