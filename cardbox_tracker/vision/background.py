@@ -190,7 +190,12 @@ def _drop_small(picture: Picture, area_px: float) -> Picture:
     """Blacken the connected white regions of fewer than ``area_px`` pixels."""
     if area_px <= 1:
         return picture
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(picture, connectivity=4)
-    keep = np.zeros(count, np.uint8)
-    keep[1:] = np.where(stats[1:, cv2.CC_STAT_AREA] >= area_px, 255, 0)
-    return np.asarray(keep[labels], dtype=np.uint8)
+    # Two regions never touch, so there are fewer than half as many as pixels; short labels are
+    # faster, and so is counting them apart from OpenCV's statistics of boxes and centres.
+    short = picture.size < 2**17
+    labels = cv2.connectedComponents(
+        picture, connectivity=4, ltype=cv2.CV_16U if short else cv2.CV_32S
+    )[1]
+    keep = np.where(np.bincount(labels.ravel()) >= area_px, 255, 0).astype(np.uint8)
+    keep[0] = 0
+    return keep.take(labels)
