@@ -1,7 +1,7 @@
 """How long the estimation takes: whole frames, their stages, and ratios taken in the same run.
 
 All of it runs in one process that is pinned to one core, but for what says otherwise. Whatever is
-compared takes turns picture by picture, so that a busy machine is unfair to nobody.
+compared takes turns, a few pictures each, so that a busy machine is unfair to nobody.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ PARTICLES = (60, 300, 600, 3000, 6000, 12_000, 20_001, 30_000, 60_000)
 FRAME_30HZ_MS = 1000.0 / 30.0
 
 _WARM_UP = 5
+_TURN = 10
 _MOST_S = 3.0
 
 Times = NDArray[np.float64]
@@ -65,19 +66,31 @@ def one_core(config: TrackerConfig) -> TrackerConfig:
     return replace(config, parallel_arms=False)
 
 
+def follow(
+    scene: BenchmarkScene, config: TrackerConfig, cost: str = "compiled"
+) -> Callable[[int], object]:
+    """Return what tracks the ``i``-th silhouette of ``scene``, the arms one after the other."""
+    made = make_cost(cost, scene.body, scene.camera)
+    tracker = Tracker(scene.body, scene.camera, one_core(config), cost=made)
+    return lambda i: tracker.track(scene.silhouettes[i])
+
+
 def frame_times_ms(
     scene: BenchmarkScene, trackers: dict[str, Callable[[int], object]]
 ) -> dict[str, Times]:
-    """Let each of ``trackers`` do picture after picture, in turns; milliseconds of each, (n,).
+    """Let each of ``trackers`` do all pictures, in turns; milliseconds of each picture, (n,).
 
-    The first pictures, which warm the caches up, do not count.
+    The first pictures of a turn find the caches full of what others left there, as in no live
+    node; they count like all others, but for those before anything was compiled or allocated.
     """
     times: dict[str, list[float]] = {name: [] for name in trackers}
-    for i in range(len(scene.silhouettes)):
+    count = len(scene.silhouettes)
+    for first in range(0, count, _TURN):
         for name, track in trackers.items():
-            start = time.perf_counter()
-            track(i)
-            times[name].append(1e3 * (time.perf_counter() - start))
+            for i in range(first, min(first + _TURN, count)):
+                start = time.perf_counter()
+                track(i)
+                times[name].append(1e3 * (time.perf_counter() - start))
     return {name: np.array(values[_WARM_UP:]) for name, values in times.items()}
 
 
@@ -87,39 +100,30 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
     ``picture_to_posture`` also cuts the silhouette out of the picture.
     """
     extractor = extractor_of(scene)
-
-    def follow(config: TrackerConfig, cost: str) -> Callable[[int], object]:
-        made = make_cost(cost, scene.body, scene.camera)
-        tracker = Tracker(scene.body, scene.camera, config, cost=made)
-        return lambda i: tracker.track(scene.silhouettes[i])
-
-    paper = one_core(paper_preset())
-    whole = Tracker(scene.body, scene.camera, paper)
+    whole = Tracker(scene.body, scene.camera, one_core(paper_preset()))
     times = frame_times_ms(
         scene,
         {
-            "paper": follow(paper, "compiled"),
-            "opencv": follow(paper, "cardbox"),
-            "default": follow(one_core(default_preset()), "compiled"),
+            "paper": follow(scene, paper_preset()),
+            "opencv": follow(scene, paper_preset(), "cardbox"),
+            "default": follow(scene, default_preset()),
             "picture_to_posture": lambda i: whole.track(extractor(scene.pictures[i])),
         },
     )
-    ratios = times["opencv"] / times["paper"]
     return {
         "frames": {name: summary(values) for name, values in times.items()},
-        "ratio_opencv": float(np.median(ratios)),
+        "ratio_opencv": float(np.median(times["opencv"] / times["paper"])),
     }
 
 
 def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
     """Compare both arms at the same time with one after the other, on two cores."""
     with pinned(2) as cores:
-        alone = Tracker(scene.body, scene.camera, one_core(paper_preset()))
         together = Tracker(scene.body, scene.camera, paper_preset())
         times = frame_times_ms(
             scene,
             {
-                "one after the other": lambda i: alone.track(scene.silhouettes[i]),
+                "one after the other": follow(scene, paper_preset()),
                 "parallel": lambda i: together.track(scene.silhouettes[i]),
             },
         )
@@ -135,29 +139,24 @@ def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
     filters = _Filters(paper, scene, cost)
     times: dict[str, list[float]] = {}
 
-    def timed(name: str, work: Callable[[], object]) -> None:
+    def timed(name: str, work: Callable[..., object], *arguments: object) -> None:
         start = time.perf_counter()
-        work()
+        work(*arguments)
         times.setdefault(name, []).append(1e3 * (time.perf_counter() - start))
 
     for picture, silhouette in zip(scene.pictures, scene.silhouettes, strict=True):
         posture = filters.track(silhouette)
         torso, left, right = filters.all
-        timed("silhouette from the picture", lambda p=picture: extractor(p))
-        timed("running sums of the silhouette", lambda s=silhouette: probe.observe(s))
-        timed("arms of the last frame taken out", lambda d=posture: probe.fix_arms(d))
-        timed("cost of 200 torsos", lambda f=torso: probe.torso(f.particles))
-        timed("torso taken out", lambda d=posture: probe.fix_torso(d[:4]))
-        timed("cost of 200 left arms", lambda f=left: probe.arm("left", f.particles))
-        timed("cost of 200 right arms", lambda f=right: probe.arm("right", f.particles))
-        timed("resampling, three filters", lambda: [_resample(f) for f in filters.all])
-        timed("noise, three filters", lambda: [_draw(f) for f in filters.all])
-        timed(
-            "standard deviations, three filters",
-            lambda d=posture: [
-                f.stddev(part) for f, part in zip(filters.all, np.split(d, 3), strict=True)
-            ],
-        )
+        timed("silhouette from the picture", extractor, picture)
+        timed("running sums of the silhouette", probe.observe, silhouette)
+        timed("arms of the last frame taken out", probe.fix_arms, posture)
+        timed("cost of all torsos", probe.torso, torso.particles)
+        timed("torso taken out", probe.fix_torso, posture[:4])
+        timed("cost of all left arms", probe.arm, "left", left.particles)
+        timed("cost of all right arms", probe.arm, "right", right.particles)
+        timed("resampling of one filter", _resample, torso)
+        timed("noise of one filter", _NOISE.standard_normal, torso.particles.shape)
+        timed("standard deviations of one filter", torso.stddev, posture[:4])
     return {name: summary(values[_WARM_UP:]) for name, values in times.items()}
 
 
@@ -188,15 +187,9 @@ def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30
 
 
 def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, float]]:
-    """Measure a whole frame at several resolutions, by turns."""
-    trackers = [Tracker(s.body, s.camera, one_core(paper_preset())) for s in scenes]
-    times = frame_times_ms(
-        min(scenes, key=lambda s: len(s.silhouettes)),
-        {
-            f"{s.camera.width}x{s.camera.height}": lambda i, t=t, s=s: t.track(s.silhouettes[i])  # type: ignore[misc]
-            for s, t in zip(scenes, trackers, strict=True)
-        },
-    )
+    """Measure a whole frame at several resolutions, by turns; all with as many pictures."""
+    trackers = {f"{s.camera.width}x{s.camera.height}": follow(s, paper_preset()) for s in scenes}
+    times = frame_times_ms(scenes[0], trackers)
     return {name: summary(values) for name, values in times.items()}
 
 
@@ -308,10 +301,6 @@ class _Filters:
 
 def _resample(of: ParticleFilter) -> object:
     return deterministic(of.costs, of.config.survival_rate, 1.0, _NOISE)
-
-
-def _draw(of: ParticleFilter) -> object:
-    return _NOISE.standard_normal(of.particles.shape)
 
 
 _NOISE = np.random.default_rng(0)

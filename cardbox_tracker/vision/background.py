@@ -13,6 +13,7 @@ in twenty; the clean-up that follows is what makes a silhouette of it, and can b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -193,7 +194,7 @@ def _drop_small(picture: Picture, area_px: float) -> Picture:
     # Two regions never touch, so there are fewer than half as many as pixels; short labels are
     # faster, and so is counting them apart from OpenCV's statistics of boxes and centres.
     short = picture.size < 2**17
-    labels = cv2.connectedComponents(
+    labels: NDArray[Any] = cv2.connectedComponents(
         picture, connectivity=4, ltype=cv2.CV_16U if short else cv2.CV_32S
     )[1]
     keep = np.where(np.bincount(labels.ravel()) >= area_px, 255, 0).astype(np.uint8)
