@@ -11,10 +11,12 @@ from __future__ import annotations
 import hashlib
 import os
 import signal
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -139,11 +141,10 @@ class Parts:
                 advance(task.effort)
             return
         # A forked child of a process with threads may hang; a new interpreter does not.
-        pool = ProcessPoolExecutor(
-            min(jobs, len(order)), get_context("spawn"), initializer=_ignore_interrupt
-        )
+        pool = ProcessPoolExecutor(min(jobs, len(order)), get_context("spawn"))
         try:
-            efforts = {pool.submit(_perform, path, task): task.effort for path, task in order}
+            with _ignored_interrupts():
+                efforts = {pool.submit(_perform, path, task): task.effort for path, task in order}
             for future in as_completed(efforts):
                 future.result()
                 advance(efforts[future])
@@ -165,9 +166,20 @@ def _perform(path: Path, task: Task) -> None:
         np.savez_compressed(temporary, **stored)
 
 
-def _ignore_interrupt() -> None:
-    """Let the parent alone react to Ctrl-C; what a child is at, it finishes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _ignored_interrupts() -> Iterator[None]:
+    """Processes started meanwhile never see Ctrl-C: what a child is at, it finishes.
+
+    The parent alone reacts to it, when it does again.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def default_jobs() -> int:
