@@ -43,78 +43,203 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the command and all its subcommands."""
     parser = argparse.ArgumentParser(
-        prog="cardbox", description="Upper-body posture of one person from silhouettes."
+        prog="cardbox",
+        formatter_class=_Formatter,
+        description="The 3D posture of one person's upper body, from the silhouettes that one\n"
+        "fixed camera sees. These commands work on recordings (rosbag2, sqlite3 or mcap);\n"
+        "live, use the nodes background, initializer, tracker, camera and play_bag.",
+        epilog="in this order, on a recording of your own or on a synthetic one:\n"
+        "  cardbox synthesize --motion wave --output session\n"
+        "  cardbox initialize session --background 0:3.9 --front 6.8:8.2 --side 9.8:11.2 \\\n"
+        "      --arms 12.8:14.2 --distance 2.0 --output person.yaml\n"
+        "  cardbox track session --model person.yaml --background 0:3.9 --start 15.6 \\\n"
+        "      --csv person.csv --video person.mp4\n"
+        "Times are seconds from the recording's start; 'cardbox COMMAND --help' explains each.",
     )
     parser.add_argument("--version", action="version", version=f"cardbox {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", title="commands"
+    )
 
     def command(name: str, run: object, text: str) -> argparse.ArgumentParser:
         added = commands.add_parser(
-            name,
-            help=text,
-            description=text,
-            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", formatter_class=_Formatter
         )
         added.set_defaults(run=run)
         return added
 
-    demo = command("demo", _demo, "Run the whole chain on a synthetic bag, through real nodes.")
-    demo.add_argument("--output", type=Path, default=Path("demo_output"), help="folder of results")
-    demo.add_argument("--preset", choices=PRESETS, default="paper", help="tracker settings")
-    demo.add_argument("--seed", type=_seed, default=0, help="seed of session and filters")
-
-    synthesize = command("synthesize", _synthesize, "Write a synthetic session with ground truth.")
-    synthesize.add_argument("--motion", default="all", help="wave, bend, bow or all")
-    synthesize.add_argument("--output", type=Path, required=True, help="bag to write")
-    synthesize.add_argument("--seed", type=_seed, default=0, help="seed of the noise")
-    synthesize.add_argument("--storage", choices=("mcap", "sqlite3"), default="mcap")
-    synthesize.add_argument("--compressed", action="store_true", help="write JPEG pictures")
-
-    initialize = command("initialize", _initialize, "Measure a person from a recording.")
-    _add_recording(initialize)
-    for name in ("front", "side", "arms"):
-        initialize.add_argument(
-            f"--{name}", type=_span, required=True, metavar="T0:T1", help="when it is held, s"
-        )
-    initialize.add_argument("--distance", type=float, required=True, help="to the person, m")
-    initialize.add_argument("--side-turn", choices=SIDE_TURNS, default="left")
-    initialize.add_argument(
-        "--camera-pitch-deg", type=float, default=0.0, help="positive when the camera looks down"
+    demo = command("demo", _demo, "run the whole chain on a synthetic recording, with real nodes")
+    demo.add_argument(
+        "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
     )
-    initialize.add_argument("--seed", type=_seed, default=0, help="seed of the hypotheses")
-    initialize.add_argument("--output", type=Path, required=True, help="body model to write")
+    _add_preset(demo, "paper")
+    demo.add_argument("--seed", type=_seed, default=0, help="of the recording and of the filters")
 
-    track = command("track", _track, "Follow the posture through a recording.")
+    synthesize = command("synthesize", _synthesize, "record a synthetic person, with ground truth")
+    synthesize.add_argument(
+        "--motion",
+        default="all",
+        help="what follows the reference postures: wave, bend, bow or all",
+    )
+    synthesize.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="BAG",
+        help="recording to write; must not exist",
+    )
+    synthesize.add_argument("--seed", type=_seed, default=0, help="of noise and sway")
+    synthesize.add_argument(
+        "--storage", choices=("mcap", "sqlite3"), default="mcap", help="format of the recording"
+    )
+    synthesize.add_argument(
+        "--compressed", action="store_true", help="write JPEG pictures instead of raw ones"
+    )
+
+    initialize = command("initialize", _initialize, "measure the person in a recording")
+    _add_recording(initialize)
+    for name, posture in (
+        ("front", "faces the camera, arms hanging 20 degrees away from the body"),
+        ("side", "stands the same, turned by 90 degrees"),
+        ("arms", "faces the camera, both arms stretched sideways"),
+    ):
+        initialize.add_argument(
+            f"--{name}",
+            type=_span,
+            required=True,
+            metavar="T0:T1",
+            help=f"seconds while the person {posture}",
+        )
+    initialize.add_argument(
+        "--distance",
+        type=float,
+        required=True,
+        metavar="M",
+        help="from the camera to the person, metres along the floor; all sizes are proportional "
+        "to it",
+    )
+    initialize.add_argument(
+        "--side-turn",
+        choices=SIDE_TURNS,
+        default="left",
+        help="which way the person turns for --side, as they see it",
+    )
+    initialize.add_argument(
+        "--camera-pitch-deg",
+        type=float,
+        default=0.0,
+        metavar="P",
+        help="positive when the camera looks down",
+    )
+    initialize.add_argument("--seed", type=_seed, default=0, help="of the hypotheses")
+    initialize.add_argument(
+        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
+    )
+
+    track = command("track", _track, "follow the posture through a recording")
     _add_recording(track)
-    track.add_argument("--model", type=Path, required=True, help="body model of the person")
-    track.add_argument("--start", type=_time, required=True, help="front posture held, s")
-    track.add_argument("--csv", type=Path, required=True, help="table to write")
-    track.add_argument("--preset", choices=PRESETS, default="default", help="tracker settings")
-    track.add_argument("--strategy", choices=STRATEGIES, default="drs", help="resampling")
-    track.add_argument("--particles", type=_count, default=None, help="N of each filter")
-    track.add_argument("--bag", type=Path, default=None, help="bag of results to write")
-    track.add_argument("--video", type=Path, default=None, help="overlay video to write, .mp4")
-    track.add_argument("--seed", type=_seed, default=0, help="seed of the filters")
+    track.add_argument(
+        "--model",
+        type=Path,
+        required=True,
+        metavar="MODEL.yaml",
+        help="the person, from 'cardbox initialize' or the node initializer",
+    )
+    track.add_argument(
+        "--start",
+        type=_time,
+        required=True,
+        metavar="T",
+        help="second at which the person stands as for --front; tracking starts there",
+    )
+    track.add_argument(
+        "--csv", type=Path, required=True, metavar="OUT.csv", help="table to write, a row a picture"
+    )
+    _add_preset(track, "default")
+    track.add_argument(
+        "--strategy",
+        choices=STRATEGIES,
+        default="drs",
+        help="resampling; drs is the paper's deterministic one",
+    )
+    track.add_argument(
+        "--particles",
+        type=_count,
+        default=None,
+        metavar="N",
+        help="particles of each of the three filters; without it, the preset's",
+    )
+    track.add_argument(
+        "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
+    )
+    track.add_argument(
+        "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
+    )
+    track.add_argument("--seed", type=_seed, default=0, help="of the filters")
 
-    evaluate = command("evaluate", _evaluate, "Repeat the paper's experiments; can be resumed.")
-    evaluate.add_argument("--runs", type=_runs, default=100, help="of each strategy and motion")
-    evaluate.add_argument("--output", type=Path, required=True, help="folder of results")
+    urdf = command("urdf", _urdf, "print the robot description (URDF) of a measured person")
+    urdf.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
+
+    screenshots = command("screenshots", _screenshots, "draw the pictures of the documents")
+    screenshots.add_argument(
+        "--output", type=Path, required=True, metavar="DIR", help="folder of the pictures"
+    )
+    screenshots.add_argument("--seed", type=_seed, default=0, help="of recording and filters")
+
+    evaluate = command(
+        "evaluate", _evaluate, "repeat the paper's experiments; goes on where it was interrupted"
+    )
+    evaluate.add_argument(
+        "--runs", type=_runs, default=100, metavar="N", help="runs of each strategy and motion"
+    )
+    evaluate.add_argument(
+        "--output", type=Path, required=True, metavar="DIR", help="folder of results"
+    )
     evaluate.add_argument("--quick", action="store_true", help="everything smaller, in two minutes")
     evaluate.add_argument(
-        "--session", type=Path, default=None, help="a recording with ground_truth.json instead"
+        "--session",
+        type=Path,
+        default=None,
+        metavar="DIR",
+        help="a recording with ground_truth.json instead of synthetic ones",
     )
-    evaluate.add_argument("--jobs", type=_jobs, default=None, help="processes; all cores without")
-    evaluate.add_argument("--seed", type=_seed, default=0, help="seed of sessions and filters")
-
-    urdf = command("urdf", _urdf, "Print the URDF of a measured person.")
-    urdf.add_argument("model", type=Path, help="body model")
+    evaluate.add_argument(
+        "--jobs", type=_jobs, default=None, metavar="N", help="processes; without it, all cores"
+    )
+    evaluate.add_argument("--seed", type=_seed, default=0, help="of recordings and filters")
     return parser
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Tells a default only where there is one."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26)
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        default = action.default
+        if action.help is None or default is None or default is False:
+            return action.help
+        return action.help if default == argparse.SUPPRESS else f"{action.help} (default: %(default)s)"
 
 
 def _add_recording(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="BAG", help="rosbag2 folder or file")
     parser.add_argument(
-        "--background", type=_span, required=True, metavar="T0:T1", help="empty scene, s"
+        "--background",
+        type=_span,
+        required=True,
+        metavar="T0:T1",
+        help="seconds while nobody is in the picture",
+    )
+
+
+def _add_preset(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--preset",
+        choices=PRESETS,
+        default=default,
+        help="tracker settings: the paper's Table I, or what tracks best",
     )
 
 
@@ -251,6 +376,15 @@ def _evaluate(options: argparse.Namespace) -> None:
         options.jobs or default_jobs(),
     )
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
+
+
+def _screenshots(options: argparse.Namespace) -> None:
+    from cardbox_tracker.demo.screenshots import write_screenshots
+
+    with progress_bar("screenshots") as show:
+        written = write_screenshots(options.output, options.seed, show)
+    for path in written:
+        print(f"wrote {path}")
 
 
 def _urdf(options: argparse.Namespace) -> None:

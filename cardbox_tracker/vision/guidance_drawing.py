@@ -61,7 +61,7 @@ def _draw_large(canvas: Picture, text: str, top: int) -> int:
     size = min(0.94 * width / max(plain_width, 1), height / 6 / (plain_height + below))
     thickness = max(1, round(1.6 * size))
     bottom = round(top + (plain_height + 0.8 * below) * size)
-    end = round(bottom + below * size)
+    end = int(bottom + below * size)
     canvas[top:end] //= 3
     left = (width - round(plain_width * size)) // 2
     cv2.putText(canvas, text, (left, bottom), font, size, TEXT_BGR, thickness, cv2.LINE_AA)
