@@ -218,9 +218,9 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default = action.default
-        if action.help is None or default is None or default is False:
+        if default is None or default is False or default == argparse.SUPPRESS:
             return action.help
-        return action.help if default == argparse.SUPPRESS else f"{action.help} (default: %(default)s)"
+        return f"{action.help} (default: %(default)s)"
 
 
 def _add_recording(parser: argparse.ArgumentParser) -> None:
