@@ -180,6 +180,11 @@ def build_parser() -> argparse.ArgumentParser:
     urdf = command("urdf", _urdf, "print the robot description (URDF) of a measured person")
     urdf.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
 
+    call = command(
+        "call", _call, "call a service of the running nodes, as 'ros2 service call' does"
+    )
+    call.add_argument("service", metavar="SERVICE", help="such as initializer/initialize")
+
     screenshots = command("screenshots", _screenshots, "draw the pictures of the documents")
     screenshots.add_argument(
         "--output", type=Path, required=True, metavar="DIR", help="folder of the pictures"
@@ -376,6 +381,17 @@ def _evaluate(options: argparse.Namespace) -> None:
         options.jobs or default_jobs(),
     )
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
+
+
+def _call(options: argparse.Namespace) -> None:
+    try:
+        from cardbox_tracker.ros.call import call_service
+    except ImportError as error:
+        raise CardboxError(
+            f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
+            "a ROS 2 Jazzy installation"
+        ) from None
+    print(call_service(options.service, lambda text: print(text, flush=True)))
 
 
 def _screenshots(options: argparse.Namespace) -> None:
