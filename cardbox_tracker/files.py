@@ -15,9 +15,11 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` with the same suffix; rename it when all went well.
 
     Raises:
-        CardboxError: the folder of ``path`` cannot be written.
+        CardboxError: the folder of ``path`` cannot be written, or ``path`` is a folder itself.
     """
     target = Path(path)
+    if target.is_dir():
+        raise CardboxError(f"cannot write {target}: it is a folder; give the name of a file")
     temporary = target.with_name(f".{target.stem}.{os.getpid()}{target.suffix}")
     try:
         temporary.touch()
