@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cardbox_tracker import __version__
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, save_body_model
 from cardbox_tracker.body.posture import SIDE_TURNS
 from cardbox_tracker.body.urdf import urdf_from_body
@@ -315,15 +316,14 @@ def _synthesize(options: argparse.Namespace) -> None:
 
 
 def _initialize(options: argparse.Namespace) -> None:
-    try:
-        config = InitializationConfig(
-            distance_m=options.distance,
-            camera_pitch_rad=float(np.radians(options.camera_pitch_deg)),
-            side_turn=options.side_turn,
-            seed=options.seed,
-        )
-    except ValueError as error:
-        raise CardboxError(str(error)) from None
+    config = InitializationConfig(
+        distance_m=options.distance,
+        camera_pitch_rad=float(np.radians(options.camera_pitch_deg)),
+        side_turn=options.side_turn,
+        seed=options.seed,
+    )
+    # Absurd constants are refused by their own names, before anything follows from them.
+    BodyModel(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
     spans = {name: getattr(options, name) for name in ("front", "side", "arms")}
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
@@ -338,7 +338,10 @@ def _track(options: argparse.Namespace) -> None:
     body = load_body_model(options.model)
     config = replace(PRESETS[options.preset](), strategy=options.strategy)
     if options.particles is not None:
-        config = config.with_particles(options.particles)
+        try:
+            config = config.with_particles(options.particles)
+        except ValueError as error:
+            raise CardboxError(str(error)) from None
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
         total_s = max(1e-9, bag.duration_s - options.start)
