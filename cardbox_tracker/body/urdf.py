@@ -14,20 +14,14 @@ hips are turned by half a turn. The visuals are the patches of the cardbox model
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.urdf_elements import add_box, add_joint, add_link, add_robot, xml_text
 
 ROOT_LINK = "camera_level"
 PATCH_THICKNESS_M = 0.004
-
-Vector = Sequence[float]
-
-_COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
-# URDF demands both; the values say nothing of a person and are only formal.
-_FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
 
 
 def urdf_from_body(
@@ -41,23 +35,20 @@ def urdf_from_body(
             body model says, so that markers and keypoints show up in the same tree.
         name: name of the robot.
     """
-    robot = Xml.Element("robot", name=name)
-    for material, rgba in _COLORS.items():
-        Xml.SubElement(Xml.SubElement(robot, "material", name=material), "color", rgba=rgba)
-    _link(robot, ROOT_LINK)
+    robot = add_robot(name)
+    add_link(robot, ROOT_LINK)
     if optical_frame:
-        _link(robot, optical_frame)
+        add_link(robot, optical_frame)
         # Level optical axes seen from REP-103 axes, then turned down by the pitch about X.
         rpy = (-math.pi / 2 - body.camera_pitch_rad, 0.0, -math.pi / 2)
-        _joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
-    _link(robot, "hips")
+        add_joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
+    add_link(robot, "hips")
     origin = (body.distance_m, 0.0, body.hip_height_m)
-    _joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
+    add_joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
     _trunk(robot, body)
     _arm(robot, body, "left", 1.0)
     _arm(robot, body, "right", -1.0)
-    Xml.indent(robot)
-    return '<?xml version="1.0"?>\n' + Xml.tostring(robot, encoding="unicode") + "\n"
+    return xml_text(robot)
 
 
 def _trunk(robot: Xml.Element, body: BodyModel) -> None:
@@ -71,8 +62,8 @@ def _trunk(robot: Xml.Element, body: BodyModel) -> None:
     ):
         child = "torso" if joint == "torso_roll" else f"{joint}_link"
         kind = "prismatic" if joint == "torso_y" else "revolute"
-        link = _link(robot, child)
-        _joint(robot, joint, kind, parent, child, axis=axis)
+        link = add_link(robot, child)
+        add_joint(robot, joint, kind, parent, child, axis=axis, limits=_limits(joint))
         parent = child
     waist_m, torso_m = size("waist_height"), size("torso_height")
     top_m = waist_m + torso_m
@@ -80,16 +71,16 @@ def _trunk(robot: Xml.Element, body: BodyModel) -> None:
     width_m = (size("torso_top_width") + size("torso_bottom_width")) / 2
     thin = PATCH_THICKNESS_M
     middle_m = waist_m + torso_m / 2
-    _box(link, "torso", (thin, width_m, torso_m), (0, 0, middle_m))
-    _box(link, "torso", (size("torso_depth"), thin, torso_m), (0, 0, middle_m))
-    _box(link, "torso", (size("torso_depth"), size("torso_top_width"), thin), (0, 0, top_m))
-    _box(link, "torso", (thin, size("waist_width"), waist_m), (0, 0, waist_m / 2))
-    _box(link, "torso", (size("waist_depth"), thin, waist_m), (0, 0, waist_m / 2))
-    head = _link(robot, "head")
+    add_box(link, "torso", (thin, width_m, torso_m), (0, 0, middle_m))
+    add_box(link, "torso", (size("torso_depth"), thin, torso_m), (0, 0, middle_m))
+    add_box(link, "torso", (size("torso_depth"), size("torso_top_width"), thin), (0, 0, top_m))
+    add_box(link, "torso", (thin, size("waist_width"), waist_m), (0, 0, waist_m / 2))
+    add_box(link, "torso", (size("waist_depth"), thin, waist_m), (0, 0, waist_m / 2))
+    head = add_link(robot, "head")
     height_m = top_m + size("neck_length") + size("head_height") / 2
-    _joint(robot, "neck", "fixed", "torso", "head", (size("head_offset"), 0.0, height_m))
-    _box(head, "torso", (thin, size("head_width"), size("head_height")), (0, 0, 0))
-    _box(head, "torso", (size("head_depth"), thin, size("head_height")), (0, 0, 0))
+    add_joint(robot, "neck", "fixed", "torso", "head", (size("head_offset"), 0.0, height_m))
+    add_box(head, "torso", (thin, size("head_width"), size("head_height")), (0, 0, 0))
+    add_box(head, "torso", (size("head_depth"), thin, size("head_height")), (0, 0, 0))
 
 
 def _arm(robot: Xml.Element, body: BodyModel, name: str, side: float) -> None:
@@ -99,57 +90,27 @@ def _arm(robot: Xml.Element, body: BodyModel, name: str, side: float) -> None:
     parent, origin = "torso", (0.0, side * size("shoulder_breadth") / 2, height_m)
     for joint, part in (("shoulder", "upper_arm"), ("elbow", "forearm")):
         turned, limb = f"{name}_{joint}_link", f"{name}_{part}"
-        _link(robot, turned)
-        _joint(
-            robot,
-            f"{name}_{joint}_abduction",
-            "revolute",
-            parent,
-            turned,
-            origin,
+        add_link(robot, turned)
+        abduction, flexion = f"{name}_{joint}_abduction", f"{name}_{joint}_flexion"
+        add_joint(
+            *(robot, abduction, "revolute", parent, turned, origin),
             axis=(side, 0, 0),
+            limits=_limits(abduction),
         )
-        link = _link(robot, limb)
-        _joint(robot, f"{name}_{joint}_flexion", "revolute", turned, limb, axis=(0, -1, 0))
+        link = add_link(robot, limb)
+        add_joint(
+            *(robot, flexion, "revolute", turned, limb),
+            axis=(0, -1, 0),
+            limits=_limits(flexion),
+        )
         length_m, width_m = size(f"{part}_length"), size(f"{part}_width")
-        _box(link, name, (PATCH_THICKNESS_M, width_m, length_m), (0, 0, -length_m / 2))
-        _box(link, name, (width_m, PATCH_THICKNESS_M, length_m), (0, 0, -length_m / 2))
+        add_box(link, name, (PATCH_THICKNESS_M, width_m, length_m), (0, 0, -length_m / 2))
+        add_box(link, name, (width_m, PATCH_THICKNESS_M, length_m), (0, 0, -length_m / 2))
         parent, origin = limb, (0.0, 0.0, -length_m)
-    _link(robot, f"{name}_hand")
-    _joint(robot, f"{name}_wrist", "fixed", parent, f"{name}_hand", origin)
+    add_link(robot, f"{name}_hand")
+    add_joint(robot, f"{name}_wrist", "fixed", parent, f"{name}_hand", origin)
 
 
-def _link(robot: Xml.Element, name: str) -> Xml.Element:
-    return Xml.SubElement(robot, "link", name=name)
-
-
-def _box(link: Xml.Element, material: str, extent_m: Vector, centre_m: Vector) -> None:
-    visual = Xml.SubElement(link, "visual")
-    Xml.SubElement(visual, "origin", xyz=_text(centre_m), rpy="0 0 0")
-    Xml.SubElement(Xml.SubElement(visual, "geometry"), "box", size=_text(extent_m))
-    Xml.SubElement(visual, "material", name=material)
-
-
-def _joint(
-    robot: Xml.Element,
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    origin_m: Vector = (0.0, 0.0, 0.0),
-    rpy: Vector = (0.0, 0.0, 0.0),
-    axis: Vector | None = None,
-) -> None:
-    joint = Xml.SubElement(robot, "joint", name=name, type=kind)
-    Xml.SubElement(joint, "parent", link=parent)
-    Xml.SubElement(joint, "child", link=child)
-    Xml.SubElement(joint, "origin", xyz=_text(origin_m), rpy=_text(rpy))
-    if axis is not None:
-        Xml.SubElement(joint, "axis", xyz=_text(axis))
-        lower, upper = JOINT_LIMITS[JOINT_NAMES.index(name)]
-        limits = {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}", **_FORMAL_LIMITS}
-        Xml.SubElement(joint, "limit", limits)
-
-
-def _text(values: Vector) -> str:
-    return " ".join(f"{value:.12g}" for value in values)
+def _limits(name: str) -> tuple[float, float]:
+    lowest, highest = JOINT_LIMITS[JOINT_NAMES.index(name)]
+    return float(lowest), float(highest)

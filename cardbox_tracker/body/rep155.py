@@ -1,0 +1,100 @@
+"""The posture in the joints of REP-155, the ROS convention for people around robots.
+
+Its reference model (package human_description) has a shoulder of three joints and an elbow of one:
+with s = 1 on the left and -1 on the right,
+
+    R_upper_arm = R_torso Rz(-s y) Rx(s p) Rz(s r),    R_forearm = R_upper_arm Ry(-e)
+
+so p says how far the arm is raised, y to which side (0: outwards, 90 degrees: forwards), r turns
+the upper arm about itself and e bends the elbow. Where the arm hangs (p = 0), y means nothing, and
+where it is straight (e = 0), r means nothing. Both happen at rest. And each direction is reached
+twice: (y, p) and (y + 180 degrees, -p), likewise (r, e). So an arm that swings through rest would
+jump by half a turn if the positive values were always taken. :class:`Rep155Joints` remembers the
+last angles and takes the nearer pair; what means nothing stays as it was.
+
+The joint ``waist`` is ours (``torso_pitch``). The reference model has no other joint of the spine;
+``body``, ``y_waist`` and ``r_waist`` are added for the place, the turn and the bend aside, so that
+``body`` is the middle of the hips below the sensor's frame. The head does not move on our torso.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.body.sizes import FloatArray
+
+_TORSO_JOINTS = ("body", "r_waist", "waist", "y_waist")
+_ARM_JOINTS = ("y_shoulder", "p_shoulder", "r_shoulder", "elbow")
+REP155_JOINTS: tuple[str, ...] = (
+    *_TORSO_JOINTS,
+    *(f"l_{name}" for name in _ARM_JOINTS),
+    *(f"r_{name}" for name in _ARM_JOINTS),
+)
+"""Joint names without the suffix ``_<id>``; the first four are d1..d4, in their order."""
+
+LOWEST_RAISE_RAD = -np.pi / 3
+"""An arm swings so far through rest before its other pair of angles is taken."""
+LOWEST_BEND_RAD = -np.pi / 6
+"""The same of the elbow, which REP-155 bends in one direction only."""
+
+# Nearer to the singular direction, the other angle stays: less than a millimetre of an arm.
+_MEANINGLESS_RAD = 1e-3
+
+
+def joint_names(body_id: str) -> list[str]:
+    """Return the names of the 12 joints of the body ``body_id``."""
+    return [f"{name}_{body_id}" for name in REP155_JOINTS]
+
+
+class Rep155Joints:
+    """Converts one person's postures, one after the other."""
+
+    def __init__(self) -> None:
+        """Start with all angles 0."""
+        self._last = {1.0: np.zeros(4), -1.0: np.zeros(4)}
+
+    def __call__(self, posture: FloatArray) -> FloatArray:
+        """Return the 12 values of ``REP155_JOINTS``, rad and metres, of a posture (12,)."""
+        return np.concatenate(
+            [posture[:4], self._arm(posture[LEFT_ARM], 1.0), self._arm(posture[RIGHT_ARM], -1.0)]
+        )
+
+    def _arm(self, angles: FloatArray, side: float) -> FloatArray:
+        upper_arm = rotation_x(side * angles[0]) @ rotation_y(-angles[1])
+        forearm = upper_arm @ rotation_x(side * angles[2]) @ rotation_y(-angles[3])
+        last = self._last[side]
+        # Where the limbs point to, mirrored to the left.
+        mirror = np.array([1.0, side, 1.0])
+        upper, lower = -upper_arm[:, 2] * mirror, -forearm[:, 2] * mirror
+        # upper = (sin y sin p, cos y sin p, -cos p)
+        y, p = _angles(upper[0], upper[1], -upper[2], last[0], last[1], LOWEST_RAISE_RAD)
+        # In the frame after y and p: lower = (cos r sin e, sin r sin e, -cos e)
+        lower = rotation_x(np.float64(-p)) @ rotation_z(np.float64(y)) @ lower
+        r, e = _angles(lower[1], lower[0], -lower[2], last[2], last[3], LOWEST_BEND_RAD)
+        self._last[side] = np.array([y, p, r, e])
+        return self._last[side]
+
+
+def _angles(
+    sine: float, cosine: float, up: float, last_turn: float, last_tilt: float, lowest: float
+) -> tuple[float, float]:
+    """Return turn and tilt with (sine, cosine) = sin(tilt) (sin, cos)(turn) and up = cos(tilt).
+
+    Of both solutions the one nearer to the last, if its tilt is not below ``lowest``.
+    """
+    tilt = float(np.arctan2(np.hypot(sine, cosine), up))
+    sign = 1.0 if last_tilt >= 0 else -1.0
+    if min(tilt, np.pi - tilt) < _MEANINGLESS_RAD and sign * tilt >= lowest:
+        return last_turn, sign * tilt
+    turn = float(np.arctan2(sine, cosine))
+    pairs = [(_near(turn, last_turn), tilt), (_near(turn + np.pi, last_turn), -tilt)]
+    allowed = [pair for pair in pairs if pair[1] >= lowest]
+    return min(allowed, key=lambda pair: abs(pair[0] - last_turn))
+
+
+def _near(angle: float, last: float) -> float:
+    """``angle``, whole turns added, so that it is nearest to ``last``; stays within two turns."""
+    near = last + np.remainder(angle - last + np.pi, 2 * np.pi) - np.pi
+    return float(near if abs(near) <= 2 * np.pi else np.remainder(near + np.pi, 2 * np.pi) - np.pi)

@@ -1,0 +1,68 @@
+"""The elements of a URDF: links, boxes to look at, joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as Xml
+
+Vector = Sequence[float]
+
+COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
+"""Colour of each material."""
+# URDF demands both; the values say nothing of a person and are only formal.
+_FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
+
+
+def add_robot(name: str) -> Xml.Element:
+    """Return a robot of that name with the materials of ``COLORS``."""
+    robot = Xml.Element("robot", name=name)
+    for material, rgba in COLORS.items():
+        Xml.SubElement(Xml.SubElement(robot, "material", name=material), "color", rgba=rgba)
+    return robot
+
+
+def add_link(robot: Xml.Element, name: str) -> Xml.Element:
+    """Add a link."""
+    return Xml.SubElement(robot, "link", name=name)
+
+
+def add_box(link: Xml.Element, material: str, extent_m: Vector, centre_m: Vector) -> None:
+    """Add a box of that extent, along the axes of ``link``."""
+    visual = Xml.SubElement(link, "visual")
+    Xml.SubElement(visual, "origin", xyz=_text(centre_m), rpy="0 0 0")
+    Xml.SubElement(Xml.SubElement(visual, "geometry"), "box", size=_text(extent_m))
+    Xml.SubElement(visual, "material", name=material)
+
+
+def add_joint(
+    robot: Xml.Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    origin_m: Vector = (0.0, 0.0, 0.0),
+    rpy: Vector = (0.0, 0.0, 0.0),
+    axis: Vector | None = None,
+    limits: Vector = (0.0, 0.0),
+) -> None:
+    """Add a joint of that ``kind``; a movable one has an axis, and limits in rad or metres."""
+    joint = Xml.SubElement(robot, "joint", name=name, type=kind)
+    Xml.SubElement(joint, "parent", link=parent)
+    Xml.SubElement(joint, "child", link=child)
+    Xml.SubElement(joint, "origin", xyz=_text(origin_m), rpy=_text(rpy))
+    if axis is not None:
+        Xml.SubElement(joint, "axis", xyz=_text(axis))
+        lower, upper = limits
+        given = {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}"} if kind != "continuous" else {}
+        Xml.SubElement(joint, "limit", {**given, **_FORMAL_LIMITS})
+
+
+def xml_text(robot: Xml.Element) -> str:
+    """Return the document of ``robot``."""
+    Xml.indent(robot)
+    return '<?xml version="1.0"?>\n' + Xml.tostring(robot, encoding="unicode") + "\n"
+
+
+def _text(values: Vector) -> str:
+    # Adding 0.0 turns a negative zero into a plain one.
+    return " ".join(f"{value + 0.0:.12g}" for value in values)
