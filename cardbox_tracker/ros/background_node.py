@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.ros import conversions, qos
+from cardbox_tracker.ros.camera_info import calibration_from_info
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.parameters import LiveParameters
@@ -103,7 +104,7 @@ class BackgroundNode(CardboxNode):
         if key == self._info_key and self._camera is not None:
             return
         self._info_key, self._camera = key, None
-        self._calibration = conversions.calibration_of(message, self._image_topic, self._info_topic)
+        self._calibration = calibration_from_info(message, self._image_topic, self._info_topic)
         try:
             self._rectifier = self._calibration.rectifier(*self._size)
             self._camera = self._calibration.camera(*self._size)

@@ -83,41 +83,6 @@ def image_message(header: Header, picture: NDArray[Any], encoding: str) -> Image
     return message
 
 
-def calibration_of(message: CameraInfo, image_topic: str, info_topic: str) -> Calibration:
-    """Return the calibration of the pictures that go with ``message``.
-
-    A region of interest and binning are taken into the matrix.
-
-    Raises:
-        CameraError: the camera is not calibrated; the text names both topics.
-    """
-    k = np.array(message.k, dtype=np.float64).reshape(3, 3)
-    if not (k[0, 0] > 0 and k[1, 1] > 0):
-        raise CameraError(
-            f"the camera that publishes {image_topic} is not calibrated: the matrix K in "
-            f"{info_topic} is all zero. Calibrate it with camera_calibration, or give its driver "
-            "the calibration file, so that the CameraInfo has its focal length"
-        )
-    width, height = int(message.width), int(message.height)
-    roi = message.roi
-    if roi.width and roi.height and (roi.width, roi.height) != (width, height):
-        k[0, 2] -= roi.x_offset
-        k[1, 2] -= roi.y_offset
-        width, height = int(roi.width), int(roi.height)
-    binning_x, binning_y = max(message.binning_x, 1), max(message.binning_y, 1)
-    # The centre of the first pixel is half a pixel inside the picture.
-    k[0] = (k[0] + (0.0, 0.0, 0.5)) / binning_x - (0.0, 0.0, 0.5)
-    k[1] = (k[1] + (0.0, 0.0, 0.5)) / binning_y - (0.0, 0.0, 0.5)
-    return Calibration(
-        width // binning_x,
-        height // binning_y,
-        k,
-        np.array(message.d, dtype=np.float64),
-        message.distortion_model or "plumb_bob",
-        message.header.frame_id,
-    )
-
-
 def check_shape(
     picture: Picture, calibration: Calibration, image_topic: str, info_topic: str
 ) -> None:

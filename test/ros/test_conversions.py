@@ -16,6 +16,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.errors import CameraError, EncodingError
 from cardbox_tracker.ros import conversions, results
+from cardbox_tracker.ros.camera_info import calibration_from_info
 from cardbox_tracker.vision.camera import Calibration, Camera
 
 HEADER = Header(frame_id="optical")
@@ -75,20 +76,20 @@ def test_compressed_picture_becomes_brightness() -> None:
 
 def test_camera_survives_its_camera_info() -> None:
     assert conversions.camera_of(info()) == CAMERA
-    calibration = conversions.calibration_of(info(), "/image_raw", "/camera_info")
+    calibration = calibration_from_info(info(), "/image_raw", "/camera_info")
     assert calibration.camera(320, 240) == CAMERA
     assert calibration.frame_id == "optical"
 
 
 def test_uncalibrated_camera_names_both_topics() -> None:
     with pytest.raises(CameraError, match=r"(?s)/eye/image_raw.*/eye/camera_info"):
-        conversions.calibration_of(info(k=np.zeros(9)), "/eye/image_raw", "/eye/camera_info")
+        calibration_from_info(info(k=np.zeros(9)), "/eye/image_raw", "/eye/camera_info")
 
 
 def test_binning_and_region_of_interest_are_taken_into_the_camera() -> None:
     roi = RegionOfInterest(x_offset=40, y_offset=20, width=160, height=120)
     message = info(roi=roi, binning_x=2, binning_y=2)
-    got = conversions.calibration_of(message, "a", "b").camera(80, 60)
+    got = calibration_from_info(message, "a", "b").camera(80, 60)
     # A point at pixel (u, v) of the full picture is at ((u - 40 + 0.5) / 2 - 0.5, ...) of this one.
     point = np.array([0.1, -0.05, 2.0])
     u, v = CAMERA.project(point)
