@@ -19,6 +19,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros import qos
 
 _FIND_S = 10.0
+_GONE_S = 5.0
 _STEP_S = 0.05
 _TYPE = "std_srvs/srv/Trigger"
 
@@ -59,9 +60,12 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
             executor.spin_once(timeout_sec=_STEP_S)
         asked = True
         future = client.call_async(Trigger.Request())
+        seen_s = time.monotonic()
         while not future.done():
             executor.spin_once(timeout_sec=_STEP_S)
-            if not client.service_is_ready():
+            if client.service_is_ready():
+                seen_s = time.monotonic()
+            elif time.monotonic() > seen_s + _GONE_S:
                 raise CardboxError(f"the node of {service} ended before it answered")
         answer: Trigger.Response = future.result()
     finally:
@@ -72,7 +76,9 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
 
 
 def _not_found(node: Node, service: str) -> str:
-    offered = sorted(name for name, types in node.get_service_names_and_types() if _TYPE in types)
+    own = node.resolve_service_name(service)
+    known = node.get_service_names_and_types()
+    offered = sorted(name for name, types in known if _TYPE in types and name != own)
     return (
         f"nobody offers the service {service}; offered are: {', '.join(offered) or 'none at all'}. "
         "Is the node running, with the same ROS_DOMAIN_ID?"
