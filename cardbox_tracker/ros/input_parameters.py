@@ -82,7 +82,12 @@ class PlayBagParameters(NodeParameters):
         True, "begin when somebody subscribes to a played picture topic", read_only=True
     )
     delay_s: float = parameter(
-        0.5, "wait so long before the first message", unit="s", limits=(0.0, 600.0), read_only=True
+        0.5,
+        "wait so long before the first message, and as long again whenever somebody subscribes "
+        "meanwhile, so that nobody misses the beginning",
+        unit="s",
+        limits=(0.0, 600.0),
+        read_only=True,
     )
 
     def check(self) -> None:

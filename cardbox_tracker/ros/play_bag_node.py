@@ -74,7 +74,7 @@ class PlayBagNode(CardboxNode):
             publisher
             for topic, publisher in self._publishers_of.items()
             if self._reader.topics[topic] in _PICTURES
-        ] or list(self._publishers_of.values())
+        ] or self._all()
 
     def _advertise(self, topic: str, kind: str) -> Publisher:
         package, _, name = kind.split("/")
@@ -86,7 +86,7 @@ class PlayBagNode(CardboxNode):
                 f"'{package}', or play other topics with --topics"
             ) from None
         latched = topic.endswith(_LATCHED_ENDINGS)
-        return self.advertise(message, topic, qos.LATCHED if latched else qos.RESULT)
+        return self.advertise(message, topic, qos.LATCHED if latched else qos.PLAYED)
 
     def play(self) -> None:
         """Play the bag to its end, or forever with ``loop``."""
@@ -97,12 +97,12 @@ class PlayBagNode(CardboxNode):
             self.diagnostics.wait_for(f"a subscriber of {topics}")
             while not any(publisher.get_subscription_count() for publisher in self._watched):
                 self._executor.spin_once(timeout_sec=0.1)
-        self._spin_until(time.monotonic() + settings.delay_s)
+        self._settle(settings.delay_s)
         while True:
             self._play_once()
             if not self.parameters.value.loop:
                 break
-        for publisher in self._publishers_of.values():
+        for publisher in self._all():
             publisher.wait_for_all_acked(Duration(seconds=5))
         self._say("finished")
         self.get_logger().info(f"end of {settings.bag}")
@@ -142,13 +142,25 @@ class PlayBagNode(CardboxNode):
                 return
             self._executor.spin_once(timeout_sec=0.1 if self._paused else min(left_s, 0.1))
 
-    def _spin_until(self, when_s: float) -> None:
-        while (left_s := when_s - time.monotonic()) > 0:
+    def _settle(self, delay_s: float) -> None:
+        """Serve calls until nobody has subscribed or left for ``delay_s``.
+
+        Whoever subscribes is found topic by topic; so their first picture has its CameraInfo.
+        """
+        subscribers: list[int] = []
+        since_s = time.monotonic()
+        while (left_s := since_s + delay_s - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=min(left_s, 0.1))
+            found = [publisher.get_subscription_count() for publisher in self._all()]
+            if found != subscribers:
+                subscribers, since_s = found, time.monotonic()
 
     def _set_anchor(self) -> None:
         """From now on, bag time runs from the present position."""
         self._anchor = (time.monotonic(), self._position_s)
+
+    def _all(self) -> list[Publisher]:
+        return list(self._publishers_of.values())
 
     def _say(self, text: str) -> None:
         self._status.publish(String(data=text))

@@ -27,6 +27,8 @@ SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # A reader's queue of a few frames rides out a hiccup; the writer keeps to one.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+# A recording waits for a slow subscriber rather than lose what it has to show.
+PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # For whoever records a replay and shall miss nothing.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(

@@ -35,14 +35,14 @@ def bag(request: pytest.FixtureRequest, scene: Any, tmp_path_factory: Any) -> Pa
     return path
 
 
-def ended(graph: Any, process: Any, timeout_s: float = 20.0) -> int:
-    graph.wait(lambda: process.process.poll() is not None, "the end of the bag", timeout_s)
+def ended(graph: Any, process: Any) -> int:
+    graph.wait(lambda: process.process.poll() is not None, "the end of the bag")
     return int(process.process.returncode)
 
 
 def test_every_message_comes_with_its_stamp_in_order(graph: Any, bag: Path) -> None:
-    images = graph.collect(Image, "image_raw")
-    infos = graph.collect(CameraInfo, "camera_info")
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
+    infos = graph.collect(CameraInfo, "camera_info", qos.REPLAY)
     started = time.monotonic()
     process = graph.start("play_bag", str(bag), "--rate", "4", "--delay", "1")
     assert ended(graph, process) == 0
@@ -58,7 +58,7 @@ def test_every_message_comes_with_its_stamp_in_order(graph: Any, bag: Path) -> N
 
 
 def test_it_pauses_where_told_and_resumes_on_call(graph: Any, bag: Path) -> None:
-    images = graph.collect(Image, "image_raw")
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
     statuses = graph.collect(String, "play_bag/status", qos.LATCHED)
     process = graph.start(
         "play_bag", str(bag), "--rate", "4", "--delay", "1", "--pause-at", "0.5", "1.0"
@@ -86,8 +86,8 @@ def test_it_pauses_where_told_and_resumes_on_call(graph: Any, bag: Path) -> None
 
 
 def test_part_and_topics_can_be_chosen(graph: Any, bag: Path) -> None:
-    images = graph.collect(Image, "image_raw")
-    infos = graph.collect(CameraInfo, "camera_info")
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
+    infos = graph.collect(CameraInfo, "camera_info", qos.REPLAY)
     options = ("--start", "0.5", "--duration", "0.49", "--topics", "/image_raw", "--delay", "1")
     process = graph.start("play_bag", str(bag), *options)
     assert ended(graph, process) == 0

@@ -12,7 +12,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
@@ -27,14 +27,17 @@ MEAN_ERROR_M = 0.15
 
 
 def deep(topic: str, end: str) -> tuple[str, ...]:
-    """Return arguments that let ``topic`` queue up and lose nothing, as a replay should."""
+    """Return arguments that let ``topic`` queue up, so that no slow machine loses a picture."""
     name = f"qos_overrides.{topic}.{end}"
-    return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:=100")
+    return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:={qos.REPLAY.depth}")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["synthetic", "person_a", "person_b"])
-def test_session_is_measured_and_tracked_to_its_end(graph: Any, name: str, tmp_path: Path) -> None:
+def test_session_is_measured_and_tracked_to_its_end(
+    own_graph: Any, name: str, tmp_path: Path
+) -> None:
+    graph = own_graph
     if name == "synthetic":
         bag, transport = tmp_path / "bag", "raw"
         truth = synthesize_session(bag, motion="wave")
@@ -65,21 +68,34 @@ def test_session_is_measured_and_tracked_to_its_end(graph: Any, name: str, tmp_p
         side_turn=truth["side_posture_turns_to"],
     )
     graph.start("tracker", *remap, *queue)
-    states = graph.collect(JointState, f"{eye}/joint_states")
-    keypoints = graph.collect(PoseArray, f"{eye}/keypoints")
+    states = graph.collect(JointState, f"{eye}/joint_states", qos.REPLAY)
+    keypoints = graph.collect(PoseArray, f"{eye}/keypoints", qos.REPLAY)
+    silhouettes = graph.collect(Image, f"{eye}/silhouette", qos.REPLAY)
     statuses = graph.collect(String, f"{eye}/play_bag/status", qos.LATCHED)
     graph.wait(
         lambda: (
-            graph.node.count_subscribers(f"{eye}/silhouette") == 2
+            graph.node.count_subscribers(topic) == 1
+            and graph.node.count_subscribers("/camera/camera_info") == 1
+            and graph.node.count_subscribers(f"{eye}/silhouette") == 3
             and graph.node.count_publishers(f"{eye}/keypoints") == 1
         ),
         "the nodes",
     )
     pauses = {reference: np.mean(spans[reference]) for reference in ("front", "side", "arms")}
     stops = [f"{at_s:.3f}" for at_s in pauses.values()]
-    player = graph.start("play_bag", str(bag), "--rate", "3", "--pause-at", *stops, *remap)
+    played = deep(topic, "publisher")
+    player = graph.start(
+        *("play_bag", str(bag), "--rate", "3", "--pause-at", *stops), *remap, *played
+    )
+    stamps = [frame["stamp_ns"] for frame in truth["frames"]]
+
+    def is_cut_out(before_s: float) -> bool:
+        last_ns = max(at for at in stamps if at - stamps[0] < before_s * 1e9 - 1e8)
+        return bool(silhouettes) and stamp_ns(silhouettes[-1].header.stamp) >= last_ns
+
     for reference, stop in zip(pauses, stops, strict=True):
-        graph.wait(lambda: statuses and statuses[-1].data == f"paused at {stop} s", reference, 60)  # noqa: B023
+        graph.wait(lambda: statuses and statuses[-1].data == f"paused at {stop} s", reference)  # noqa: B023
+        graph.wait(lambda: is_cut_out(pauses[reference]), "all silhouettes before the pause")  # noqa: B023
         graph.spin(0.3)
         response = graph.call(f"{eye}/initializer/capture_{reference}")
         assert response.success, response.message
@@ -90,9 +106,13 @@ def test_session_is_measured_and_tracked_to_its_end(graph: Any, name: str, tmp_p
             assert iou >= 0.80, response.message
             graph.diagnosis(f"{name}/tracker", "")
         assert graph.call(f"{eye}/play_bag/resume").success
-    graph.wait(lambda: player.process.poll() is not None, "the end of the bag", 60)
-    graph.spin(0.5)
+    graph.wait(lambda: player.process.poll() is not None, "the end of the bag")
     frames = [f for f in truth["frames"] if "joints_m" in f]
+    last_ns = frames[-1]["stamp_ns"]
+    graph.wait(
+        lambda: states[-1:] and stamp_ns(states[-1].header.stamp) >= last_ns, "the last joint state"
+    )
+    graph.spin(0.5)
     pictures = [f["stamp_ns"] for f in frames if f["stamp_ns"] >= stamp_ns(states[0].header.stamp)]
     assert [stamp_ns(state.header.stamp) for state in states] == pictures
     where = {frame["stamp_ns"]: frame["joints_m"] for frame in frames}
