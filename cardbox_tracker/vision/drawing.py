@@ -76,6 +76,13 @@ def draw_overlay(
     return canvas
 
 
+def draw_message(picture: Picture, text: str) -> Picture:
+    """Return a colour picture (H, W, 3) bgr of ``picture`` with ``text`` written over it."""
+    canvas = _bgr(picture).copy()
+    draw_text(canvas, text)
+    return canvas
+
+
 def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
@@ -83,15 +90,32 @@ def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatA
     """
     tint = canvas.copy()
     # The torso first: an arm before it stays visible.
-    parts = sorted(_polygons(body, camera, posture), key=lambda part: part[0] in _PART_BGR)
+    parts = sorted(
+        _polygons(camera, cardbox_patches(body, posture)), key=lambda part: part[0] in _PART_BGR
+    )
     for name, polygon in parts:
         colour = _PART_BGR.get(name, _TORSO_BGR)
         cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
     cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
     thickness = max(1, round(camera.width / 400))
-    outlines = outlines_of(body, camera, posture)
-    cv2.polylines(canvas, outlines, True, OUTLINE_BGR, thickness, cv2.LINE_AA, OUTLINE_SHIFT)
+    draw_outline(canvas, camera, cardbox_patches(body, posture), OUTLINE_BGR, thickness)
     _draw_skeleton(canvas, body, camera, posture, thickness)
+
+
+def draw_outline(
+    canvas: Picture,
+    camera: Camera,
+    patches: FloatArray,
+    colour: tuple[int, int, int],
+    thickness: int | None = None,
+) -> None:
+    """Draw the common outline of ``patches`` (15, 4, 3) into ``canvas`` (H, W, 3), in place.
+
+    ``thickness`` is in pixels; without it the line suits the canvas.
+    """
+    width = thickness or max(1, round(camera.width / 200))
+    outlines = outlines_of(camera, patches)
+    cv2.polylines(canvas, outlines, True, colour, width, cv2.LINE_AA, OUTLINE_SHIFT)
 
 
 def _draw_skeleton(
@@ -134,22 +158,20 @@ def draw_text(
     cv2.putText(canvas, text, (left, bottom), font, size, colour, thickness, cv2.LINE_AA)
 
 
-def _polygons(
-    body: BodyModel, camera: Camera, posture: FloatArray
-) -> Iterator[tuple[str, FloatArray]]:
+def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Yield the side (left, right or another word) and the pixels (n, 2) of each visible patch."""
-    patches = camera.reference_to_optical(cardbox_patches(body, posture))
-    for name, corners in zip(PATCH_NAMES, patches, strict=True):
+    optical = camera.reference_to_optical(patches)
+    for name, corners in zip(PATCH_NAMES, optical, strict=True):
         polygon = clip_near(corners)
         if len(polygon) > 2:
             yield name.split("_")[0], camera.project(polygon)
 
 
-def outlines_of(body: BodyModel, camera: Camera, posture: FloatArray) -> list[NDArray[np.int32]]:
+def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
     """Return the outlines of all patches together, px with ``OUTLINE_SHIFT`` fractional bits."""
     fine = camera.scaled(*(size << OUTLINE_SHIFT for size in (camera.width, camera.height)))
     model = np.zeros((fine.height, fine.width), np.uint8)
-    for _, polygon in _polygons(body, fine, posture):
+    for _, polygon in _polygons(fine, patches):
         cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
     # A patch seen edge-on is a whisker, which tells nothing of where the part ends.
     whisker = max(3, fine.width // 128)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import cv2
 
+from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
@@ -42,7 +43,7 @@ def draw_guidance(
         (scale H, scale W, 3) bgr.
     """
     canvas = enlarged(picture, scale)
-    outlines = outlines_of(body, camera.scaled(*canvas.shape[1::-1]), posture)
+    outlines = outlines_of(camera.scaled(*canvas.shape[1::-1]), cardbox_patches(body, posture))
     width = max(2, round(canvas.shape[1] / 160))
     # A dark rim keeps the line visible before a white silhouette.
     for colour, thickness in (((0, 0, 0), width + 2), (WANTED_BGR, width)):
