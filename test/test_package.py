@@ -1,0 +1,252 @@
+"""The package holds together: metadata agree, what is declared exists, the core knows no ROS."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import runpy
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import setuptools
+
+import cardbox_tracker
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ROOT / "cardbox_tracker"
+CORE = ("body", "vision", "estimation")
+CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
+OUTER = ("ros", "offline", "simulation", "evaluation", "demo", "cli", "progress")
+MESSAGES = (
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "sensor_msgs",
+    "std_msgs",
+    "std_srvs",
+    "visualization_msgs",
+)
+ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
+
+# One concept a module. Beyond it: the compiled inner loop, which would only be longer in parts, and
+# two that are lists, of options and of a report's paragraphs.
+MAX_LINES = 310
+LONGER = ("estimation/kernels.py", "evaluation/report.py", "cli.py")
+MAX_NODE_LINES = 200
+
+
+@cache
+def setup_arguments() -> dict[str, Any]:
+    """What setup.py says."""
+    caught: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setuptools, "setup", lambda **values: caught.update(values))
+        patch.chdir(ROOT)
+        runpy.run_path(str(ROOT / "setup.py"))
+    return caught
+
+
+@cache
+def package_xml() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def imported_by(path: Path) -> Iterator[str]:
+    """Full names of the modules that a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            assert node.module is not None
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def declared() -> set[str]:
+    """Distributions that setup.py requires, in small letters, without version and extra."""
+    arguments = setup_arguments()
+    lists = [arguments["install_requires"], *arguments["extras_require"].values()]
+    return {re.split(r"[\[<>=!~; ]", line)[0].lower() for lines in lists for line in lines}
+
+
+def test_versions_agree() -> None:
+    version = cardbox_tracker.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+", version)
+    assert setup_arguments()["version"] == version
+    assert package_xml().findtext("version") == version
+    headings = re.findall(
+        r"^(\S+)\n-+$", (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert headings[0] == version
+
+
+def test_names_and_licence_agree() -> None:
+    arguments, xml = setup_arguments(), package_xml()
+    assert arguments["name"] == xml.findtext("name") == cardbox_tracker.__name__
+    assert arguments["license"] == xml.findtext("license") == "Apache-2.0"
+    licence = (ROOT / "LICENSE").read_text(encoding="utf-8")
+    assert "Apache License" in licence
+    assert "Version 2.0" in licence
+    maintainer = xml.find("maintainer")
+    assert maintainer is not None
+    assert arguments["maintainer"] == maintainer.text
+    assert arguments["maintainer_email"] == maintainer.get("email")
+    assert xml.findtext("export/build_type") == "ament_python"
+
+
+@pytest.mark.parametrize(
+    "script", setup_arguments()["entry_points"]["console_scripts"], ids=lambda s: s.split()[0]
+)
+def test_every_executable_is_a_function(script: str) -> None:
+    _, target = script.split(" = ")
+    module, function = target.split(":")
+    if ".ros." in module:
+        pytest.importorskip("rclpy", reason="rclpy is not installed")
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_every_node_of_the_design_is_an_executable() -> None:
+    scripts = setup_arguments()["entry_points"]["console_scripts"]
+    names = {script.split(" = ")[0] for script in scripts}
+    assert names >= {"cardbox", "background", "initializer", "tracker", "camera", "play_bag"}
+
+
+def test_installed_data_exist_and_none_is_forgotten() -> None:
+    installed = [name for _, names in setup_arguments()["data_files"] for name in names]
+    assert all((ROOT / name).is_file() for name in installed)
+    for folder in ("config", "launch"):
+        there = {
+            f"{folder}/{path.name}"
+            for path in (ROOT / folder).iterdir()
+            if path.is_file() and not path.name.startswith(".")
+        }
+        assert there <= set(installed)
+        assert there
+    assert "package.xml" in installed
+    assert "resource/cardbox_tracker" in installed
+
+
+def test_every_folder_is_a_package() -> None:
+    folders = {p.parent for p in SOURCES.rglob("*.py")}
+    names = {".".join(folder.relative_to(ROOT).parts) for folder in folders}
+    assert set(setup_arguments()["packages"]) == names
+
+
+@pytest.mark.parametrize("path", CORE_FILES, ids=lambda p: str(p.relative_to(SOURCES)))
+def test_the_core_knows_neither_ros_nor_what_uses_it(path: Path) -> None:
+    forbidden = (*ROS, *(f"cardbox_tracker.{name}" for name in OUTER))
+    found = [
+        name
+        for name in imported_by(path)
+        if any(name == other or name.startswith(f"{other}.") for other in forbidden)
+    ]
+    assert found == []
+
+
+def test_the_rule_for_the_core_would_find_an_offender(tmp_path: Path) -> None:
+    offender = tmp_path / "offender.py"
+    imports = ("from cardbox_tracker.ros import qos", "import rclpy.node")
+    offender.write_text("\n    ".join(("def late():", *imports)))
+    assert set(imported_by(offender)) == {
+        "cardbox_tracker.ros",
+        "cardbox_tracker.ros.qos",
+        "rclpy.node",
+    }
+
+
+def test_recordings_are_handled_without_rclpy() -> None:
+    """What 'cardbox initialize' and 'cardbox track' import, other than in functions."""
+    for folder in ("offline", "simulation"):
+        for path in (SOURCES / folder).rglob("*.py"):
+            assert not [n for n in imported_by(path) if n.split(".")[0] in ("rclpy", *MESSAGES)]
+
+
+@pytest.mark.parametrize(
+    "path", sorted((SOURCES / "ros").glob("*_node.py")), ids=lambda path: path.name
+)
+def test_nodes_are_thin(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_NODE_LINES
+
+
+@pytest.mark.parametrize(
+    "path", sorted(SOURCES.rglob("*.py")), ids=lambda path: str(path.relative_to(SOURCES))
+)
+def test_modules_are_short_and_say_what_they_are(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert ast.get_docstring(ast.parse(text))
+    if str(path.relative_to(SOURCES)) not in LONGER:
+        assert len(text.splitlines()) <= MAX_LINES
+
+
+def test_what_is_imported_is_declared() -> None:
+    distributions = {"cv2": "opencv-python-headless", "yaml": "pyyaml"}
+    imports = {
+        name.split(".")[0] for path in SOURCES.rglob("*.py") for name in imported_by(path)
+    } - set(sys.stdlib_module_names)
+    imports -= {"cardbox_tracker", "ament_index_python", "launch", "launch_ros"}
+    in_xml = {element.text for element in package_xml().findall("exec_depend")}
+    for name in sorted(imports):
+        if name in ("rclpy", *MESSAGES):
+            assert name in in_xml, f"{name} is not in package.xml"
+        else:
+            assert distributions.get(name, name).lower() in declared(), f"{name} is not in setup.py"
+
+
+def test_what_pip_requires_rosdep_requires() -> None:
+    """But for rosbags, which has no key there."""
+    keys = {"opencv-python-headless": "python3-opencv", "pyyaml": "python3-yaml"}
+    in_xml = {element.text for element in package_xml().findall("exec_depend")}
+    for line in setup_arguments()["install_requires"]:
+        name = re.split(r"[<>=]", line)[0].lower()
+        if name != "rosbags":
+            assert keys.get(name, f"python3-{name}") in in_xml
+
+
+def make_targets() -> set[str]:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    return set(re.findall(r"^([a-z][a-z_-]*):", text, re.MULTILINE))
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "Makefile", "docs"])
+def test_every_make_target_that_is_mentioned_exists(name: str) -> None:
+    path = ROOT / name
+    files = sorted(path.rglob("*.md")) if path.is_dir() else [path]
+    mentioned = set()
+    for file in files:
+        # At the start of a line, after a shell's prompt, or in quotes of code; not in prose.
+        text = file.read_text(encoding="utf-8")
+        mentioned |= set(re.findall(r"(?:^[ #$]*|[`'])make ([a-z][a-z_-]*)", text, re.MULTILINE))
+    assert mentioned <= make_targets()
+    if name == "README.md":
+        assert {"demo", "test"} <= mentioned
+
+
+def test_ci_runs_make_test_and_nothing_else() -> None:
+    lines = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("#!")
+    commands = [line for line in lines[1:] if line.strip() and not line.startswith(("#", "set "))]
+    assert commands == ['cd "$(dirname "$0")/.."', "exec make test"]
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
+
+
+def test_every_cardbox_command_in_the_readme_exists() -> None:
+    from cardbox_tracker.cli import build_parser
+
+    (commands,) = (a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
+    text = (ROOT / "README.md").read_text(encoding="utf-8").replace("\\\n", " ")
+    for line in re.findall(r"^    cardbox (.*)$|`cardbox ([^`]*)`", text, re.MULTILINE):
+        words = "".join(line).split()
+        if words[0].startswith("-"):
+            continue
+        assert words[0] in commands
+        options = {option for a in commands[words[0]]._actions for option in a.option_strings}
+        assert {word.split("=")[0] for word in words if word.startswith("--")} <= options
