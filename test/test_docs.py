@@ -1,0 +1,249 @@
+"""What the documents name is there: links, files, commands, and what nodes are quoted with."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cardbox_tracker.cli import build_parser
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted(
+    path.relative_to(ROOT)
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+)
+WRITTEN = [path for path in DOCUMENTS if "evaluation" not in path.parts]
+LARGEST_PICTURE_BYTES = 200_000
+IMAGE_SUFFIXES = (".png", ".jpg")
+
+INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.(?:py|md|yaml|xml|rviz|json|png|jpg)")
+# Made by a command, or of a user.
+NOT_HERE = ("demo_output/", "/", "~")
+
+
+def text_of(document: Path) -> str:
+    return (ROOT / document).read_text(encoding="utf-8")
+
+
+def blocks(text: str) -> Iterator[str]:
+    """Yield each line of the code blocks (indented or fenced), continuation lines joined."""
+    lines, fenced, before = [], False, ""
+    for line in text.splitlines():
+        if line.startswith("```"):
+            fenced = not fenced
+        elif fenced or (line.startswith("    ") and (not before.strip() or lines)):
+            lines.append(line.strip())
+        elif lines:
+            yield from re.sub(r"\\\n", " ", "\n".join(lines)).splitlines()
+            lines = []
+        before = line
+    yield from re.sub(r"\\\n", " ", "\n".join(lines)).splitlines()
+
+
+def prose(text: str) -> str:
+    """Return the text without its code blocks."""
+    text = re.sub(r"(?ms)^```.*?^```", "", text)
+    return re.sub(r"(?m)^    .*$", "", text)
+
+
+def inline(text: str) -> list[str]:
+    return [" ".join(code.split()) for code in INLINE.findall(prose(text))]
+
+
+def slug(heading: str) -> str:
+    """Return the anchor that a heading gets."""
+    kept = re.sub(r"[^\w\- ]", "", heading.strip().lower())
+    return kept.replace(" ", "-")
+
+
+def anchors(path: Path) -> set[str]:
+    headings = re.findall(r"(?m)^#+ (.*)$", prose(path.read_text(encoding="utf-8")))
+    return {slug(heading) for heading in headings}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=str)
+def test_links_and_pictures_are_there(document: Path) -> None:
+    for target in LINK.findall(prose(text_of(document))):
+        if re.match(r"https?://", target):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (ROOT / document).parent / name if name else ROOT / document
+        assert path.exists(), f"{document}: {target}"
+        if anchor:
+            assert anchor in anchors(path), f"{document}: {target}"
+        if path.suffix in IMAGE_SUFFIXES and "evaluation" not in path.parts:
+            assert path.stat().st_size < LARGEST_PICTURE_BYTES, path
+
+
+@pytest.mark.parametrize("document", WRITTEN, ids=str)
+def test_named_files_are_there(document: Path) -> None:
+    for code in inline(text_of(document)):
+        for name in FILE.findall(code):
+            if not code.startswith(NOT_HERE) and "$" not in code:
+                places = [ROOT / name, ROOT / "cardbox_tracker" / name]
+                assert any(place.exists() for place in places), f"{document}: {name}"
+
+
+def commands(first: str) -> list[tuple[Path, str, bool]]:
+    """Return (document, command, whether it stands in a code block) of all that start so."""
+    found = []
+    for document in WRITTEN:
+        text = text_of(document)
+        found += [(document, line, True) for line in blocks(text) if line.startswith(f"{first} ")]
+        found += [(document, line, False) for line in inline(text) if line.startswith(f"{first} ")]
+    return found
+
+
+def subcommands() -> dict[str, argparse.ArgumentParser]:
+    parser = build_parser()
+    groups = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    return dict(next(groups).choices)
+
+
+@pytest.mark.parametrize(("document", "command", "is_block"), commands("cardbox"))
+def test_cardbox_commands_parse(
+    document: Path, command: str, is_block: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = shlex.split(command, comments=True)[1:]
+    if not is_block and len(words) == 1 and words[0] in subcommands():
+        return
+    try:
+        build_parser().parse_args(words)
+    except SystemExit as end:
+        assert not end.code, f"{document}: {command}: {capsys.readouterr().err}"
+
+
+def test_each_subcommand_is_in_a_document() -> None:
+    named = {shlex.split(command)[1] for _, command, _ in commands("cardbox")}
+    assert set(subcommands()) <= named
+
+
+def test_make_targets_exist() -> None:
+    targets = set(re.findall(r"(?m)^\.PHONY: (\w+)$", (ROOT / "Makefile").read_text()))
+    for document, command, _ in commands("make"):
+        assert shlex.split(command, comments=True)[1] in targets, f"{document}: {command}"
+    named = {shlex.split(command, comments=True)[1] for _, command, _ in commands("make")}
+    assert {"setup", "demo", "test"} <= named <= targets
+
+
+def launch_arguments(name: str) -> set[str]:
+    """Arguments that a launch file declares, itself or by the launch files that it includes."""
+    text = (ROOT / "launch" / name).read_text(encoding="utf-8")
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict):
+            names = [target.id for target in node.targets if isinstance(target, ast.Name)]
+            if "ARGUMENTS" in names:
+                found |= {k.value for k in node.value.keys if isinstance(k, ast.Constant)}
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "DeclareLaunchArgument":
+            found |= {a.value for a in node.args[:1] if isinstance(a, ast.Constant)}
+        if isinstance(node, ast.Constant) and str(node.value).endswith(".launch.py"):
+            found |= launch_arguments(str(node.value))
+    return {str(argument) for argument in found}
+
+
+def launch_commands() -> list[tuple[Path, str]]:
+    started = [(d, c.split(maxsplit=3)[3]) for d, c, _ in commands("ros2 launch cardbox_tracker")]
+    for document in WRITTEN:
+        codes = inline(text_of(document))
+        started += [(document, code) for code in codes if re.match(r"\w+\.launch\.py\b", code)]
+    return started
+
+
+@pytest.mark.parametrize(("document", "command"), launch_commands())
+def test_launch_files_have_the_arguments(document: Path, command: str) -> None:
+    name, *given = shlex.split(command)
+    assert (ROOT / "launch" / name).exists(), f"{document}: {name}"
+    for argument in given:
+        assert argument.partition(":=")[0] in launch_arguments(name), f"{document}: {argument}"
+
+
+def test_the_launch_arguments_are_found() -> None:
+    assert {"device", "person_distance_m", "rviz"} <= launch_arguments("live.launch.py")
+    assert "device" not in launch_arguments("replay.launch.py")
+    assert {"bag", "pause_at", "image"} <= launch_arguments("replay.launch.py")
+
+
+def spoken() -> str:
+    """All texts of the code but docstrings; … where a value is filled in."""
+    texts = []
+    for path in sorted((ROOT / "cardbox_tracker").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        silent = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.JoinedStr):
+                parts = (p.value if isinstance(p, ast.Constant) else "\0" for p in node.values)
+                texts.append("".join(map(str, parts)))
+            elif isinstance(node, ast.Constant) and id(node) not in silent:
+                texts.append(str(node.value))
+    return "\n".join(texts)
+
+
+def test_what_nodes_are_quoted_with_is_what_they_say() -> None:
+    said = spoken()
+    quotes = re.findall(r"(?m)^> (.*)$", text_of(Path("docs/troubleshooting.md")))
+    assert len(quotes) > 10
+    for quote in quotes:
+        quote = quote.removeprefix("waiting for ")
+        for fragment in re.split(r"\s*\.\.\.\s*", quote):
+            # Words are filled in where a reader is shown one case of several.
+            pieces = [piece for piece in re.split(FILLED_IN, fragment) if piece.strip(" :=;")]
+            for piece in pieces:
+                assert piece.strip() in said, f"{piece!r} of {quote!r}"
+
+
+FILLED_IN = r"\b(?:best effort|reliable|reliability|best_effort)\b"
+
+
+def test_a_made_up_quote_would_be_noticed() -> None:
+    assert "the whole scene changed its brightness" in spoken()
+    assert "the whole scene changed its colour" not in spoken()
+
+
+COMPLAINTS = {
+    "latency": "Latency is high",
+    "cpu": "CPU load",
+    "no images": '"No images"',
+    "lazy nodes": "A node looks dead",
+    "k zero": "K is all zero",
+    "angles": "joint angles, not points",
+    "confidence": "How sure is it?",
+    "metric depth": "Depth or sizes are wrong",
+    "clock": "wrong clock",
+    "encodings": "encoding is not supported",
+    "white balance": "silhouette flares up",
+    "tf rate": "TF comes at 20 Hz",
+}
+
+
+@pytest.mark.parametrize("complaint", COMPLAINTS)
+def test_each_common_complaint_has_an_entry_with_cause_and_remedy(complaint: str) -> None:
+    entries = re.split(r"(?m)^#+ ", text_of(Path("docs/troubleshooting.md")))[1:]
+    entry = next(e for e in entries if COMPLAINTS[complaint] in e.splitlines()[0])
+    if complaint != "angles":
+        assert "*Remedy*" in entry
+        assert "*Cause*" in entry or "*What the node" in entry
+
+
+def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
+    import numpy as np
+
+    from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+
+    rows = re.findall(
+        r"(?m)^\| `(\w+)`.*\| (-?\d+) to (\d+) \|$", text_of(Path("docs/conventions.md"))
+    )
+    limits = np.degrees(JOINT_LIMITS)
+    limits[0] = JOINT_LIMITS[0]
+    assert len(rows) == 8
+    for name, lowest, highest in rows:
+        found = limits[JOINT_NAMES.index(name)]
+        assert (float(lowest), float(highest)) == pytest.approx(tuple(found)), name
