@@ -1,6 +1,7 @@
 # make setup   everything in .venv: the cardbox command, the nodes, the tools of the tests
 # make demo    the whole chain on a synthetic recording; results in demo_output/
 # make test    set-up, lint, types, all tests
+# make benchmark   measure the speed on this machine; writes docs/benchmarks.md
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove all that the above made
@@ -71,6 +72,12 @@ test: lint
 .PHONY: demo
 demo: setup
 	$(BIN)/cardbox demo --output demo_output
+
+# The extra is left out of the set-up, for few need it: it replaces NumPy by an older one.
+.PHONY: benchmark
+benchmark: setup
+	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
+	$(BIN)/python -m cardbox_tracker.evaluation.readme
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

@@ -178,6 +178,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     track.add_argument("--seed", type=_seed, default=0, help="of the filters")
 
+    benchmark = command("benchmark", _benchmark, "measure how fast it is on this machine")
+    benchmark.add_argument(
+        "--json", type=Path, required=True, metavar="FILE", help="results to write"
+    )
+    benchmark.add_argument("--report", type=Path, metavar="FILE.md", help="report to write")
+
     urdf = command("urdf", _urdf, "print the robot description (URDF) of a measured person")
     urdf.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
 
@@ -404,6 +410,13 @@ def _screenshots(options: argparse.Namespace) -> None:
         written = write_screenshots(options.output, options.seed, show)
     for path in written:
         print(f"wrote {path}")
+
+
+def _benchmark(options: argparse.Namespace) -> None:
+    from cardbox_tracker.evaluation.benchmark import run_benchmark, short_table
+
+    print(short_table(run_benchmark(options.json, options.report)))
+    print(f"wrote {options.json}" + (f" and {options.report}" if options.report else ""))
 
 
 def _urdf(options: argparse.Namespace) -> None:

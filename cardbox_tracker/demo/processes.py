@@ -66,6 +66,10 @@ class Nodes:
                 words = (self._logs / f"{name}.log").read_text(errors="replace")[-800:]
                 raise CardboxError(f"the node {name} ended with {process.returncode}:\n{words}")
 
+    def pid(self, name: str) -> int:
+        """Return the number of the node's process."""
+        return self._processes[name].pid
+
     def is_running(self, name: str) -> bool:
         """Return whether the node is still there."""
         return self._processes[name].poll() is None

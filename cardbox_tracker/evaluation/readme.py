@@ -1,7 +1,7 @@
-"""The README's numbers, made from the committed results.
+"""The README's numbers, made from the committed results of evaluation and benchmarks.
 
-``python -m cardbox_tracker.evaluation.readme`` writes them between two marks in ``README.md``; with
-``--check`` it only says whether they differ.
+``python -m cardbox_tracker.evaluation.readme`` writes them between their marks in ``README.md``;
+with ``--check`` it only says whether they differ.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cardbox_tracker.evaluation import benchmark_report
 from cardbox_tracker.evaluation.report import recorded_results
 from cardbox_tracker.evaluation.results import motions_in, read_json
 from cardbox_tracker.files import atomic_path
 
 BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 RESULTS = Path("docs/evaluation")
+BENCHMARKS = Path("docs/benchmarks.json")
 
 
 def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[str, Any]]) -> str:
@@ -49,23 +51,25 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
     return "\n".join(lines)
 
 
-def replaced(text: str, section: str) -> str:
+def replaced(text: str, section: str, begin: str = BEGIN, end: str = END) -> str:
     """Return the README ``text`` with ``section`` between the marks.
 
     Raises:
         ValueError: the marks are not there, each once.
     """
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ValueError(f"the README needs the marks {BEGIN} and {END}, each once")
-    before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n{section}\n{END}{rest.split(END)[1]}"
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise ValueError(f"the README needs the marks {begin} and {end}, each once")
+    before, rest = text.split(begin)
+    return f"{before}{begin}\n{section}\n{end}{rest.split(end)[1]}"
 
 
 def current(root: Path) -> str:
     """Return what the README in ``root`` should read."""
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
-    return replaced((root / "README.md").read_text(encoding="utf-8"), section)
+    text = replaced((root / "README.md").read_text(encoding="utf-8"), section)
+    speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))
+    return replaced(text, speed, benchmark_report.BEGIN, benchmark_report.END)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
