@@ -71,7 +71,7 @@ class Rep155Joints:
         # upper = (sin y sin p, cos y sin p, -cos p)
         y, p = _angles(upper[0], upper[1], -upper[2], last[0], last[1], LOWEST_RAISE_RAD)
         # In the frame after y and p: lower = (cos r sin e, sin r sin e, -cos e)
-        lower = rotation_x(np.float64(-p)) @ rotation_z(np.float64(y)) @ lower
+        lower = rotation_x(np.array(-p)) @ rotation_z(np.array(y)) @ lower
         r, e = _angles(lower[1], lower[0], -lower[2], last[2], last[3], LOWEST_BEND_RAD)
         self._last[side] = np.array([y, p, r, e])
         return self._last[side]

@@ -7,7 +7,9 @@ functions it is given.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
+from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.errors import InitializationError
 
 _TURN = {
@@ -25,6 +27,23 @@ def instruction(name: str, side_turn: str) -> str:
         "side": f"{_TURN[side_turn]}, arms hanging a little away from the body",
         "arms": "face the camera, both arms stretched sideways, just below the shoulders",
     }[name]
+
+
+class Step(NamedTuple):
+    """A line of the guidance: the reference (or ``measuring``), words, and the seconds left."""
+
+    name: str
+    words: str
+    left_s: int | None
+
+
+def step_of(status: str) -> Step | None:
+    """Return the step that a line of ``initializer/status`` belongs to; None outside a guidance."""
+    name, colon, words = status.partition(": ")
+    if not colon or name not in (*REFERENCE_NAMES, "measuring"):
+        return None
+    said, _, count = words.rpartition(": ")
+    return Step(name, said, int(count)) if count.isdigit() else Step(name, words, None)
 
 
 class Guidance:

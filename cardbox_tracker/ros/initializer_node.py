@@ -23,6 +23,7 @@ from cardbox_tracker.errors import CardboxError, InitializationError
 from cardbox_tracker.estimation.initialization import InitializationResult, initialize_body
 from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.guidance import Guidance
+from cardbox_tracker.ros.guide_overlay import GuideOverlay
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.node_parameters import InitializerParameters
 from cardbox_tracker.ros.parameters import LiveParameters
@@ -46,6 +47,7 @@ class InitializerNode(CardboxNode):
         self._model = self.advertise(String, "body_model", qos.LATCHED)
         self._description = self.advertise(String, "robot_description", qos.LATCHED)
         self._status = self.advertise(String, "~/status", qos.LATCHED)
+        self._guide = GuideOverlay(self)
         self._topic = self.resolve("silhouette")
         self._references = ReferenceCapture(self._topic)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
@@ -75,6 +77,7 @@ class InitializerNode(CardboxNode):
     def _on_silhouette(self, message: Image, sent_ns: int) -> None:
         self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
         self._references.add(message)
+        self._guide.show(message, self._camera, self.parameters.value)
         self.diagnostics.working(sent_ns)
         if message.header.frame_id != self._frame_id:
             self._frame_id = message.header.frame_id
@@ -82,6 +85,7 @@ class InitializerNode(CardboxNode):
                 self._describe(self._body)
 
     def _say(self, text: str) -> None:
+        self._guide.status = text
         self._status.publish(String(data=text))
 
     def _capture(self, name: str) -> str:

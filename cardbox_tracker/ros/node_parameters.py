@@ -7,6 +7,7 @@ that the chosen preset decides.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -214,6 +215,12 @@ class TrackerParameters(NodeParameters):
         "body model to start with; one that arrives on body_model replaces it; empty: none",
         read_only=True,
     )
+    rep155_id: str = parameter(
+        "",
+        "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
+        "this ID of letters, digits and underscores; empty: do not",
+        read_only=True,
+    )
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core; raises ValueError where they do not go together."""
@@ -242,6 +249,11 @@ class TrackerParameters(NodeParameters):
     def check(self) -> None:
         """Raise ValueError where values do not go together."""
         self.config()
+        if self.rep155_id and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.rep155_id):
+            raise ValueError(
+                f"rep155_id is '{self.rep155_id}'; expected a letter, then letters, digits and "
+                "underscores, as topics need"
+            )
 
 
 NODES: dict[str, type[NodeParameters]] = {

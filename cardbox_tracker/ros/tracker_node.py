@@ -7,21 +7,19 @@ import sys
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseArray
-from sensor_msgs.msg import CameraInfo, Image, JointState
-from std_msgs.msg import Header, String
-from visualization_msgs.msg import MarkerArray
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import String
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
-from cardbox_tracker.ros import conversions, qos, results
+from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.node_parameters import TrackerParameters
 from cardbox_tracker.ros.parameters import LiveParameters
+from cardbox_tracker.ros.tracker_outputs import TrackerOutputs
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.drawing import draw_overlay
 
 _REASONS = {
     NO_PERSON: "nobody is in the picture",
@@ -39,6 +37,9 @@ class TrackerNode(CardboxNode):
         """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
+        # Compiles what no cache has yet, so that no live picture waits for it.
+        self.get_logger().info("preparing (the very first start compiles for half a minute)")
+        Tracker(BodyModel(), Camera(320, 240, 300.0, 300.0, 159.5, 119.5))
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._tracker: Tracker | None = None
@@ -46,11 +47,7 @@ class TrackerNode(CardboxNode):
         self._counts: dict[str, int] = {}
         self._estimate: Estimate | None = None
 
-        self._joints = self.advertise(JointState, "joint_states", qos.RESULT)
-        self._deviations = self.advertise(JointState, "joint_states_stddev", qos.RESULT)
-        self._keypoints = self.advertise(PoseArray, "keypoints", qos.RESULT)
-        self._markers = self.advertise(MarkerArray, "markers", qos.RESULT)
-        self._overlay = self.advertise(Image, "overlay", qos.SENSOR_DATA)
+        self._outputs = TrackerOutputs(self, self.parameters.value.rep155_id)
         self._model_topic = self.resolve("body_model")
         self._silhouette_topic = self.resolve("silhouette")
         self._info_topic = self.resolve("silhouette/camera_info")
@@ -59,8 +56,6 @@ class TrackerNode(CardboxNode):
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
         self.diagnostics.extra = self._values
-        # Compiles what no cache has yet, so that no live picture waits for it.
-        Tracker(BodyModel(), Camera(320, 240, 300.0, 300.0, 159.5, 119.5))
         if self.parameters.value.model_file:
             self._use(load_body_model(self.parameters.value.model_file))
         self._wait()
@@ -122,6 +117,7 @@ class TrackerNode(CardboxNode):
             self._tracker.reset()
         if self._tracker is None or self._body is None or self._camera is None:
             self._wait()
+            self._outputs.waiting(message, "no body model yet: call initializer/initialize")
             return
         silhouette = conversions.silhouette_of(message)
         height, width = silhouette.shape
@@ -131,31 +127,9 @@ class TrackerNode(CardboxNode):
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
         estimate = self._tracker.track(silhouette)
-        self._publish(header, estimate, silhouette)
+        self._outputs.publish(header, estimate, silhouette, self._tracker)
         self._note(estimate)
         self.diagnostics.working(sent_ns)
-
-    def _publish(self, header: Header, estimate: Estimate, silhouette: np.ndarray) -> None:
-        """Publish a posture only where there is one: nothing stale under a new stamp."""
-        tracker = self._tracker
-        assert tracker is not None
-        if estimate.posture is not None:
-            self._joints.publish(results.joint_state_message(header, estimate.posture))
-            if estimate.posture_stddev is not None and _wanted(self._deviations):
-                self._deviations.publish(
-                    results.joint_state_message(header, estimate.posture_stddev)
-                )
-            if estimate.keypoints_m is not None and _wanted(self._keypoints):
-                self._keypoints.publish(results.keypoints_message(header, estimate.keypoints_m))
-            if _wanted(self._markers):
-                self._markers.publish(
-                    results.markers_message(header, tracker.body, tracker.camera, estimate.posture)
-                )
-        elif self._state != estimate.state:
-            self._markers.publish(results.no_markers_message(header))
-        if _wanted(self._overlay):
-            picture = draw_overlay(silhouette, tracker.body, tracker.camera, estimate)
-            self._overlay.publish(conversions.image_message(header, picture, "bgr8"))
 
     def _note(self, estimate: Estimate) -> None:
         self._estimate = estimate
@@ -182,10 +156,6 @@ class TrackerNode(CardboxNode):
                 angles = estimate.posture_stddev[1:]
                 values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
         return values
-
-
-def _wanted(publisher: Any) -> bool:
-    return bool(publisher.get_subscription_count())
 
 
 def main(args: list[str] | None = None) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.ros.guidance import Guidance, instruction
+from cardbox_tracker.ros.guidance import Guidance, instruction, step_of
 
 
 class Room:
@@ -57,3 +57,16 @@ def test_it_gives_up_with_the_reason() -> None:
 @pytest.mark.parametrize("name", ["front", "side", "arms"])
 def test_each_posture_has_an_instruction(name: str) -> None:
     assert instruction(name, "left")
+
+
+def test_every_line_of_the_guidance_is_a_step_and_no_other() -> None:
+    lines: list[str] = []
+    guidance = Guidance(lines.append, lambda name: f"captured '{name}'", lambda _: None)
+    guidance.run(["front", "side", "arms"], "left", 3, 1)
+    steps = [step_of(line) for line in lines]
+    assert {step.name for step in steps if step} == {"front", "side", "arms"}
+    assert [step.left_s for step in steps[:4] if step] == [3, 2, 1, None]
+    assert steps[0] and steps[0].words == instruction("front", "left")
+    assert step_of("measuring: 40 %") == ("measuring", "40 %", None)
+    for other in ("", "measured; fit (IoU) front 0.93", "nobody is in the picture: come nearer"):
+        assert step_of(other) is None

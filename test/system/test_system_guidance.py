@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -14,6 +15,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.vision.guidance_drawing import WANTED_BGR  # noqa: E402
 
 
 class Person:
@@ -59,6 +61,7 @@ def test_guidance_gives_up_with_the_reason_when_nobody_comes(person: Person) -> 
 def test_one_call_guides_captures_and_measures(person: Person) -> None:
     person.obeys, graph = True, person.graph
     person.statuses.clear()
+    overlays = graph.collect(Image, "overlay", qos.SENSOR_DATA)
     client = graph.node.create_client(Trigger, "initializer/initialize")
     graph.wait(client.service_is_ready, "service")
     first = client.call_async(Trigger.Request())
@@ -77,3 +80,15 @@ def test_one_call_guides_captures_and_measures(person: Person) -> None:
         assert any(line.startswith(f"{name}: ") and words in line for line in lines), lines
         assert any(line.startswith(f"{name}: captured") for line in lines), lines
     assert any(line.startswith("measuring") for line in lines)
+    assert overlays, "nothing was drawn for the person"
+    guides = [np.array(o.data).reshape(o.height, o.width, 3) for o in overlays if o.width == 640]
+    # The outline to stand in has a colour of its own.
+    assert any((guide == WANTED_BGR).all(axis=2).sum() > 500 for guide in guides)
+
+
+def test_no_guide_is_drawn_once_it_is_over(person: Person) -> None:
+    graph = person.graph
+    overlays = graph.collect(Image, "overlay", qos.SENSOR_DATA)
+    graph.wait(lambda: not person.statuses[-1].data.startswith("measuring"), "the last line")
+    graph.spin(1.0)
+    assert not overlays

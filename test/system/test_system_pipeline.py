@@ -5,6 +5,7 @@ The tests share one running graph and follow a user's session in order.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ class Session:
         self.model_file = Path(graph.folder) / "model.yaml"
         graph.start("background", learn_images=LEARN_IMAGES)
         graph.start("initializer", model_file=self.model_file, person_distance_m=2.3)
-        self.tracker = graph.start("tracker")
+        self.tracker = graph.start("tracker", rep155_id="p1")
         self.images = graph.node.create_publisher(Image, "image_raw", qos.CAMERA)
         self.infos = graph.node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)
         self.silhouettes = graph.collect(Image, "silhouette")
@@ -310,6 +311,34 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
     )
     assert len(session.joint_states) == before
     graph.diagnosis("tracker", "nobody is in the picture")
+
+
+def test_joints_and_urdf_of_rep155_put_the_hands_at_the_keypoints(
+    measured: tuple[Session, str, str],
+) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
+    session, _, _ = measured
+    graph = session.graph
+    humans = graph.collect(JointState, "/humans/bodies/p1/joint_states")
+    keypoints = graph.collect(PoseArray, "keypoints")
+    descriptions = graph.collect(String, "/humans/bodies/p1/robot_description", qos.LATCHED)
+    graph.spin(0.5)
+
+    def shown() -> bool:
+        session.track("front", 1)
+        return bool(humans and descriptions and keypoints)
+
+    graph.wait(shown, "joint states of REP-155")
+    stamps = {(k.header.stamp.sec, k.header.stamp.nanosec): k for k in keypoints}
+    human = next(h for h in humans if (h.header.stamp.sec, h.header.stamp.nanosec) in stamps)
+    points = stamps[human.header.stamp.sec, human.header.stamp.nanosec].poses
+    robot = yourdfpy.URDF.load(io.BytesIO(descriptions[-1].data.encode()))
+    robot.update_cfg(dict(zip(human.name, human.position, strict=True)))
+    assert all(name.endswith("_p1") for name in human.name)
+    for link, pose in (("l_shoulder", 0), ("l_elbow", 1), ("l_wrist", 2), ("r_wrist", 5)):
+        place = robot.get_transform(f"{link}_p1", "test_optical")[:3, 3]
+        point = points[pose].position
+        np.testing.assert_allclose(place, (point.x, point.y, point.z), atol=2e-3)
 
 
 def test_reset_starts_from_the_front_reference(measured: tuple[Session, str, str]) -> None:
