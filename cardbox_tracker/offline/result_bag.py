@@ -11,7 +11,12 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.body.urdf import urdf_from_body
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.offline.silhouettes import Frame
+from cardbox_tracker.ros.bag_results import write_markers
 from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.ros.marker_shapes import marker_shapes
+from cardbox_tracker.vision.drawing import draw_overlay
+
+_LATCHED = ("/body_model", "/robot_description")
 
 
 class ResultBag:
@@ -19,10 +24,11 @@ class ResultBag:
 
     def __init__(self, path: Path | None, body: BodyModel, frame_id: str) -> None:
         """Set up; the file is opened on entry and appears, whole, on exit."""
-        self._writer = None if path is None else BagWriter(path)
+        self._writer = None if path is None else BagWriter(path, compress=True, latched=_LATCHED)
         self._body = body
         self._frame_id = frame_id
         self._is_first = True
+        self._is_shown = False
 
     def __enter__(self) -> ResultBag:
         """Open the bag."""
@@ -44,14 +50,31 @@ class ResultBag:
         """Write what is known of one picture."""
         if self._writer is None:
             return
-        stamp = frame.stamp_ns
+        self._write(self._writer, frame, estimate, tracker)
+
+    def _write(self, bag: BagWriter, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+        stamp, optical = frame.stamp_ns, self._frame_id
+        body, camera = self._body, tracker.camera
         if self._is_first:
-            self._is_first = False
-            self._writer.write_string("body_model", stamp, dumps_body_model(self._body))
-            self._writer.write_string("robot_description", stamp, urdf_from_body(self._body))
+            bag.write_string("/body_model", stamp, dumps_body_model(body))
+            bag.write_string("/robot_description", stamp, urdf_from_body(body, optical or None))
+        self._is_first = False
+        bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
+        bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
+        overlay = draw_overlay(frame.brightness, body, camera, estimate)
+        bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
         if estimate.posture is None or estimate.keypoints_m is None:
+            if self._is_shown:
+                write_markers(bag, "/markers", stamp, optical, None)
+            self._is_shown = False
             return
-        self._writer.write_joint_state(
-            "joint_states", stamp, "camera_level", JOINT_NAMES, estimate.posture
-        )
-        self._writer.write_pose_array("keypoints", stamp, self._frame_id, estimate.keypoints_m)
+        # The header is that of the picture, as the node has it.
+        bag.write_joint_state("/joint_states", stamp, optical, JOINT_NAMES, estimate.posture)
+        if estimate.posture_stddev is not None:
+            bag.write_joint_state(
+                "/joint_states_stddev", stamp, optical, JOINT_NAMES, estimate.posture_stddev
+            )
+        bag.write_pose_array("/keypoints", stamp, optical, estimate.keypoints_m)
+        shapes = marker_shapes(body, camera, estimate.posture)
+        write_markers(bag, "/markers", stamp, optical, shapes)
+        self._is_shown = True

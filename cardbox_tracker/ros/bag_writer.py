@@ -12,8 +12,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.errors import BagError
@@ -21,12 +29,30 @@ from cardbox_tracker.vision.camera import Camera
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 
+_FOREVER = QosTime(2**31 - 1, 2**32 - 1)
+_LATCHED = Qos(
+    QosHistory.KEEP_LAST,
+    1,
+    QosReliability.RELIABLE,
+    QosDurability.TRANSIENT_LOCAL,
+    _FOREVER,
+    _FOREVER,
+    QosLiveliness.AUTOMATIC,
+    _FOREVER,
+    False,
+)
+
 
 class BagWriter:
     """Context of a new recording: a folder that appears, complete, when the context ends."""
 
     def __init__(
-        self, path: str | os.PathLike[str], storage: str = "mcap", overwrite: bool = False
+        self,
+        path: str | os.PathLike[str],
+        storage: str = "mcap",
+        overwrite: bool = False,
+        compress: bool = False,
+        latched: Sequence[str] = (),
     ) -> None:
         """Name the folder.
 
@@ -34,6 +60,8 @@ class BagWriter:
             path: folder to make.
             storage: ``mcap`` or ``sqlite3``.
             overwrite: replace a recording of that name; nothing else is ever replaced.
+            compress: compress the chunks of an mcap file (zstd, as every reader of mcap knows).
+            latched: topics whose last message a late subscriber needs; 'ros2 bag play' knows then.
 
         Raises:
             BagError: the storage is unknown, or something is in the way.
@@ -48,6 +76,8 @@ class BagWriter:
             raise BagError(f"{self.path} exists and is {what}; choose another name or remove it")
         self._storage = STORAGES[storage]
         self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._compress = compress and storage == "mcap"
+        self._latched = frozenset(latched)
         self._connections: dict[str, Connection] = {}
 
     def __enter__(self) -> BagWriter:
@@ -68,6 +98,8 @@ class BagWriter:
         self._writer = Writer(
             self._folder / self.path.name, version=9, storage_plugin=self._storage
         )
+        if self._compress:
+            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._writer.open()
         return self
 
@@ -105,7 +137,10 @@ class BagWriter:
         """Write the CDR bytes of a message."""
         connection = self._connections.get(topic)
         if connection is None:
-            connection = self._writer.add_connection(topic, msgtype, typestore=self._store)
+            profiles = [_LATCHED] if topic in self._latched else []
+            connection = self._writer.add_connection(
+                topic, msgtype, typestore=self._store, offered_qos_profiles=profiles
+            )
             self._connections[topic] = connection
         self._writer.write(connection, stamp_ns, raw)
 
