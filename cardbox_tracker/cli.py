@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,12 +33,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(arguments)
     try:
         options.run(options)
+        sys.stdout.flush()
     except CardboxError as error:
         print(f"cardbox {options.command}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(f"cardbox {options.command}: interrupted", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        # As in 'cardbox urdf MODEL.yaml | head': nobody reads on, which is no error of ours.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
 
 
