@@ -26,6 +26,8 @@ SPAN = 0.985
 
 _RANGE_M = (1.1, 2.2)
 _MEAN_M = 1.71
+# Whose lower edge leaves less than this of the stature that the arms suggest hides the lower legs.
+_FEET = 0.88
 
 
 def height_of_row_m(camera: Camera, row: float, distance_m: float) -> float:
@@ -47,27 +49,39 @@ def stature_m(
     front, arms = references["front"], references["arms"]
     rows = np.nonzero(np.any(front, axis=1))[0]
     crown_m = height_of_row_m(camera, rows[0] - 0.5, distance_m)
+    guess_m = _stature_without_feet_m(arms, crown_m, camera, distance_m)
     if rows[-1] < front.shape[0] - 1:
-        # The feet are in the picture, so nothing needs to be guessed.
+        # Nothing needs to be guessed if these are the feet, and not the edge of a desk.
         whole_m = crown_m - height_of_row_m(camera, rows[-1] + 0.5, distance_m)
-        if _RANGE_M[0] <= whole_m <= _RANGE_M[1]:
+        if whole_m > _FEET * guess_m and _RANGE_M[0] <= whole_m <= _RANGE_M[1]:
             return whole_m
+    return guess_m
+
+
+def _stature_without_feet_m(
+    arms: NDArray[np.uint8], crown_m: float, camera: Camera, distance_m: float
+) -> float:
+    """Stature by the arm span and the height of the head above the shoulders."""
     columns = np.nonzero(np.any(arms, axis=0))[0]
     scale = np.hypot(1.0, (np.mean(np.nonzero(arms)[0]) - camera.cy) / camera.fy)
     depth_m = distance_m / scale
     span_m = (columns[-1] - columns[0] + 1) / camera.fx * depth_m
-    guesses = [
-        span_m / SPAN,
-        (crown_m - _shoulder_height_m(arms, camera, distance_m)) / CROWN_TO_SHOULDER,
-        _MEAN_M,
-    ]
     # Both measures scatter by a few per cent; what everybody shares steadies them.
-    weights = [0.45, 0.3, 0.25]
+    guesses, weights = [span_m / SPAN, _MEAN_M], [0.45, 0.25]
+    shoulder_m = _shoulder_height_m(arms, camera, distance_m)
+    if shoulder_m is not None:
+        guesses.append((crown_m - shoulder_m) / CROWN_TO_SHOULDER)
+        weights.append(0.3)
     return float(np.clip(np.average(guesses, weights=weights), *_RANGE_M))
 
 
-def _shoulder_height_m(arms: NDArray[np.uint8], camera: Camera, distance_m: float) -> float:
-    """Height of the shoulder joints: the arms' middle line, followed back to the shoulders."""
+def _shoulder_height_m(
+    arms: NDArray[np.uint8], camera: Camera, distance_m: float
+) -> float | None:
+    """Height of the shoulder joints: the arms' middle line, followed back to the shoulders.
+
+    None where no upper arm was cut out.
+    """
     columns = np.nonzero(np.any(arms, axis=0))[0]
     first, last = columns[0], columns[-1]
     heights = []
@@ -83,4 +97,4 @@ def _shoulder_height_m(arms: NDArray[np.uint8], camera: Camera, distance_m: floa
         slope, offset = np.polyfit(used, rows, 1)
         shoulder = end + 0.78 * (middle - end)
         heights.append(height_of_row_m(camera, slope * shoulder + offset, distance_m))
-    return float(np.mean(heights)) if heights else float("nan")
+    return float(np.mean(heights)) if heights else None

@@ -24,6 +24,14 @@ def block(top: int, bottom: int, left: int, right: int) -> np.ndarray:
     return silhouette
 
 
+def outstretched(rows: int) -> np.ndarray:
+    """A person of so many rows with level arms of their span, the crown in row 30."""
+    arms = block(30, 30 + rows, 130, 190)
+    half = round(SPAN * rows / 2)
+    shoulder = 30 + round(0.19 * rows)
+    return arms | block(shoulder - 4, shoulder + 5, 160 - half, 160 + half)
+
+
 def seen(body: BodyModel, name: str) -> np.ndarray:
     camera = CAMERA.with_pitch(body.camera_pitch_rad)
     return render(cardbox_patches(body, reference_posture(name)), camera)
@@ -58,7 +66,25 @@ def test_the_height_of_a_row_is_that_of_the_point_seen_there(
 def test_whose_feet_are_in_the_picture_needs_no_guess(rows: int, expected_m: float) -> None:
     # 3.3 px a centimetre at 1 m, so 1 px is a centimetre at 3.3 m.
     front = block(30, 30 + rows, 130, 190)
-    assert stature_m({"front": front, "arms": front}, CAMERA, 3.3) == pytest.approx(expected_m)
+    assert stature_m({"front": front, "arms": outstretched(rows)}, CAMERA, 3.3) == pytest.approx(
+        expected_m
+    )
+
+
+def test_a_desk_before_the_legs_is_not_taken_for_feet() -> None:
+    """Whoever spans 1.8 m is not 1.2 m tall."""
+    arms = outstretched(180)
+    arms[150:] = 0
+    front = block(30, 150, 130, 190)
+    assert stature_m({"front": front, "arms": arms}, CAMERA, 3.3) == pytest.approx(1.8, abs=0.06)
+
+
+def test_upper_arms_that_were_not_cut_out_are_done_without() -> None:
+    arms = outstretched(180)
+    arms[:, 100:130] = 0
+    arms[:, 190:220] = 0
+    front = block(30, 230, 130, 190)
+    assert stature_m({"front": front, "arms": arms}, CAMERA, 3.3) == pytest.approx(1.8, abs=0.25)
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 5.0])
