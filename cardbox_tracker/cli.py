@@ -43,6 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # As in 'cardbox urdf MODEL.yaml | head': nobody reads on, which is no error of ours.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        # Such as a disk that is full; what was being written is not left behind half.
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"cardbox {options.command}: {where}{error.strerror or error}", file=sys.stderr)
+        return 1
     return 0
 
 
@@ -335,6 +340,10 @@ def _initialize(options: argparse.Namespace) -> None:
     )
     # Absurd constants are refused by their own names, before anything follows from them.
     BodyModel(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
+    folder = options.output.parent
+    if not folder.is_dir():
+        reason = "Not a directory" if folder.exists() else "No such file or directory"
+        raise CardboxError(f"cannot write {options.output}: {reason}; choose a folder that exists")
     spans = {name: getattr(options, name) for name in ("front", "side", "arms")}
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)

@@ -154,7 +154,15 @@ def test_a_span_that_is_none_is_refused(
     model = files / "new.yaml"
     words = [*SPANS, "--distance", "2", "--output", str(model), f"{option}={text}"]
     code = run("initialize", files / "session", *words)
-    assert_told(capsys, "initialize", code, (option, f"'{text}' is no span; expected T0:T1",))
+    assert_told(
+        capsys,
+        "initialize",
+        code,
+        (
+            option,
+            f"'{text}' is no span; expected T0:T1",
+        ),
+    )
     assert not model.exists()
 
 
@@ -354,3 +362,26 @@ def test_what_needs_ros_says_so() -> None:
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert "ROS 2 is not installed" in done.stderr.splitlines()[-1]
+
+
+def test_a_full_disk_is_told_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device", "somewhere")
+
+    monkeypatch.setattr("cardbox_tracker.simulation.session.synthesize_session", full)
+    assert main(["synthesize", "--output", str(tmp_path / "bag")]) == 1
+    assert capsys.readouterr().err.endswith(
+        "cardbox synthesize: somewhere: No space left on device\n"
+    )
+
+
+def test_a_missing_output_folder_is_told_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spans = ["--background", "0:4", "--front", "6:7", "--side", "9:10", "--arms", "12:13"]
+    output = str(tmp_path / "none" / "body.yaml")
+    given = ["initialize", "no_bag", *spans, "--distance", "2", "--output", output]
+    assert main(given) == 1
+    assert "No such file or directory; choose a folder" in capsys.readouterr().err

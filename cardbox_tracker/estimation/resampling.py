@@ -90,7 +90,8 @@ def deterministic(
     survivors come in no particular order: whoever is an ancestor once is so at any place in the
     list, so a partition does the work of a sort.
     """
-    survivors = max(1, int(survival_rate * len(costs)))
+    # The product may fall short of a whole number by rounding, as 0.29 times 100 does.
+    survivors = max(1, int(survival_rate * len(costs) + 1e-9))
     ancestors: Ancestors = costs.argpartition(survivors - 1)
     first = costs[ancestors[:survivors]].argmin()
     best = ancestors[first]

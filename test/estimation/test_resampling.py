@@ -201,3 +201,10 @@ def test_srs_does_not_look_at_the_order_alone() -> None:
     far = srs(costs, np.random.default_rng(0))
     near = srs(costs / 10.0, np.random.default_rng(0))
     assert len(np.unique(far)) < len(np.unique(near))
+
+
+def test_survivors_are_not_lost_to_rounding() -> None:
+    """0.29 times 100 is 28.999999999999996."""
+    costs = np.arange(100, dtype=np.float64)
+    ancestors = STRATEGIES["drs"](costs, 0.29, 1.0, np.random.default_rng(0))
+    assert sorted(set(ancestors.tolist())) == list(range(29))
