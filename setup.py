@@ -64,6 +64,7 @@ setup(
             f"tracker = {NAME}.ros.tracker_node:main",
             f"camera = {NAME}.ros.camera_node:main",
             f"play_bag = {NAME}.ros.play_bag_node:main",
+            f"cardbox_nodes = {NAME}.ros.single_process:main",
         ],
     },
 )

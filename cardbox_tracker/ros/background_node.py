@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.camera_info import calibration_from_info
-from cardbox_tracker.ros.node import CardboxNode, run
+from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.vision.background import (
@@ -192,7 +192,7 @@ class BackgroundNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run(BackgroundNode, args)
+    return run_node(BackgroundNode, args)
 
 
 if __name__ == "__main__":

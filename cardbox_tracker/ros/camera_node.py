@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.input_parameters import CameraParameters
-from cardbox_tracker.ros.node import CardboxNode, run
+from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 
@@ -185,7 +185,7 @@ def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> C
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run(CameraNode, args)
+    return run_node(CameraNode, args)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from cardbox_tracker.estimation.initialization import InitializationResult, init
 from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.guidance import Guidance
 from cardbox_tracker.ros.guide_overlay import GuideOverlay
-from cardbox_tracker.ros.node import CardboxNode, run
+from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import InitializerParameters
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.ros.reference_capture import ReferenceCapture
@@ -176,7 +176,7 @@ def _answer(result: InitializationResult) -> str:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run(InitializerNode, args)
+    return run_node(InitializerNode, args)
 
 
 if __name__ == "__main__":

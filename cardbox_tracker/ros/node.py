@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import rclpy
 from rclpy.callback_groups import CallbackGroup
@@ -26,7 +26,15 @@ from cardbox_tracker.ros.diagnostics import NodeDiagnostics
 Callback = Callable[[Any, int], None]
 """Takes a message and when it left its sender, ns since the epoch."""
 
-N = TypeVar("N", bound="CardboxNode")
+
+class Closable(Protocol):
+    """A node or several that hold something to release."""
+
+    def close(self) -> None:
+        """Release it."""
+
+
+N = TypeVar("N", bound=Closable)
 
 
 class CardboxNode(Node):
@@ -115,10 +123,13 @@ def spin(node: CardboxNode) -> None:
     executor.spin()
 
 
-def run(
-    create: Callable[[], N], args: list[str] | None = None, work: Callable[[N], None] = spin
-) -> int:
-    """Create a node and let it work until it is told to stop; return the process's exit code."""
+def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
+    """Create a node and serve it until it is told to stop; return the process's exit code."""
+    return run(create, args, spin)
+
+
+def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
+    """Create what works until it is told to stop; return the process's exit code."""
     try:
         rclpy.init(args=args)
     except Exception as error:

@@ -42,13 +42,26 @@ def _details(spec: ParameterSpec) -> str:
 
 def config_text(kind: type[NodeParameters]) -> str:
     """Return the YAML file of one node, with every parameter at its default."""
-    lines = [f"# {kind.__doc__}", f"# {_GENERATED}", "/**:", "  ros__parameters:"]
+    lines = [f"# {kind.__doc__}", f"# {_GENERATED}", "/**:", *_section(kind)]
+    return "\n".join(lines) + "\n"
+
+
+def all_config_text() -> str:
+    """Return the YAML file of ``cardbox_nodes``: all nodes, each in any namespace."""
+    lines = ["# All nodes in one process (cardbox_nodes).", f"# {_GENERATED}"]
+    for node, kind in NODES.items():
+        lines += [f"/**/{node}:", *_section(kind)]
+    return "\n".join(lines) + "\n"
+
+
+def _section(kind: type[NodeParameters]) -> list[str]:
+    lines = ["  ros__parameters:"]
     for name, spec in kind.specs().items():
         value = default_of(kind, name)
         lines.append(f"    # {spec.description} ({_details(spec)})")
         # The ROS parser does not take an empty list, so it is shown as a comment.
         lines.append(f"    # {name}: []" if value == [] else f"    {name}: {yaml_value(value)}")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def markdown_text() -> str:
@@ -83,6 +96,7 @@ def markdown_text() -> str:
 def files() -> dict[str, str]:
     """Return every generated file: path below the repository to its text."""
     texts = {f"config/{node}.yaml": config_text(kind) for node, kind in NODES.items()}
+    texts["config/cardbox_nodes.yaml"] = all_config_text()
     return {**texts, "docs/parameters.md": markdown_text()}
 
 

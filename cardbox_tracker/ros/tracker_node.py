@@ -15,7 +15,7 @@ from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
 from cardbox_tracker.ros import conversions, qos
-from cardbox_tracker.ros.node import CardboxNode, run
+from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import TrackerParameters
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.ros.tracker_outputs import TrackerOutputs
@@ -160,7 +160,7 @@ class TrackerNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run(TrackerNode, args)
+    return run_node(TrackerNode, args)
 
 
 if __name__ == "__main__":

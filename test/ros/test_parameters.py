@@ -169,6 +169,22 @@ def test_ros_reads_the_generated_file_as_the_defaults(make_node: Callable, node_
     assert LiveParameters(node, NODES[node_name]).value == expected
 
 
+@pytest.mark.parametrize("node_name", NODES)
+def test_one_file_has_the_parameters_of_all_nodes_in_any_namespace(
+    make_node: Callable, node_name: str, tmp_path: Path
+) -> None:
+    changed = tmp_path / "nodes.yaml"
+    text = (ROOT / "config" / "cardbox_nodes.yaml").read_text()
+    changed.write_text(text.replace('model_file: ""', f'model_file: "{node_name}"'))
+    extra = ("-p", "bag:=some") if node_name == "play_bag" else ()
+    arguments = ("--params-file", str(changed), "-r", "__ns:=/left", *extra)
+    value = LiveParameters(make_node(*arguments, name=node_name), NODES[node_name]).value
+    if hasattr(value, "model_file"):
+        assert value == NODES[node_name](model_file=node_name)  # type: ignore[call-arg]
+    else:
+        assert value == (PlayBagParameters(bag="some") if extra else NODES[node_name]())
+
+
 def test_defaults_of_the_core_are_not_written_twice() -> None:
     assert BackgroundParameters().config() == BackgroundConfig()
     assert InitializerParameters().config() == InitializationConfig()

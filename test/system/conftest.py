@@ -46,8 +46,8 @@ class Scene:
         camera: the camera that sees them.
     """
 
-    def __init__(self) -> None:
-        self.body = BodyModel(distance_m=2.3, hip_height_m=-0.45, lateral_m=0.05)
+    def __init__(self, lateral_m: float = 0.05) -> None:
+        self.body = BodyModel(distance_m=2.3, hip_height_m=-0.45, lateral_m=lateral_m)
         self.camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
         self._rng = np.random.default_rng(1)
 
@@ -118,11 +118,15 @@ class Graph:
         self._numbers = itertools.count()
 
     def start(self, name: str, *arguments: str, **parameters: Any) -> Process:
-        """Start the node ``name`` with ROS parameters; ``arguments`` come before them."""
+        """Start the node ``name`` with ROS parameters; ``arguments`` come before them.
+
+        ``single_process`` is all nodes in one.
+        """
         ros = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
         log = self.folder / f"{name}_{next(self._numbers)}.log"
         extra = ("--ros-args", *ros) if ros else ()
-        process = Process(f"{name}_node", (*arguments, *extra), log, self.domain)
+        module = name if name == "single_process" else f"{name}_node"
+        process = Process(module, (*arguments, *extra), log, self.domain)
         self.processes.append(process)
         return process
 
@@ -226,3 +230,9 @@ def _graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 def scene() -> Scene:
     """The drawn room and person."""
     return Scene()
+
+
+@pytest.fixture(scope="session")
+def make_scene() -> type[Scene]:
+    """What makes another room with a person who stands elsewhere."""
+    return Scene
