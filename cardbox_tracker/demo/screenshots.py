@@ -24,6 +24,7 @@ from cardbox_tracker.files import atomic_path
 from cardbox_tracker.offline.initialize import initialize_from_recording
 from cardbox_tracker.offline.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.ros.bag_reader import BagReader
+from cardbox_tracker.ros.guidance import instruction
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.session import synthesize_session
 from cardbox_tracker.vision.drawing import Picture, draw_overlay
@@ -98,16 +99,18 @@ def _shots(
 def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Picture:
     """What is shown before the references ``front`` and ``arms`` are captured."""
     shown = []
-    for name, before_s, text in (
-        ("front", -_SETTLED_S, "FRONT: 1"),
-        ("arms", _BEFORE_ARMS_S, "ARMS: 3"),
-    ):
-        start_s = segments[name].start_s - before_s
-        frame = next(source.frames(start_s))
-        posture = reference_posture(name)
-        somebody = BodyModel()
+    for name, before_s, left_s in (("front", -_SETTLED_S, 1), ("arms", _BEFORE_ARMS_S, 3)):
+        frame = next(source.frames(segments[name].start_s - before_s))
         shown.append(
-            draw_guidance(frame.silhouette, somebody, source.camera, posture, [text], _SCALE)
+            draw_guidance(
+                frame.silhouette,
+                BodyModel(),
+                source.camera,
+                reference_posture(name),
+                instruction(name, "left"),
+                left_s,
+                _SCALE,
+            )
         )
     return _row(shown)
 

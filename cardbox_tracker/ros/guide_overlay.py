@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import textwrap
 
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.ros import conversions, qos
-from cardbox_tracker.ros.guidance import Step, step_of
+from cardbox_tracker.ros.guidance import step_of
 from cardbox_tracker.ros.node import CardboxNode
 from cardbox_tracker.ros.node_parameters import InitializerParameters
 from cardbox_tracker.vision.camera import Camera
@@ -19,8 +18,6 @@ from cardbox_tracker.vision.guidance_drawing import draw_guidance
 from cardbox_tracker.vision.standing import at_height_of
 
 _SCALE = 2
-# Characters a line: fewer are larger.
-_LINE = 26
 
 
 class GuideOverlay:
@@ -56,15 +53,10 @@ class GuideOverlay:
                 at_height_of(silhouette, body, camera),
                 camera.with_pitch(body.camera_pitch_rad),
                 reference_posture(step.name, settings.side_turn),
-                _lines(step),
+                step.words,
+                step.left_s,
                 _SCALE,
             )
         else:
             picture = draw_message(silhouette, self.status)
         self._publisher.publish(conversions.image_message(message.header, picture, "bgr8"))
-
-
-def _lines(step: Step) -> list[str]:
-    """The number first, the largest; then what to do, in lines that can be read from afar."""
-    number = [] if step.left_s is None else [str(step.left_s)]
-    return [*number, *textwrap.wrap(step.words, _LINE)[:3]]
