@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
 from cardbox_tracker.ros import conversions, qos
 from cardbox_tracker.ros.node import CardboxNode, run_node
@@ -39,7 +40,7 @@ class TrackerNode(CardboxNode):
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
         # Compiles what no cache has yet, so that no live picture waits for it.
         self.get_logger().info("preparing (the very first start compiles for half a minute)")
-        Tracker(BodyModel(), Camera(320, 240, 300.0, 300.0, 159.5, 119.5))
+        compile_all()
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._tracker: Tracker | None = None
