@@ -118,7 +118,9 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
         with BagWriter(folder / "bag") as bag:
             bag.write_camera_info(BAG_TOPIC, 1, "camera", session_camera())
         return [make(PlayBagNode, bag=str(folder / "bag"))]
-    return [make({"initializer": InitializerNode, "tracker": TrackerNode}[name])]
+    if name == "tracker":
+        return [make(TrackerNode, rep155_id="ID")]
+    return [make(InitializerNode)]
 
 
 @pytest.mark.parametrize("name", NODES)
@@ -222,6 +224,18 @@ def test_commands_give_nodes_what_they_have(
             assert node.has_parameter(parameter), line
         for topic in REMAPPED.findall(line):
             assert topic == "__ns" or full(topic) in topics, line
+
+
+def test_commands_give_nodes_in_one_process_what_they_have(
+    make: Callable[..., Any], tmp_path: Path
+) -> None:
+    lines = lines_that_start("cardbox_nodes")
+    assert lines
+    for line in lines:
+        given = re.findall(r"-p (\w+):(\w+):=", line)
+        assert len(given) == line.count(":="), line
+        for node, parameter in given:
+            assert nodes_called(node, make, tmp_path)[0].has_parameter(parameter), line
 
 
 def test_command_lines_of_play_bag_parse() -> None:
