@@ -9,13 +9,24 @@ Several cameras: start it once per camera, each with a namespace and a device of
 
 from pathlib import Path
 
+import yaml
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    SetLaunchConfiguration,
+)
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+
+def _is_true(text: str) -> bool:
+    return text.lower() == "true"
+
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # The node's parameters of the same names: default, type, meaning.
@@ -27,32 +38,61 @@ ARGUMENTS = {
     "width": ("640", int, "width to ask the device for, px"),
     "height": ("480", int, "height to ask the device for, px"),
     "rate_hz": ("15.0", float, "pictures a second"),
+    "loop": ("false", _is_true, "play the file again and again"),
     "frame_id": ("camera_optical_frame", str, "name of the camera's optical frame"),
 }
 
 
 def generate_launch_description() -> LaunchDescription:
-    given = {
-        name: ParameterValue(LaunchConfiguration(name), value_type=kind)
-        for name, (_, kind, _) in ARGUMENTS.items()
-    }
     return LaunchDescription(
         [
             *(
                 DeclareLaunchArgument(name, default_value=default, description=text)
                 for name, (default, _, text) in ARGUMENTS.items()
             ),
+            OpaqueFunction(function=_in_one_process),
             # First, since it sets the environment and declares what the camera uses as well.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
             ),
-            Node(
-                package="cardbox_tracker",
-                executable="camera",
-                name="camera",
-                namespace=LaunchConfiguration("namespace"),
-                parameters=[[LaunchConfiguration("config_dir"), "/camera.yaml"], given],
-                output="screen",
-            ),
+            OpaqueFunction(function=_camera),
         ]
     )
+
+
+def _is_single(context: LaunchContext) -> bool:
+    return context.launch_configurations.get("single_process", "false").lower() == "true"
+
+
+def _parameters(context: LaunchContext) -> dict[str, object]:
+    given = context.launch_configurations
+    return {name: kind(given[name]) for name, (_, kind, _) in ARGUMENTS.items()}
+
+
+def _in_one_process(context: LaunchContext) -> list[object]:
+    if not _is_single(context):
+        return []
+    return [
+        SetLaunchConfiguration("source", "camera"),
+        SetLaunchConfiguration("source_parameters", yaml.safe_dump(_parameters(context))),
+    ]
+
+
+def _camera(context: LaunchContext) -> list[object]:
+    if _is_single(context):
+        return []
+    # Keeps launch from reading a text as a number or as nothing.
+    parameters = {
+        name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
+        for name, value in _parameters(context).items()
+    }
+    return [
+        Node(
+            package="cardbox_tracker",
+            executable="camera",
+            name="camera",
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[[LaunchConfiguration("config_dir"), "/camera.yaml"], parameters],
+            output="screen",
+        )
+    ]

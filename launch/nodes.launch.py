@@ -6,8 +6,10 @@ Included by live.launch.py and replay.launch.py; start it alone beside a camera 
         camera_info:=/camera/camera_info person_distance_m:=2.0
 """
 
+import tempfile
 from pathlib import Path
 
+import yaml
 from ament_index_python.packages import (
     PackageNotFoundError,
     get_package_prefix,
@@ -42,8 +44,21 @@ ARGUMENTS = {
     "side_turn": ("left", "which way the person turns for the side reference: left or right"),
     "model_file": ("", "body model: read if it exists, written by every initialization"),
     "preset": ("default", "tracker settings: paper or default"),
+    "rep155_id": ("", "also publish /humans/bodies/ID/... after REP-155, for this ID"),
+    "single_process": ("false", "all nodes in one process, for least latency"),
     "publish_tf": ("true", "start robot_state_publisher"),
     "rviz": ("false", "start RViz"),
+}
+# Parameters that are launch arguments too, by node.
+GIVEN: dict[str, dict[str, type]] = {
+    "background": {"image_transport": str},
+    "initializer": {
+        "person_distance_m": float,
+        "camera_pitch_deg": float,
+        "side_turn": str,
+        "model_file": str,
+    },
+    "tracker": {"preset": str, "rep155_id": str},
 }
 # Nobody until somebody is measured: robot_state_publisher does not start without a description.
 NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
@@ -62,45 +77,74 @@ def generate_launch_description() -> LaunchDescription:
             *declared,
             # Without it Fast DDS loses most large pictures; a profile of the user's own stays.
             SetEnvironmentVariable(PROFILES, profiles),
-            _node(
-                "background",
-                {"image_transport": str},
-                remappings=[
-                    ("image_raw", LaunchConfiguration("image")),
-                    ("image_raw/compressed", [LaunchConfiguration("image"), "/compressed"]),
-                    ("camera_info", LaunchConfiguration("camera_info")),
-                ],
-            ),
-            _node(
-                "initializer",
-                {
-                    "person_distance_m": float,
-                    "camera_pitch_deg": float,
-                    "side_turn": str,
-                    "model_file": str,
-                },
-            ),
-            _node("tracker", {"preset": str}),
+            OpaqueFunction(function=_nodes),
             OpaqueFunction(function=_robot_state_publisher),
             OpaqueFunction(function=_rviz),
         ]
     )
 
 
-def _node(name: str, parameters: dict[str, type], **options: object) -> Node:
-    """A node of this package: its YAML file, and on top the launch arguments of the same names."""
-    given = {
-        parameter: ParameterValue(LaunchConfiguration(parameter), value_type=kind)
-        for parameter, kind in parameters.items()
+def _nodes(context: LaunchContext) -> list[object]:
+    given = context.launch_configurations
+    remappings = [
+        ("image_raw", given["image"]),
+        ("image_raw/compressed", f"{given['image']}/compressed"),
+        ("camera_info", given["camera_info"]),
+    ]
+    if _wanted(context, "single_process"):
+        return [_single_process(context, remappings)]
+    return [
+        Node(
+            package="cardbox_tracker",
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], own],
+            remappings=remappings if name == "background" else [],
+            output="screen",
+        )
+        for name, own in ((name, _exact(_typed(given, name))) for name in GIVEN)
+    ]
+
+
+def _exact(parameters: dict[str, object]) -> dict[str, object]:
+    """Keep launch from reading a text as a number or as nothing."""
+    return {
+        name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
+        for name, value in parameters.items()
     }
+
+
+def _typed(given: dict[str, str], node: str) -> dict[str, object]:
+    """The launch arguments that are parameters of ``node``, as its types."""
+    return {name: kind(given[name]) for name, kind in GIVEN[node].items()}
+
+
+def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
+    """All nodes, and the source that live.launch.py or replay.launch.py chose, in one process."""
+    given = context.launch_configurations
+    parameters = {name: _typed(given, name) for name in GIVEN}
+    source = given.get("source", "")
+    if source:
+        parameters[source] = yaml.safe_load(given["source_parameters"])
+    sections = {}
+    for name, own in parameters.items():
+        path = Path(given["config_dir"]) / f"{name}.yaml"
+        # In one process, a file for any node would be for every node.
+        (section,) = yaml.safe_load(path.read_text(encoding="utf-8")).values()
+        sections[f"/**/{name}"] = {"ros__parameters": {**section["ros__parameters"], **own}}
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
+        yaml.safe_dump(sections, file)
+    rules = [word for old, new in remappings for word in ("-r", f"background:{old}:={new}")]
     return Node(
         package="cardbox_tracker",
-        executable=name,
-        name=name,
+        executable="cardbox_nodes",
         namespace=LaunchConfiguration("namespace"),
-        parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], given],
+        arguments=[
+            *(["--with", source] if source else []),
+            *("--ros-args", "--params-file", file.name, *rules),
+        ],
         output="screen",
-        **options,
     )
 
 
@@ -109,38 +153,49 @@ def _robot_state_publisher(context: LaunchContext) -> list[object]:
         return []
     if not _installed("robot_state_publisher"):
         return [_hint("robot_state_publisher", "so there is no TF of the person")]
-    _pass_on_description(context)
-    return [
-        Node(
-            package="robot_state_publisher",
-            executable="robot_state_publisher",
-            name="robot_state_publisher",
-            namespace=LaunchConfiguration("namespace"),
-            # A recording's stamps go back when it starts over.
-            parameters=[
-                {
-                    "robot_description": ParameterValue(NOBODY, value_type=str),
-                    "ignore_timestamp": True,
-                    # It thins out joint states to this rate.
-                    "publish_frequency": 200.0,
-                }
-            ],
+    body_id = LaunchConfiguration("rep155_id").perform(context)
+    described = [_described(context, "robot_state_publisher", "")]
+    if body_id:
+        name = f"robot_state_publisher_{body_id}"
+        described.append(_described(context, name, f"/humans/bodies/{body_id}/"))
+    return described
+
+
+def _described(context: LaunchContext, name: str, place: str) -> Node:
+    """A robot_state_publisher of the joint states and the description below ``place``."""
+    _pass_on_description(context, name, f"{place}robot_description")
+    return Node(
+        package="robot_state_publisher",
+        executable="robot_state_publisher",
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        # A recording's stamps go back when it starts over.
+        parameters=[
+            {
+                "robot_description": ParameterValue(NOBODY, value_type=str),
+                "ignore_timestamp": True,
+                # It thins out joint states to this rate.
+                "publish_frequency": 200.0,
+            }
+        ],
+        remappings=[
+            ("joint_states", f"{place}joint_states"),
             # Its own copy of the description would compete with the initializer's.
-            remappings=[("robot_description", "robot_state_publisher/robot_description")],
-            output="screen",
-        )
-    ]
+            ("robot_description", f"{name}/robot_description"),
+        ],
+        output="screen",
+    )
 
 
-def _pass_on_description(context: LaunchContext) -> None:
-    """Set what the initializer publishes as robot_state_publisher's parameter.
+def _pass_on_description(context: LaunchContext, name: str, topic: str) -> None:
+    """Set what is published on ``topic`` as a parameter of the robot_state_publisher ``name``.
 
     It takes a new description as a parameter at any time, but does not listen to the topic.
     """
     node = get_ros_node(context)
     namespace = LaunchConfiguration("namespace").perform(context).strip("/")
     prefix = f"/{namespace}" if namespace else ""
-    client = AsyncParameterClient(node, f"{prefix}/robot_state_publisher")
+    client = AsyncParameterClient(node, f"{prefix}/{name}")
     waiting: list[str] = []
 
     def send() -> None:
@@ -153,7 +208,8 @@ def _pass_on_description(context: LaunchContext) -> None:
         send()
 
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    node.create_subscription(String, f"{prefix}/robot_description", receive, latched)
+    full = topic if topic.startswith("/") else f"{prefix}/{topic}"
+    node.create_subscription(String, full, receive, latched)
     node.create_timer(0.5, send)
 
 

@@ -9,6 +9,7 @@ can be captured (initializer/capture_front) before play_bag/resume.
 
 from pathlib import Path
 
+import yaml
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
@@ -24,12 +25,17 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from cardbox_tracker.ros.bag_reader import BagReader
 
+
+def _is_true(text: str) -> bool:
+    return text.lower() == "true"
+
+
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 COMPRESSED = "/compressed"
 # The node's parameters of the same names: default, type, meaning.
 ARGUMENTS = {
     "rate": ("1.0", float, "speed; 2 plays twice as fast"),
-    "loop": ("false", bool, "play again and again"),
+    "loop": ("false", _is_true, "play again and again"),
     "start_s": ("0.0", float, "begin so long after the bag's start"),
     "duration_s": ("0.0", float, "play so much of the bag; 0 is all"),
 }
@@ -45,6 +51,7 @@ def generate_launch_description() -> LaunchDescription:
                 for name, (default, _, text) in ARGUMENTS.items()
             ),
             OpaqueFunction(function=_find_topics),
+            OpaqueFunction(function=_in_one_process),
             # Before play_bag, since it sets the environment and declares what play_bag uses too.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
@@ -68,23 +75,50 @@ def _find_topics(context: LaunchContext) -> list[object]:
     return [SetLaunchConfiguration(name, value) for name, value in found.items()]
 
 
-def _play_bag(context: LaunchContext) -> list[object]:
-    given = {
-        name: ParameterValue(LaunchConfiguration(name), value_type=kind)
-        for name, (_, kind, _) in ARGUMENTS.items()
-    }
-    given["bag"] = ParameterValue(LaunchConfiguration("bag"), value_type=str)
+def _is_single(context: LaunchContext) -> bool:
+    return context.launch_configurations.get("single_process", "false").lower() == "true"
+
+
+def _parameters(context: LaunchContext) -> dict[str, object]:
+    given = context.launch_configurations
+    parameters = {name: kind(given[name]) for name, (_, kind, _) in ARGUMENTS.items()}
+    parameters["bag"] = given["bag"]
+    # The tracker compiles at its first start; the recording is not to be over by then.
+    parameters["wait_for_topics"] = ["keypoints"]
     # ROS has no empty list of a known type.
-    times = LaunchConfiguration("pause_at").perform(context).strip("[] ")
+    times = given["pause_at"].strip("[] ")
     if times:
-        given["pause_at"] = [float(time) for time in times.split(",")]
+        parameters["pause_at"] = [float(time) for time in times.split(",")]
+    return parameters
+
+
+def _in_one_process(context: LaunchContext) -> list[object]:
+    if not _is_single(context):
+        return []
+    return [
+        SetLaunchConfiguration("source", "play_bag"),
+        SetLaunchConfiguration("source_parameters", yaml.safe_dump(_parameters(context))),
+    ]
+
+
+def _play_bag(context: LaunchContext) -> list[object]:
+    if _is_single(context):
+        return []
+    # Keeps launch from reading a text as a number or as nothing.
+    parameters = {
+        name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
+        for name, value in _parameters(context).items()
+    }
     return [
         Node(
             package="cardbox_tracker",
             executable="play_bag",
             name="play_bag",
             namespace=LaunchConfiguration("namespace"),
-            parameters=[[LaunchConfiguration("config_dir"), "/play_bag.yaml"], given],
+            parameters=[
+                [LaunchConfiguration("config_dir"), "/play_bag.yaml"],
+                parameters,
+            ],
             output="screen",
         )
     ]

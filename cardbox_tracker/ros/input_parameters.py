@@ -81,6 +81,12 @@ class PlayBagParameters(NodeParameters):
     wait_for_subscribers: bool = parameter(
         True, "begin when somebody subscribes to a played picture topic", read_only=True
     )
+    wait_for_topics: list[str] = parameter(
+        [],
+        "begin when somebody publishes these topics, such as keypoints: at its very first start "
+        "the tracker compiles for half a minute",
+        read_only=True,
+    )
     delay_s: float = parameter(
         0.5,
         "wait so long before the first message, and as long again whenever somebody subscribes "

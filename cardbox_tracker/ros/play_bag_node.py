@@ -10,9 +10,9 @@ posture, call ``initializer/capture_front``, and resume. The exit code is 0 at t
 
 from __future__ import annotations
 
-import importlib
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -27,6 +27,7 @@ from cardbox_tracker.errors import BagError
 from cardbox_tracker.ros import qos
 from cardbox_tracker.ros.bag_reader import BagReader
 from cardbox_tracker.ros.input_parameters import PlayBagParameters
+from cardbox_tracker.ros.message_types import message_class
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.ros.play_bag_arguments import overrides_from
@@ -77,26 +78,18 @@ class PlayBagNode(CardboxNode):
         ] or self._all()
 
     def _advertise(self, topic: str, kind: str) -> Publisher:
-        package, _, name = kind.split("/")
-        try:
-            message = getattr(importlib.import_module(f"{package}.msg"), name)
-        except (ImportError, AttributeError):
-            raise BagError(
-                f"topic {topic} has the type {kind}, which is not installed; install the package "
-                f"'{package}', or play other topics with --topics"
-            ) from None
         latched = topic.endswith(_LATCHED_ENDINGS)
-        return self.advertise(message, topic, qos.LATCHED if latched else qos.PLAYED)
+        profile = qos.LATCHED if latched else qos.PLAYED
+        return self.advertise(message_class(topic, kind), topic, profile)
 
     def play(self) -> None:
         """Play the bag to its end, or forever with ``loop``."""
         settings = self.parameters.value
         if settings.wait_for_subscribers:
-            self._say("waiting")
             topics = ", ".join(publisher.topic_name for publisher in self._watched)
-            self.diagnostics.wait_for(f"a subscriber of {topics}")
-            while not any(publisher.get_subscription_count() for publisher in self._watched):
-                self._executor.spin_once(timeout_sec=0.1)
+            self._wait_for(f"a subscriber of {topics}", self._is_watched)
+        for topic in map(self.resolve, settings.wait_for_topics):
+            self._wait_for(f"a publisher of {topic}", partial(self.count_publishers, topic))
         self._settle(settings.delay_s)
         while True:
             self._play_once()
@@ -106,6 +99,15 @@ class PlayBagNode(CardboxNode):
             publisher.wait_for_all_acked(Duration(seconds=5))
         self._say("finished")
         self.get_logger().info(f"end of {settings.bag}")
+
+    def _is_watched(self) -> bool:
+        return any(publisher.get_subscription_count() for publisher in self._watched)
+
+    def _wait_for(self, what: str, is_there: Callable[[], bool | int]) -> None:
+        self._say("waiting")
+        self.diagnostics.wait_for(what)
+        while not is_there():
+            self._executor.spin_once(timeout_sec=0.1)
 
     def _play_once(self) -> None:
         settings = self.parameters.value

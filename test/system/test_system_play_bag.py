@@ -98,6 +98,20 @@ def test_part_and_topics_can_be_chosen(graph: Any, bag: Path) -> None:
         graph.node.destroy_subscription(subscription)
 
 
+def test_it_waits_until_a_topic_is_published(graph: Any, bag: Path) -> None:
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
+    process = graph.start("play_bag", str(bag), "--rate", "4", wait_for_topics="[keypoints]")
+    graph.wait(lambda: "waiting for a publisher of /keypoints" in process.text(), "the words")
+    graph.spin(1.0)
+    assert not images
+    publisher = graph.node.create_publisher(String, "keypoints", 1)
+    assert ended(graph, process) == 0
+    graph.wait(lambda: len(images) == COUNT, "all pictures")
+    graph.node.destroy_publisher(publisher)
+    for subscription in list(graph.node.subscriptions):
+        graph.node.destroy_subscription(subscription)
+
+
 def test_resume_while_playing_is_refused(graph: Any, bag: Path) -> None:
     process = graph.start("play_bag", str(bag), "--no-wait", "--loop")
     response = graph.call("play_bag/resume")
