@@ -83,9 +83,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
 @pytest.fixture(scope="module")
 def runs(session: Session) -> dict[str, list[Run]]:
     """The runs of each configuration, one a seed."""
-    return {
-        name: [session.run(config, seed) for seed in SEEDS] for name, config in CONFIGS.items()
-    }
+    return {name: [session.run(config, seed) for seed in SEEDS] for name, config in CONFIGS.items()}
 
 
 def mean_error_m(runs: list[Run]) -> float:
