@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import CameraError
 from cardbox_tracker.ros import conversions, qos
+from cardbox_tracker.ros.camera_device import (
+    describe_devices,
+    lock_exposure,
+    open_device,
+    open_video,
+)
 from cardbox_tracker.ros.input_parameters import CameraParameters
 from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 
-# V4L2's menu: 1 is manual, 3 is automatic (aperture priority).
-_V4L2_MANUAL = 1
 _RETRY_S = 1.0
 
 
@@ -111,12 +115,7 @@ class CameraNode(CardboxNode):
     def _lock_exposure(self) -> None:
         """Switch to manual where possible: a scene whose brightness drifts is no background."""
         self._locked = True
-        exposure = self._capture.get(cv2.CAP_PROP_EXPOSURE)
-        fixed = self._capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, _V4L2_MANUAL)
-        if fixed and exposure > 0:
-            self._capture.set(cv2.CAP_PROP_EXPOSURE, exposure)
-        balanced = self._capture.set(cv2.CAP_PROP_AUTO_WB, 0)
-        for what, done in (("exposure", fixed), ("white balance", balanced)):
+        for what, done in lock_exposure(self._capture).items():
             if done:
                 self.get_logger().info(f"{what} is manual now")
             else:
@@ -132,46 +131,6 @@ class CameraNode(CardboxNode):
         self._capture.release()
 
 
-def open_device(device: str) -> cv2.VideoCapture:
-    """Open a V4L2 device such as ``/dev/video0`` or ``0``.
-
-    Raises:
-        CameraError: it does not exist or cannot be opened.
-    """
-    path = Path(f"/dev/video{device}" if device.isdigit() else device)
-    if not path.exists():
-        found = ", ".join(sorted(str(other) for other in Path("/dev").glob("video*")))
-        raise CameraError(
-            f"there is no camera {path}; found: {found or 'none at all'}. Plug it in, set the "
-            "parameter 'device', or play a video with the parameter 'file'"
-        )
-    capture = cv2.VideoCapture(str(path), cv2.CAP_V4L2)
-    if not capture.isOpened():
-        raise CameraError(
-            f"the camera {path} cannot be opened; it may be in use by another program, or this "
-            "user is not in the group 'video'"
-        )
-    return capture
-
-
-def open_video(name: str) -> cv2.VideoCapture:
-    """Open a video file.
-
-    Raises:
-        CameraError: it does not exist or is no video.
-    """
-    path = Path(name).expanduser()
-    if not path.is_file():
-        raise CameraError(f"there is no video {path}; set the parameter 'file' to one that exists")
-    capture = cv2.VideoCapture(str(path))
-    if not capture.isOpened():
-        raise CameraError(
-            f"{path} is no video that OpenCV can read; expected for example MP4, AVI or MKV: "
-            "convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
-        )
-    return capture
-
-
 def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> Calibration:
     """Return an ideal lens of that field of view; an uncalibrated camera (K zero) if it is 0."""
     k = np.zeros((3, 3))
@@ -185,7 +144,17 @@ def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> C
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(CameraNode, args)
+    command_line = list(sys.argv) if args is None else ["camera", *args]
+    parser = argparse.ArgumentParser(
+        prog="camera",
+        description="Publish a V4L2 device or a video file.",
+        epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
+    )
+    parser.add_argument("--list", action="store_true", help="say what each device offers, and end")
+    if parser.parse_args(remove_ros_args(command_line)[1:]).list:
+        print(describe_devices())
+        return 0
+    return run_node(CameraNode, command_line)
 
 
 if __name__ == "__main__":

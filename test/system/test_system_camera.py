@@ -86,3 +86,21 @@ def test_an_unreadable_calibration_is_named(graph: Any, video: Path) -> None:
     graph.processes.remove(process)
     assert process.process.returncode == 1
     assert "/nowhere.yaml" in process.text() and "Traceback" not in process.text()
+
+
+def test_devices_are_listed_without_a_graph(graph: Any) -> None:
+    process = graph.start("camera", "--list")
+    graph.wait(lambda: process.process.poll() is not None, "the end of the process")
+    graph.processes.remove(process)
+    assert process.process.returncode == 0
+    assert "video" in process.text() and "Traceback" not in process.text()
+
+
+def test_an_unknown_option_is_told_without_a_traceback(graph: Any) -> None:
+    for name, wrong in (("camera", "--lst"), ("play_bag", "--rate=fast"), ("single_process", "x")):
+        process = graph.start(name, wrong)
+        graph.wait(lambda process=process: process.process.poll() is not None, "the end")
+        graph.processes.remove(process)
+        assert process.process.returncode == 2
+        assert wrong.split("=")[-1] in process.text() and "usage:" in process.text()
+        assert "Traceback" not in process.text()
