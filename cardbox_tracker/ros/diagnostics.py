@@ -92,7 +92,7 @@ class NodeDiagnostics:
         self._problem = ""
         self._said: dict[str, float] = {}
         self._warnings: list[str] = []
-        self._published = 0
+        self._published = self._late = 0
         self._latencies_ms: deque[float] = deque(maxlen=_WINDOW)
         self._before = (time.monotonic(), 0, 0)
         self._publisher = node.create_publisher(
@@ -120,7 +120,10 @@ class NodeDiagnostics:
             self._said.clear()
         self._published += 1
         if sent_ns > 0:
-            self._latencies_ms.append((time.time_ns() - sent_ns) / 1e6)
+            latency_ns = time.time_ns() - sent_ns
+            self._latencies_ms.append(latency_ns / 1e6)
+            # The next picture was due before this one was done.
+            self._late += 0 < self.input.period_ns < latency_ns
 
     def warn(self, text: str) -> None:
         """Add a warning that stays, such as an incompatible QoS."""
@@ -157,6 +160,7 @@ class NodeDiagnostics:
             "received": str(received),
             "published": str(published),
             "dropped (by stamps)": str(self.input.dropped),
+            "late": str(self._late),
             "stamps that went back": str(self.input.went_back),
         }
         if self._latencies_ms:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import pytest
@@ -83,3 +84,13 @@ def test_a_warning_stays_until_the_end(make_node: Callable) -> None:
     status = diagnostics._status()
     assert status.level == DiagnosticStatus.WARN
     assert "incompatible QoS on /silhouette" in [value.value for value in status.values]
+
+
+def test_a_result_that_takes_longer_than_a_period_is_late(make_node: Callable) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    for frame in range(10):
+        diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
+    diagnostics.working(sent_ns=time.time_ns() - 60 * PERIOD_NS)
+    diagnostics.working(sent_ns=time.time_ns() + 60 * PERIOD_NS)
+    values = {value.key: value.value for value in diagnostics._status().values}
+    assert (values["late"], values["published"], values["received"]) == ("1", "2", "10")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import shutil
+import subprocess
 from collections.abc import Mapping
+from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -10,8 +14,11 @@ import pytest
 
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.rep155_urdf import rep155_urdf
 from cardbox_tracker.body.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.cli import main
 from cardbox_tracker.vision.camera import Camera
 
 KEYPOINT_LINKS = (
@@ -125,8 +132,6 @@ def test_visuals_are_the_fifteen_patches() -> None:
 
 def test_yourdfpy_loads_it_and_agrees() -> None:
     yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
-    import io
-
     body = BodyModel(distance_m=2.3)
     posture = random_postures(1)[0]
     robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
@@ -136,3 +141,23 @@ def test_yourdfpy_loads_it_and_agrees() -> None:
         np.testing.assert_allclose(
             robot.get_transform(link, ROOT_LINK)[:3, 3], TO_ROOT @ point, atol=1e-6
         )
+
+
+def test_the_example_body_is_a_person_to_try_it_with(capsys: pytest.CaptureFixture[str]) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
+    example = Path(__file__).resolve().parents[2] / "config" / "example_body.yaml"
+    assert main(["urdf", str(example)]) == 0
+    robot = yourdfpy.URDF.load(io.BytesIO(capsys.readouterr().out.encode()))
+    assert robot.validate()
+    assert set(robot.actuated_joint_names) == set(JOINT_NAMES)
+    assert len(load_body_model(example).sizes) == 18
+
+
+@pytest.mark.skipif(shutil.which("check_urdf") is None, reason="check_urdf is not installed")
+@pytest.mark.parametrize("kind", ["own", "rep155"])
+def test_check_urdf_accepts_it(tmp_path: Path, kind: str) -> None:
+    body = BodyModel()
+    path = tmp_path / "person.urdf"
+    path.write_text(urdf_from_body(body, "eye") if kind == "own" else rep155_urdf(body, "a", "eye"))
+    checked = subprocess.run(["check_urdf", str(path)], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout + checked.stderr

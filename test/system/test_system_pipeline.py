@@ -22,7 +22,7 @@ from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
@@ -369,8 +369,43 @@ def test_wrong_parameter_is_refused_and_a_right_one_is_live(
     assert not refused.successful and "drs, srs" in refused.reason
     refused = set_parameter("average", 100000)
     assert not refused.successful and "average" in refused.reason
+    reads = graph.node.create_client(GetParameters, "tracker/get_parameters")
+    graph.wait(reads.service_is_ready, "parameter service")
+    future = reads.call_async(GetParameters.Request(names=["strategy", "average", "particles"]))
+    graph.wait(future.done, "answer")
+    kept = [value.string_value or value.integer_value for value in future.result().values]
+    assert kept == ["preset", 0, 0]
+    session.track("front", 2)
+
+    assert set_parameter("lost_iou", 1.0).successful
+    assert set_parameter("lost_frames", 1).successful
+    before = len(session.joint_states)
+    session.show("front")
+    graph.diagnosis("tracker", "the person was lost")
+    assert len(session.joint_states) == before, "it takes effect at the very next picture"
+    assert set_parameter("lost_iou", 0.3).successful
     assert set_parameter("particles", 100).successful
     session.track("front", 2)
+
+
+def test_a_brighter_scene_names_the_controls_of_the_camera(learned: Session) -> None:
+    """As automatic exposure does it: everything becomes brighter at once."""
+    graph = learned.graph
+    for _ in range(3):
+        header = learned.header()
+        learned.infos.publish(camera_info_message(header, learned.scene.camera))
+        brighter = np.clip(learned.scene.picture(None).astype(int) + 40, 0, 255).astype(np.uint8)
+        learned.images.publish(image_message(header, brighter, "mono8"))
+        graph.spin(0.1)
+    status = graph.diagnosis("background", "the whole scene changed its brightness")
+    for word in ("auto_exposure=1", "white_balance_automatic=0", "background/learn"):
+        assert word in status.message
+    drift = {v.key: v.value for v in status.values}["scene brightness drift (grey levels)"]
+    assert float(drift) == pytest.approx(40, abs=3)
+    learned.show(None, 2)
+    status = graph.diagnosis("background", "working")
+    drift = {v.key: v.value for v in status.values}["scene brightness drift (grey levels)"]
+    assert float(drift) == pytest.approx(0, abs=3)
 
 
 def test_a_restarted_tracker_goes_on_with_the_latched_model(
@@ -405,12 +440,18 @@ def test_a_restarted_tracker_goes_on_with_the_latched_model(
 def test_diagnostics_have_state_rates_latency_and_fit(measured: tuple[Session, str, str]) -> None:
     session, _, _ = measured
     session.track("front", 3)
+    common = {"rate in (Hz)", "rate out (Hz)", "latency p95 (ms)", "dropped (by stamps)", "late"}
     for node, keys in (
-        ("background", {"rate in (Hz)", "rate out (Hz)", "latency p95 (ms)"}),
-        ("tracker", {"state", "iou", "cost (px)", "latency p95 (ms)", "dropped (by stamps)"}),
+        ("background", {"scene brightness drift (grey levels)", "foreground (% of the picture)"}),
+        ("tracker", {"state", "iou", "cost (px)"}),
     ):
         status = session.graph.diagnosis(node, "working")
-        assert keys <= {value.key for value in status.values}
+        values = {value.key: value.value for value in status.values}
+        assert common | keys <= set(values)
+        assert float(values["latency p95 (ms)"]) > 0
+        assert int(values["published"]) > 0
+    assert values["state"] == "tracking"
+    assert 0.5 < float(values["iou"]) <= 1
 
 
 def test_learning_again_stops_silhouettes_until_it_is_done(

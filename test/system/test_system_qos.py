@@ -8,11 +8,18 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.conversions import image_message  # noqa: E402
+
+
+def is_reported(graph: Any, words: str) -> bool:
+    status = graph.diagnosis("tracker")
+    assert status.level != DiagnosticStatus.OK
+    return any(words in value.value for value in status.values)
 
 
 def test_a_best_effort_silhouette_is_told_with_the_remedy(graph: Any) -> None:
@@ -22,12 +29,7 @@ def test_a_best_effort_silhouette_is_told_with_the_remedy(graph: Any) -> None:
     words = "incompatible QoS on /silhouette: a publisher offers best effort"
     graph.wait(lambda: words in tracker.text(), "the warning in the log")
     assert "qos_overrides./silhouette.subscription.reliability:=best_effort" in tracker.text()
-
-    def reported() -> bool:
-        status = graph.diagnosis("tracker")
-        return any(words in value.value for value in status.values)
-
-    graph.wait(reported, "the warning in the diagnostics")
+    graph.wait(lambda: is_reported(graph, words), "the warning in the diagnostics")
 
 
 def test_a_latched_subscriber_of_joint_states_is_told(graph: Any) -> None:
@@ -35,6 +37,8 @@ def test_a_latched_subscriber_of_joint_states_is_told(graph: Any) -> None:
     graph.collect(JointState, "joint_states", qos.LATCHED)
     words = "incompatible QoS on /joint_states: a subscriber asks for latched"
     graph.wait(lambda: words in tracker.text(), "the warning in the log")
+    assert "qos_overrides./joint_states.publisher.durability:=transient_local" in tracker.text()
+    graph.wait(lambda: is_reported(graph, words), "the warning in the diagnostics")
 
 
 def test_the_remedy_works(graph: Any, scene: Any) -> None:
