@@ -60,6 +60,7 @@ GIVEN: dict[str, dict[str, type]] = {
     },
     "tracker": {"preset": str, "rep155_id": str},
 }
+LAYOUT_TOPICS = ("robot_description", "markers", "keypoints", "overlay", "silhouette")
 # Nobody until somebody is measured: robot_state_publisher does not start without a description.
 NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
 
@@ -226,6 +227,8 @@ def _rviz(context: LaunchContext) -> list[object]:
             name="rviz",
             namespace=LaunchConfiguration("namespace"),
             arguments=["-d", str(layout)] if layout.exists() else ["-f", "camera_level"],
+            # The layout has full names; in a namespace they are those of this camera.
+            remappings=[(f"/{topic}", topic) for topic in LAYOUT_TOPICS],
             output="log",
         )
     ]

@@ -172,6 +172,13 @@ def test_rviz_subscribes_to_what_is_published_with_a_qos_that_fits() -> None:
         assert latched == source.qos.startswith("latched")
 
 
+def test_the_launch_file_moves_every_topic_of_the_layout_into_the_namespace() -> None:
+    text = (ROOT / "launch" / "nodes.launch.py").read_text(encoding="utf-8")
+    (names,) = re.findall(r"(?m)^LAYOUT_TOPICS = \((.*)\)$", text)
+    shown = [d.get("Topic") or d.get("Description Topic") for d in displays()]
+    assert set(re.findall(r'"(\w+)"', names)) == {t["Value"].lstrip("/") for t in shown if t}
+
+
 def test_rviz_stands_on_the_root_of_the_person() -> None:
     text = (ROOT / "config" / "cardbox.rviz").read_text(encoding="utf-8")
     manager = yaml.safe_load(text)["Visualization Manager"]
