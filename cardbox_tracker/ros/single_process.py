@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import remove_ros_args, try_shutdown
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.background_node import BackgroundNode
@@ -28,6 +28,7 @@ from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.tracker_node import TrackerNode
 
+_STOP_S = 5.0
 SOURCES = ("camera", "play_bag")
 
 
@@ -42,6 +43,7 @@ class AllNodes:
         """
         self.nodes: list[CardboxNode] = []
         self._player: PlayBagNode | None = None
+        self._playing: threading.Thread | None = None
         kinds: list[Callable[[], CardboxNode]] = [BackgroundNode, InitializerNode, TrackerNode]
         if source == "camera":
             kinds.append(CameraNode)
@@ -61,11 +63,16 @@ class AllNodes:
             executor.add_node(node)
         if self._player is not None:
             # It keeps the time of the recording, whatever the others do.
-            threading.Thread(target=partial(_play, self._player), daemon=True).start()
+            self._playing = threading.Thread(target=partial(_play, self._player), daemon=True)
+            self._playing.start()
         executor.spin()
 
     def close(self) -> None:
         """Release what the nodes hold, the source first."""
+        if self._playing is not None:
+            # It notices the end of ROS; a thread that still used it would abort the process.
+            try_shutdown()
+            self._playing.join(timeout=_STOP_S)
         if self._player is not None:
             self._player.close()
         for node in reversed(self.nodes):

@@ -119,6 +119,18 @@ def test_resume_while_playing_is_refused(graph: Any, bag: Path) -> None:
     assert process.stop() == 0
 
 
+def test_it_plays_in_the_process_of_the_nodes_and_ends_on_a_signal(graph: Any, bag: Path) -> None:
+    images = graph.collect(Image, "image_raw", qos.REPLAY)
+    given = ("-p", f"play_bag:bag:={bag}", "-p", "play_bag:loop:=true")
+    process = graph.start("single_process", "--with", "play_bag", "--ros-args", *given)
+    graph.wait(lambda: len(images) > COUNT + 5, "pictures of the second round")
+    assert process.stop() == 0, process.text()
+    graph.processes.remove(process)
+    assert "Traceback" not in process.text()
+    for subscription in list(graph.node.subscriptions):
+        graph.node.destroy_subscription(subscription)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
