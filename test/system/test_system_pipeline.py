@@ -287,9 +287,15 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
     overlays = graph.collect(Image, "overlay", qos.SENSOR_DATA)
     deviations = graph.collect(JointState, "joint_states_stddev")
     graph.spin(0.5)
-    state = session.track("front", 2)[-1]
-    graph.wait(lambda: keypoints and markers and overlays and deviations, "all outputs")
-    graph.spin(0.2)
+
+    def shown() -> Any:
+        # Subscribers are found one by one, and an overlay may be lost: it is best effort.
+        state = session.track("front", 1)[-1]
+        graph.spin(0.2)
+        latest = [m[-1].header.stamp for m in (keypoints, overlays, deviations) if m]
+        return state if markers and latest == [state.header.stamp] * 3 else None
+
+    state = graph.wait(shown, "all outputs of one picture")
     assert keypoints[-1].header.stamp == state.header.stamp
     assert keypoints[-1].header.frame_id == "test_optical"
     points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
