@@ -3,9 +3,10 @@
     cardbox_nodes [--with camera | --with play_bag] --ros-args --params-file NODES.yaml
 
 Nothing differs for other nodes: the same names, topics and services. Between ``background`` and
-``tracker`` no process has to be woken, so a posture comes a little earlier; in exchange they share
-one core. Parameters are given by node in a YAML file, as ``config/cardbox_nodes.yaml`` has them, or
-without a namespace as ``-p tracker:preset:=paper``; remappings by node as
+``tracker`` no other process has to be woken; in exchange they share one core.
+
+Parameters are given by node in a YAML file, as ``config/cardbox_nodes.yaml`` has them, or without a
+namespace as ``-p tracker:preset:=paper``; remappings by node as
 ``-r background:image_raw:=/camera/image_raw``.
 """
 
