@@ -70,6 +70,10 @@ class Nodes:
         """Return the number of the node's process."""
         return self._processes[name].pid
 
+    def text(self, name: str) -> str:
+        """Return what the node has printed so far."""
+        return (self._logs / f"{name}.log").read_text(errors="replace")
+
     def is_running(self, name: str) -> bool:
         """Return whether the node is still there."""
         return self._processes[name].poll() is None

@@ -24,11 +24,7 @@ from cardbox_tracker.evaluation.benchmark_scene import BenchmarkScene, make_scen
 
 RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))
-NODES = {
-    "background": "background/learn",
-    "initializer": "initializer/initialize",
-    "tracker": "tracker/reset",
-}
+NODES = ("background", "initializer", "tracker")
 
 _START_S = 30.0
 _LAST_S = 0.5
@@ -47,7 +43,7 @@ def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, 
             scenes = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
             model = Path(folder) / "body.yaml"
             save_body_model(scenes[STREAMS[0]].body, model)
-            ready_s = {name: camera.start(name, service, model) for name, service in NODES.items()}
+            ready_s = {name: camera.start(name, model) for name in NODES}
             streams = {}
             for i, (stream, scene) in enumerate(scenes.items()):
                 camera.learn(scene, stream[0])
@@ -86,22 +82,17 @@ class _CameraAndListener:
         stamp = message.header.stamp
         self._arrivals_ns[stamp.sec * 10**9 + stamp.nanosec] = now_ns
 
-    def start(self, name: str, service: str, model: Path) -> float:
-        """Start a node; return how long its service took to be there, seconds."""
-        from std_srvs.srv import Trigger
-
-        client = self._node.create_client(Trigger, service)
+    def start(self, name: str, model: Path) -> float:
+        """Start a node; return how long it took until it said what it waits for, seconds."""
         began = time.monotonic()
         arguments = ("--ros-args", "-p", f"model_file:={model}") if name == "tracker" else ()
         self._nodes.start(name, *arguments)
-        while not client.service_is_ready():
-            self._executor.spin_once(timeout_sec=0.01)
+        while "waiting for" not in self._nodes.text(name):
+            time.sleep(0.01)
             self._nodes.check()
             if time.monotonic() - began > _START_S:
                 raise CardboxError(f"the node {name} was not ready within {_START_S:g} s")
-        ready_s = time.monotonic() - began
-        self._node.destroy_client(client)
-        return ready_s
+        return time.monotonic() - began
 
     def learn(self, scene: BenchmarkScene, encoding: str) -> None:
         """Show the empty scene until silhouettes come; the camera changed, so it is learned."""

@@ -156,8 +156,9 @@ class BackgroundNode(CardboxNode):
         assert self._camera is not None
         silhouette = extractor(picture)
         self._covered = np.count_nonzero(silhouette) / silhouette.size
-        self._silhouette_info.publish(conversions.camera_info_message(header, self._camera))
+        # The picture first: whoever tracks it need not wait for what hardly ever changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
+        self._silhouette_info.publish(conversions.camera_info_message(header, self._camera))
 
     def _values(self) -> dict[str, str]:
         return {

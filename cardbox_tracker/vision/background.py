@@ -129,6 +129,8 @@ class SilhouetteExtractor:
         # A sparse grid is enough for the one number that describes the scene's brightness.
         self._grid = (slice(None, None, 4), slice(None, None, 4))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
+        # Fresh memory costs more than the arithmetic on it.
+        self._scratch = tuple(np.empty_like(model.mean) for _ in range(3))
 
     def __call__(self, brightness: Picture) -> Picture:
         """Return the silhouette (H, W) of ``brightness`` (H, W): 255 for the person, else 0.
@@ -145,13 +147,19 @@ class SilhouetteExtractor:
             difference = np.abs(brightness - self.model.mean)
             return np.where(difference < self._limit, 0, 255).astype(np.uint8)
         self.gain = self._scene_gain(brightness)
-        signed = cv2.addWeighted(
-            brightness, 1.0, self.model.mean, -self.gain, 0.0, dtype=cv2.CV_32F
+        signed, darker, score = self._scratch
+        cv2.addWeighted(
+            brightness, 1.0, self.model.mean, -self.gain, 0.0, dst=signed, dtype=cv2.CV_32F
         )
         if config.smoothing_px > 0:
-            signed = cv2.GaussianBlur(signed, (0, 0), config.smoothing_px)
-        score = cv2.max(cv2.multiply(signed, self._brighter), cv2.multiply(signed, self._darker))
-        limit = np.maximum(cv2.dilate(score, _KERNEL) * np.float32(config.edge), np.float32(1.0))
+            cv2.GaussianBlur(signed, (0, 0), config.smoothing_px, dst=signed)
+        cv2.multiply(signed, self._darker, dst=darker)
+        cv2.multiply(signed, self._brighter, dst=score)
+        cv2.max(score, darker, dst=score)
+        limit = signed
+        cv2.dilate(score, _KERNEL, dst=limit)
+        np.multiply(limit, np.float32(config.edge), out=limit)
+        np.maximum(limit, np.float32(1.0), out=limit)
         foreground = cv2.compare(score, limit, cv2.CMP_GE)
         return clean_silhouette(
             np.asarray(foreground, dtype=np.uint8), config.min_area, config.max_hole
@@ -194,9 +202,14 @@ def _drop_small(picture: Picture, area_px: float) -> Picture:
     # Two regions never touch, so there are fewer than half as many as pixels; short labels are
     # faster, and so is counting them apart from OpenCV's statistics of boxes and centres.
     short = picture.size < 2**17
-    labels: NDArray[Any] = cv2.connectedComponents(
+    count, found = cv2.connectedComponents(
         picture, connectivity=4, ltype=cv2.CV_16U if short else cv2.CV_32S
-    )[1]
-    keep = np.where(np.bincount(labels.ravel()) >= area_px, 255, 0).astype(np.uint8)
+    )
+    labels: NDArray[Any] = np.asarray(found)
+    if short:
+        areas = cv2.calcHist([labels], [0], None, [count], [0, count]).ravel()
+    else:
+        areas = np.bincount(labels.ravel())
+    keep = np.where(areas >= area_px, 255, 0).astype(np.uint8)
     keep[0] = 0
     return keep.take(labels)
