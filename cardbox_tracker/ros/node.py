@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 import rclpy
@@ -18,7 +17,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.utilities import ok, try_shutdown
-from rclpy.waitable import Waitable
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
@@ -39,33 +37,13 @@ class Closable(Protocol):
 N = TypeVar("N", bound=Closable)
 
 
-_EVENTS_S = 0.5
-
-
 class CardboxNode(Node):
     """A node that says what it does, what it waits for, and what is wrong."""
 
     def __init__(self, name: str, **options: Any) -> None:
         """Create the node; ``options`` are those of :class:`rclpy.node.Node`."""
-        self._events_s = 0.0
-        self._events_waited = False
         super().__init__(name, **options)
         self.diagnostics = NodeDiagnostics(self)
-
-    @property
-    def waitables(self) -> Iterator[Waitable]:
-        """The handlers of QoS events, but to the executor only twice a second.
-
-        It asks before each wait and after it, and two dozen of them would cost more than all else
-        it does for a picture. An event stays pending meanwhile.
-        """
-        if self._events_waited:
-            self._events_waited = False
-            yield from super().waitables
-        elif time.monotonic() - self._events_s > _EVENTS_S:
-            self._events_s = time.monotonic()
-            self._events_waited = True
-            yield from super().waitables
 
     def resolve(self, topic: str) -> str:
         """Return the full name of ``topic`` after namespace and remapping."""
