@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.evaluation.benchmark_core import measure_core, pinned
+from cardbox_tracker.evaluation.benchmark_core import measure_core
 from cardbox_tracker.evaluation.benchmark_mediapipe import measure_mediapipe
 from cardbox_tracker.evaluation.benchmark_nodes import measure_nodes
 from cardbox_tracker.evaluation.benchmark_report import write_report
 from cardbox_tracker.evaluation.benchmark_scene import make_scene
+from cardbox_tracker.evaluation.benchmark_tools import pinned
 from cardbox_tracker.evaluation.results import provenance, write_json
 from cardbox_tracker.progress import progress_bar
 

@@ -6,64 +6,37 @@ compared takes turns, a few pictures each, so that a busy machine is unfair to n
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.posture import N_JOINTS, clip_to_limits, reference_posture
 from cardbox_tracker.body.volumetric import volumetric_faces
 from cardbox_tracker.estimation.compiled import CompiledCost
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.estimation.hierarchy import HierarchicalFilter
-from cardbox_tracker.estimation.particle_filter import ParticleFilter
-from cardbox_tracker.estimation.resampling import deterministic
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.benchmark_scene import BenchmarkScene, make_scene
+from cardbox_tracker.evaluation.benchmark_stages import measure_stages
+from cardbox_tracker.evaluation.benchmark_tools import (
+    WARM_UP,
+    Times,
+    extractor_of,
+    one_core,
+    pinned,
+    rss_mb,
+    summary,
+)
 from cardbox_tracker.evaluation.models import make_cost
-from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 
 RESOLUTIONS = ((160, 120), (320, 240), (640, 480), (1280, 960))
 PARTICLES = (60, 300, 600, 3000, 6000, 12_000, 20_001, 30_000, 60_000)
 FRAME_30HZ_MS = 1000.0 / 30.0
 
-_WARM_UP = 5
 _TURN = 10
 _MOST_S = 3.0
-
-Times = NDArray[np.float64]
-
-
-@contextmanager
-def pinned(cores: int) -> Iterator[int]:
-    """Keep this thread, and those it starts, on the first ``cores`` cores; yields how many."""
-    before = os.sched_getaffinity(0)
-    chosen = sorted(before)[:cores]
-    os.sched_setaffinity(0, chosen)
-    try:
-        yield len(chosen)
-    finally:
-        os.sched_setaffinity(0, before)
-
-
-def summary(milliseconds: Times | list[float]) -> dict[str, float]:
-    """Return median and 95th percentile."""
-    return {
-        "median_ms": float(np.median(milliseconds)),
-        "p95_ms": float(np.percentile(milliseconds, 95)),
-    }
-
-
-def one_core(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` with the arms one after the other."""
-    return replace(config, parallel_arms=False)
 
 
 def follow(
@@ -91,7 +64,7 @@ def frame_times_ms(
                 start = time.perf_counter()
                 track(i)
                 times[name].append(1e3 * (time.perf_counter() - start))
-    return {name: np.array(values[_WARM_UP:]) for name, values in times.items()}
+    return {name: np.array(values[WARM_UP:]) for name, values in times.items()}
 
 
 def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
@@ -116,6 +89,26 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
     }
 
 
+def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
+    """Measure a frame, picture to posture with the default preset, a 30th of a second apart.
+
+    So it is in a live node: while it waits, the processor slows down and its caches are given away.
+    """
+    extractor = extractor_of(scene)
+    tracker = Tracker(scene.body, scene.camera, one_core(default_preset()))
+    times: dict[bool, list[float]] = {True: [], False: []}
+    for paused in (False, True):
+        for picture in scene.pictures:
+            time.sleep(FRAME_30HZ_MS / 1e3 if paused else 0.0)
+            start = time.perf_counter()
+            tracker.track(extractor(picture))
+            times[paused].append(1e3 * (time.perf_counter() - start))
+    return {
+        "without_ms": float(np.median(times[False][WARM_UP:])),
+        "with_ms": float(np.median(times[True][WARM_UP:])),
+    }
+
+
 def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
     """Compare both arms at the same time with one after the other, on two cores."""
     with pinned(2) as cores:
@@ -128,36 +121,6 @@ def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
             },
         )
     return {"cores": cores, **{name: summary(values) for name, values in times.items()}}
-
-
-def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
-    """Measure the steps of a frame one by one, on the particles of a tracker at work."""
-    extractor = extractor_of(scene)
-    paper = one_core(paper_preset())
-    cost = CompiledCost(scene.body, scene.camera)
-    probe = CompiledCost(scene.body, scene.camera)
-    filters = _Filters(paper, scene, cost)
-    times: dict[str, list[float]] = {}
-
-    def timed(name: str, work: Callable[..., object], *arguments: object) -> None:
-        start = time.perf_counter()
-        work(*arguments)
-        times.setdefault(name, []).append(1e3 * (time.perf_counter() - start))
-
-    for picture, silhouette in zip(scene.pictures, scene.silhouettes, strict=True):
-        posture = filters.track(silhouette)
-        torso, left, right = filters.all
-        timed("silhouette from the picture", extractor, picture)
-        timed("running sums of the silhouette", probe.observe, silhouette)
-        timed("arms of the last frame taken out", probe.fix_arms, posture)
-        timed("cost of all torsos", probe.torso, torso.particles)
-        timed("torso taken out", probe.fix_torso, posture[:4])
-        timed("cost of all left arms", probe.arm, "left", left.particles)
-        timed("cost of all right arms", probe.arm, "right", right.particles)
-        timed("resampling of one filter", _resample, torso)
-        timed("noise of one filter", _NOISE.standard_normal, torso.particles.shape)
-        timed("standard deviations of one filter", torso.stddev, posture[:4])
-    return {name: summary(values[_WARM_UP:]) for name, values in times.items()}
 
 
 def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:
@@ -208,10 +171,10 @@ def measure_particles(
                     start = time.perf_counter()
                     tracker.track(silhouette)
                     times.append(1e3 * (time.perf_counter() - start))
-                    if len(times) > 2 * _WARM_UP and sum(times) > 1e3 * _MOST_S:
+                    if len(times) > 2 * WARM_UP and sum(times) > 1e3 * _MOST_S:
                         break
                 entry = result.setdefault(str(3 * (count // 3)), {})
-                entry[f"cores_{cores}_ms"] = float(np.median(times[_WARM_UP:]))
+                entry[f"cores_{cores}_ms"] = float(np.median(times[WARM_UP:]))
     return result
 
 
@@ -225,34 +188,18 @@ def particles_at_30hz(particles: dict[str, dict[str, float]]) -> int:
     return int(np.interp(FRAME_30HZ_MS, times, counts))
 
 
-def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
-    """Return what cuts the person out, with the scene's background learned."""
-    learner = BackgroundLearner()
-    for picture in scene.empty:
-        learner.add(picture)
-    return SilhouetteExtractor(learner.model())
-
-
-def rss_mb() -> float:
-    """Return the memory that this process holds, in MB; not a number where the system hides it."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    except OSError:
-        return float("nan")
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
 def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]:
     """Measure all that needs no ROS; ``report`` is told the finished fraction."""
     with pinned(1):
         scene = make_scene(320, 240, frames)
         results = measure_frames(scene)
         memory = rss_mb()
+        pauses = measure_after_pauses(scene)
         report(0.3)
         stages = measure_stages(scene)
         volumetric = measure_models(scene)
         report(0.4)
-        scenes = [make_scene(w, h, max(2 * _WARM_UP, frames // 3), 2) for w, h in RESOLUTIONS]
+        scenes = [make_scene(w, h, max(2 * WARM_UP, frames // 3), 2) for w, h in RESOLUTIONS]
         resolutions = measure_resolutions(scenes)
         report(0.7)
     parallel = measure_parallel(scene)
@@ -269,38 +216,9 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         "particles_at_30hz": particles_at_30hz(particles),
         "rss_mb": memory,
         "frames": results["frames"],
+        "after_pauses": pauses,
         "stages": stages,
         "parallel_arms": parallel,
         "resolutions": resolutions,
         "particles": particles,
     }
-
-
-class _Filters:
-    """A tracker whose filters can be looked at."""
-
-    def __init__(self, config: TrackerConfig, scene: BenchmarkScene, cost: CompiledCost) -> None:
-        self._cost = cost
-        area = scene.camera.width * scene.camera.height
-        self._filter = HierarchicalFilter(cost, config, area, np.random.default_rng(0))
-        self._started = False
-
-    @property
-    def all(self) -> list[ParticleFilter]:
-        """Torso, left arm, right arm."""
-        return [self._filter.torso, *self._filter.arms.values()]
-
-    def track(self, silhouette: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Return the posture (12,) of the next silhouette."""
-        self._cost.observe(silhouette)
-        if self._started:
-            return self._filter.cycle()
-        self._started = True
-        return self._filter.scatter(reference_posture("front"))
-
-
-def _resample(of: ParticleFilter) -> object:
-    return deterministic(of.costs, of.config.survival_rate, 1.0, _NOISE)
-
-
-_NOISE = np.random.default_rng(0)

@@ -11,7 +11,7 @@ import pytest
 
 from cardbox_tracker.cli import main
 from cardbox_tracker.estimation.config import paper_preset
-from cardbox_tracker.evaluation import benchmark, benchmark_core, benchmark_report
+from cardbox_tracker.evaluation import benchmark, benchmark_core, benchmark_report, benchmark_tools
 from cardbox_tracker.evaluation.benchmark_scene import make_scene
 from cardbox_tracker.evaluation.readme import BENCHMARKS
 from cardbox_tracker.evaluation.results import read_json
@@ -100,7 +100,7 @@ def test_the_scene_moves_and_its_background_does_not() -> None:
 
 def test_both_arms_at_once_find_what_one_after_the_other_does() -> None:
     """What the benchmark compares is the same work."""
-    assert benchmark_core.one_core(paper_preset()).parallel_arms is False
+    assert benchmark_tools.one_core(paper_preset()).parallel_arms is False
     assert paper_preset().parallel_arms is True
 
 
