@@ -16,7 +16,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, save_body_model
 from cardbox_tracker.body.posture import SIDE_TURNS
 from cardbox_tracker.body.urdf import urdf_from_body
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, RosMissingError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.initialization import InitializationConfig
 from cardbox_tracker.estimation.resampling import STRATEGIES
@@ -410,10 +410,7 @@ def _call(options: argparse.Namespace) -> None:
     try:
         from cardbox_tracker.ros.call import call_service
     except ImportError as error:
-        raise CardboxError(
-            f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
-            "a ROS 2 Jazzy installation"
-        ) from None
+        raise RosMissingError(error) from None
     print(call_service(options.service, lambda text: print(text, flush=True)))
 
 

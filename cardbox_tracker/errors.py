@@ -33,3 +33,14 @@ class InitializationError(CardboxError):
 
 class BagError(CardboxError):
     """A recording cannot be read or written."""
+
+
+class RosMissingError(CardboxError):
+    """ROS 2 is not installed, and what was asked for needs it."""
+
+    def __init__(self, error: ImportError) -> None:
+        """Say what could not be imported and what to do."""
+        super().__init__(
+            f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
+            "a ROS 2 Jazzy installation"
+        )

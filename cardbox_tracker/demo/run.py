@@ -12,7 +12,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.demo.processes import Nodes, isolate, running_nodes
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, RosMissingError
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.ros.bag_writer import BagWriter
@@ -77,10 +77,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     try:
         from cardbox_tracker.demo.client import Client
     except ImportError as error:
-        raise CardboxError(
-            f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
-            "a ROS 2 Jazzy installation"
-        ) from None
+        raise RosMissingError(error) from None
     truth = load_ground_truth(session / "ground_truth.json")
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)

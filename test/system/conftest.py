@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -201,20 +200,14 @@ class Graph:
         return Time(sec=self._stamp_ns // 10**9, nanosec=self._stamp_ns % 10**9)
 
 
-@pytest.fixture(scope="session")
-def compiled(scene: Scene) -> None:
-    """What the nodes compile at their first start is in the cache."""
-    Tracker(scene.body, scene.camera)
-
-
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory, compiled: None) -> Iterator[Graph]:
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
     """A graph that the tests of a module share."""
     yield from _graph(tmp_path_factory)
 
 
 @pytest.fixture
-def own_graph(tmp_path_factory: pytest.TempPathFactory, compiled: None) -> Iterator[Graph]:
+def own_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
     """A graph of one test; what the test started is gone before the next one begins."""
     yield from _graph(tmp_path_factory)
 
