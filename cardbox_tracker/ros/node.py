@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 import rclpy
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ROSInterruptException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -22,6 +22,7 @@ from std_srvs.srv import Trigger
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros import qos
 from cardbox_tracker.ros.diagnostics import NodeDiagnostics
+from cardbox_tracker.ros.static_executor import StaticExecutor
 
 Callback = Callable[[Any, int], None]
 """Takes a message and when it left its sender, ns since the epoch."""
@@ -118,7 +119,7 @@ class CardboxNode(Node):
 
 def spin(node: CardboxNode) -> None:
     """Serve the node until it is told to stop."""
-    executor = SingleThreadedExecutor()
+    executor = StaticExecutor()
     executor.add_node(node)
     executor.spin()
 

@@ -18,7 +18,7 @@ import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args, try_shutdown
 
 from cardbox_tracker.errors import CardboxError
@@ -27,6 +27,7 @@ from cardbox_tracker.ros.camera_node import CameraNode
 from cardbox_tracker.ros.initializer_node import InitializerNode
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.static_executor import StaticExecutor
 from cardbox_tracker.ros.tracker_node import TrackerNode
 
 _STOP_S = 5.0
@@ -59,7 +60,7 @@ class AllNodes:
 
     def work(self) -> None:
         """Serve all nodes until they are told to stop."""
-        executor = SingleThreadedExecutor()
+        executor = StaticExecutor()
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:
