@@ -7,6 +7,7 @@ by the spacing of their stamps, since the middleware does not tell.
 from __future__ import annotations
 
 import time
+from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Callable
 
@@ -37,7 +38,9 @@ class StreamStatistics:
         self.dropped = 0
         self.went_back = 0
         self._last_ns: int | None = None
-        self._spacings_ns: deque[int] = deque(maxlen=_WINDOW)
+        self._spacings_ns: deque[int] = deque()
+        # The same in order: with every picture the period is asked for.
+        self._ordered_ns: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
         """Count a message of that stamp; return False if its stamp went back or stayed."""
@@ -49,20 +52,27 @@ class StreamStatistics:
         if spacing_ns <= 0:
             self.went_back += 1
             self._spacings_ns.clear()
+            self._ordered_ns.clear()
             return False
         if spacing_ns < _PAUSE_NS:
-            self._spacings_ns.append(spacing_ns)
+            self._note(spacing_ns)
             if len(self._spacings_ns) >= 5:
                 self.dropped += max(round(spacing_ns / self.period_ns) - 1, 0)
         return True
 
+    def _note(self, spacing_ns: int) -> None:
+        if len(self._spacings_ns) == _WINDOW:
+            del self._ordered_ns[bisect_left(self._ordered_ns, self._spacings_ns.popleft())]
+        self._spacings_ns.append(spacing_ns)
+        insort(self._ordered_ns, spacing_ns)
+
     @property
-    def period_ns(self) -> float:
+    def period_ns(self) -> int:
         """Spacing of the stamps where none is missing, ns.
 
         A low percentile: where most pictures are lost, the median is a multiple of the period.
         """
-        return float(np.percentile(self._spacings_ns, 10)) if self._spacings_ns else 0.0
+        return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
 
     @property
     def loss(self) -> float:

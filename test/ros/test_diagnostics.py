@@ -49,6 +49,11 @@ def test_a_pause_of_the_source_is_no_loss() -> None:
     assert statistics.dropped == 0
 
 
+def test_the_period_is_that_of_the_latest_stamps() -> None:
+    frames = [*range(200), *range(201, 601, 2)]
+    assert fed(frames).period_ns == pytest.approx(2 * PERIOD_NS)
+
+
 def test_stamps_that_go_back_are_noticed() -> None:
     statistics = fed(list(range(20)))
     assert not statistics.add(0)
