@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import FilterConfig
-from cardbox_tracker.estimation.particle_kernels import propagate, weighted_stddev
+from cardbox_tracker.estimation.particle_kernels import propagate, weighted_mean, weighted_stddev
 from cardbox_tracker.estimation.resampling import Ancestors, Resampler
 
 FloatArray = NDArray[np.float64]
@@ -89,7 +89,7 @@ class ParticleFilter:
         propagate(steps, self.particles, ancestors, self.noise * noise_scale, self._limits)
         if explorers > 0:
             low, high = self._limits.T
-            steps[-explorers:] = self._rng.uniform(low, high, (explorers, len(low)))
+            steps[-explorers:] = low + (high - low) * self._rng.random((explorers, len(low)))
         self.particles = steps
         self.costs = rate(self.particles)
 
@@ -105,8 +105,9 @@ class ParticleFilter:
         """
         if count == 1:
             return self.best()
-        particles, weights = self._weighted(count, spread_scale)
-        mean: FloatArray = weights @ particles
+        mean: FloatArray = weighted_mean(
+            self.particles, self.costs, count, SPREAD_PX * spread_scale
+        )
         return mean
 
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
@@ -118,14 +119,3 @@ class ParticleFilter:
             self.particles, self.costs, mean, SPREAD_PX * spread_scale
         )
         return stddev
-
-    def _weighted(self, count: int, spread_scale: float) -> tuple[FloatArray, FloatArray]:
-        """A copy of the ``count`` best particles (count, D), and their weights; these sum to 1."""
-        if count < len(self.costs):
-            chosen = np.argpartition(self.costs, count - 1)[:count]
-        else:
-            chosen = np.arange(len(self.costs))
-        costs = self.costs[chosen]
-        weights = np.exp((costs.min() - costs) / (SPREAD_PX * spread_scale))
-        weights /= weights.sum()
-        return self.particles[chosen], weights

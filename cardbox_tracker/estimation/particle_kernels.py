@@ -42,3 +42,80 @@ def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any
     for d in range(particles.shape[1]):
         squares[d] = sqrt(squares[d] / total)
     return squares
+
+
+@_compile
+def _limit(costs: Any, count: int) -> Any:
+    """The cost of the dearest of the ``count`` cheapest, and how many of just that cost belong."""
+    limit = np.partition(costs, count - 1)[count - 1]
+    ties = count
+    for cost in costs:
+        if cost < limit:
+            ties -= 1
+    return limit, ties
+
+
+@_compile
+def truncate(costs: Any, count: int) -> Any:
+    """Ancestors (N,): the best of ``costs`` (N,), the others of the ``count`` best, then the best.
+
+    Among equals the first ones survive.
+    """
+    best = np.argmin(costs)
+    ancestors = np.full(costs.shape[0], best)
+    limit, ties = _limit(costs, count)
+    place = 1
+    for i in range(costs.shape[0]):
+        if costs[i] > limit:
+            continue
+        if costs[i] == limit:
+            if ties == 0:
+                continue
+            ties -= 1
+        if i != best:
+            ancestors[place] = i
+            place += 1
+    return ancestors
+
+
+@_compile
+def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
+    """Mean (D,) of the ``count`` cheapest of the particles (N, D) with ``costs`` (N,).
+
+    They are weighted by exp(-(W - W_best) / spread).
+    """
+    best = costs.min()
+    limit, ties = _limit(costs, count)
+    total = 0.0
+    mean = np.zeros(particles.shape[1])
+    for i in range(particles.shape[0]):
+        if costs[i] > limit:
+            continue
+        if costs[i] == limit:
+            if ties == 0:
+                continue
+            ties -= 1
+        weight = exp((best - costs[i]) / spread)
+        total += weight
+        for d in range(particles.shape[1]):
+            mean[d] += weight * particles[i, d]
+    for d in range(particles.shape[1]):
+        mean[d] /= total
+    return mean
+
+
+@_compile
+def add_prior(costs: Any, particles: Any, below: Any, above: Any, weight: float) -> Any:
+    """Costs (N,) plus ``weight`` times the squared distances of particles (N, D) from rest.
+
+    A value is measured in units 1/``above`` (D,) where it is positive, 1/``below`` (D,) where not.
+    """
+    rated = np.empty(costs.shape[0])
+    for i in range(costs.shape[0]):
+        squares = 0.0
+        for d in range(particles.shape[1]):
+            value = particles[i, d]
+            scaled = value * (below[d] if value < 0.0 else above[d])
+            squares += scaled * scaled
+        rated[i] = costs[i] + weight * squares
+    return rated

@@ -50,6 +50,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.estimation.particle_kernels import truncate
+
 FloatArray = NDArray[np.float64]
 Ancestors = NDArray[np.intp]
 
@@ -87,17 +89,12 @@ def deterministic(
     """Algorithm "DRS": ancestors (N,) from the order of ``costs`` (N,) alone.
 
     The best particle comes first with or without ``elite``: it survives in either case. The other
-    survivors come in no particular order: whoever is an ancestor once is so at any place in the
-    list, so a partition does the work of a sort.
+    survivors keep their order, so a partition does the work of a sort; of equals, the first ones
+    survive.
     """
     # The product may fall short of a whole number by rounding, as 0.29 times 100 does.
     survivors = max(1, int(survival_rate * len(costs) + 1e-9))
-    ancestors: Ancestors = costs.argpartition(survivors - 1)
-    first = costs[ancestors[:survivors]].argmin()
-    best = ancestors[first]
-    ancestors[first] = ancestors[0]
-    ancestors[0] = best
-    ancestors[survivors:] = best
+    ancestors: Ancestors = truncate(costs, survivors)
     return ancestors
 
 

@@ -113,6 +113,11 @@ def test_drs_of_equal_costs_keeps_as_many(count: int, survival_rate: float) -> N
     assert copies[ancestors[0]] == copies.max() == count - survivors + 1
 
 
+def test_of_equal_costs_the_first_survive() -> None:
+    ancestors = drs(np.array([5.0, 7.0, 3.0, 7.0, 3.0, 7.0]), 4 / 6)
+    assert list(ancestors) == [2, 0, 1, 4, 2, 2]
+
+
 def test_drs_leaves_the_costs_as_they_are() -> None:
     costs = np.array([3.0, 1.0, 2.0, 0.0])
     drs(costs, 0.5)
