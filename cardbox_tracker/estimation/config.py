@@ -65,7 +65,8 @@ class TrackerConfig:
         torso_beside_arms: rate a torso beside the arms found last, where they are in the picture,
             so that the whole model is drawn as equation (2) has it; rated alone, it leans forward
             to cover the upper arms.
-        parallel_arms: estimate both arms at the same time, in two threads.
+        parallel_from: arms of so many particles or more are estimated at the same time, in two
+            threads; with fewer, waking the other thread costs more than it saves. None: never.
         recover: search anew when the person was lost, or came back into the picture.
         lost_iou: an IoU below this counts as lost.
         lost_frames: after so many lost frames in a row the state is ``lost``.
@@ -80,7 +81,7 @@ class TrackerConfig:
     average: int = 1
     explore: float = 0.0
     torso_beside_arms: bool = True
-    parallel_arms: bool = True
+    parallel_from: int | None = 500
     recover: bool = False
     lost_iou: float = 0.4
     lost_frames: int = 5
@@ -98,6 +99,8 @@ class TrackerConfig:
         _check("cycles", self.cycles, 1, 100)
         _check("noise_decay", self.noise_decay, 0.0, 1.0)
         _check("prior", self.prior, 0.0, 1.0)
+        if self.parallel_from is not None:
+            _check("parallel_from", self.parallel_from, 0, 1_000_000)
         _check("average", self.average, 1, min(self.torso.particles, self.arm.particles))
         _check("explore", self.explore, 0.0, 0.9)
         _check("lost_iou", self.lost_iou, 0.0, 1.0)
@@ -119,13 +122,17 @@ def paper_preset() -> TrackerConfig:
 
 
 def default_preset() -> TrackerConfig:
-    """Return what tracks best: cycles with falling noise, a weak prior, a mean of the best."""
-    return TrackerConfig(
+    """Return what tracks best: cycles with falling noise, a weak prior, a mean of the best.
+
+    More particles than these hardly track better (``docs/architecture.md``).
+    """
+    return replace(
+        TrackerConfig().with_particles(120),
         cycles=3,
         noise_decay=0.6,
         prior=0.012,
         average=20,
-        explore=0.15,
+        explore=0.25,
         recover=True,
     )
 

@@ -16,6 +16,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost import ARMS, CostArray, SilhouetteCost
 from cardbox_tracker.estimation.particle_filter import ParticleFilter
+from cardbox_tracker.estimation.particle_kernels import add_prior
 from cardbox_tracker.estimation.resampling import STRATEGIES
 
 _REFERENCE_AREA_PX = 320 * 240
@@ -27,10 +28,10 @@ _RANGES = JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]
 _PRIOR_UNITS = np.where([name.endswith("flexion") for name in JOINT_NAMES], _RANGES / 6, _RANGES)
 _PRIOR_UNITS[0] = np.inf
 _PRIOR_UNITS[1:4] = np.radians([20.0, 26.0, 20.0])
-_PRIOR_SCALE = 1.0 / _PRIOR_UNITS
+_ABOVE_REST = 1.0 / _PRIOR_UNITS
 # A bow and leaning back lower the head alike in the picture, but people bow.
-_PITCH = JOINT_NAMES.index("torso_pitch")
-_BACKWARD_FACTOR = 3.0
+_BELOW_REST = _ABOVE_REST.copy()
+_BELOW_REST[JOINT_NAMES.index("torso_pitch")] *= 3.0
 
 
 class HierarchicalFilter:
@@ -63,7 +64,9 @@ class HierarchicalFilter:
             for (side, joints), stream in zip(ARMS.items(), streams[1:], strict=True)
         }
         self._last: FloatArray | None = None
-        self._pool = ThreadPoolExecutor(1, "left_arm") if config.parallel_arms else None
+        fewest = config.parallel_from
+        parallel = fewest is not None and config.arm.particles >= fewest
+        self._pool = ThreadPoolExecutor(1, "left_arm") if parallel else None
 
     def scatter(self, posture: FloatArray, noise_scale: float = 1.0) -> FloatArray:
         """Start all filters around ``posture`` (12,) on the silhouette observed last.
@@ -135,12 +138,11 @@ class HierarchicalFilter:
 
     def _with_prior(self, costs: CostArray, particles: FloatArray, joints: slice) -> FloatArray:
         """Add to costs (N,) what grows with the square of each angle's distance from rest, px."""
-        rated: FloatArray = costs.astype(np.float64)
-        if self._config.prior > 0.0:
-            scaled = particles * _PRIOR_SCALE[joints]
-            if joints == TORSO:
-                pitch = scaled[:, _PITCH]
-                pitch[pitch < 0.0] *= _BACKWARD_FACTOR
-            weight_px = self._config.prior * self._cost.silhouette_px
-            rated += weight_px * np.einsum("ij,ij->i", scaled, scaled)
+        rated: FloatArray = add_prior(
+            costs,
+            particles,
+            _BELOW_REST[joints],
+            _ABOVE_REST[joints],
+            self._config.prior * self._cost.silhouette_px,
+        )
         return rated

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,7 +47,11 @@ def follow(
     """Return what tracks the ``i``-th silhouette of ``scene``, the arms one after the other."""
     made = make_cost(cost, scene.body, scene.camera)
     tracker = Tracker(scene.body, scene.camera, one_core(config), cost=made)
-    return lambda i: tracker.track(scene.silhouettes[i])
+    return partial(_track, tracker, scene)
+
+
+def _track(tracker: Tracker, scene: BenchmarkScene, i: int) -> object:
+    return tracker.track(scene.silhouettes[i])
 
 
 def frame_times_ms(
@@ -110,17 +116,24 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
 
 
 def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
-    """Compare both arms at the same time with one after the other, on two cores."""
+    """Compare both arms at the same time with one after the other, on two cores.
+
+    For few particles, and for so many that it pays.
+    """
+    result: dict[str, Any] = {}
     with pinned(2) as cores:
-        together = Tracker(scene.body, scene.camera, paper_preset())
-        times = frame_times_ms(
-            scene,
-            {
-                "one after the other": follow(scene, paper_preset()),
-                "parallel": lambda i: together.track(scene.silhouettes[i]),
-            },
-        )
-    return {"cores": cores, **{name: summary(values) for name, values in times.items()}}
+        for count in (600, 6000):
+            config = paper_preset().with_particles(count // 3)
+            both = Tracker(scene.body, scene.camera, replace(config, parallel_from=0))
+            times = frame_times_ms(
+                scene,
+                {
+                    "one after the other": follow(scene, config),
+                    "parallel": partial(_track, both, scene),
+                },
+            )
+            result[str(count)] = {name: summary(values) for name, values in times.items()}
+    return {"cores": cores, "particles": result}
 
 
 def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.files import atomic_path
 
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
@@ -136,11 +137,15 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
 
 
 def _parallel(times: Mapping[str, Any]) -> str:
-    names = ("one after the other", "parallel")
-    alone, together = (f"{times[name]['median_ms']:.2f} ms" for name in names)
+    parts = [
+        f"{measured['parallel']['median_ms']:.2f} instead of "
+        f"{measured['one after the other']['median_ms']:.2f} ms with {count} particles"
+        for count, measured in times["particles"].items()
+    ]
     return (
-        f"With 600 particles on {times['cores']} cores a frame takes {alone} with one arm after "
-        f"the other and {together} with both at the same time."
+        f"With both arms at the same time on {times['cores']} cores a frame takes "
+        f"{' and '.join(parts)}; the trackers do so from {TrackerConfig().parallel_from} particles "
+        "an arm on."
     )
 
 

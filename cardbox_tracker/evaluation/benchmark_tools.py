@@ -43,7 +43,7 @@ def summary(milliseconds: Times | list[float]) -> dict[str, float]:
 
 def one_core(config: TrackerConfig) -> TrackerConfig:
     """Return ``config`` with the arms one after the other."""
-    return replace(config, parallel_arms=False)
+    return replace(config, parallel_from=None)
 
 
 def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:

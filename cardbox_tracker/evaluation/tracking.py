@@ -70,7 +70,7 @@ class Runs:
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
     """Return ``config`` such that no picture is left out, and one run stays in one thread."""
-    return replace(config, lost_iou=0.0, parallel_arms=False)
+    return replace(config, lost_iou=0.0, parallel_from=None)
 
 
 def tasks_of(setting: Setting, runs: int, effort: float) -> list[Task]:

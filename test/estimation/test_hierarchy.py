@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -61,7 +62,7 @@ def on_constant_cost(
     config: TrackerConfig, picture_px: int = PICTURE_PX
 ) -> tuple[HierarchicalFilter, ConstantCost]:
     cost = ConstantCost()
-    config = replace(config, parallel_arms=False)
+    config = replace(config, parallel_from=None)
     return HierarchicalFilter(cost, config, picture_px, np.random.default_rng(0)), cost
 
 
@@ -81,8 +82,8 @@ def test_arms_in_threads_give_what_they_give_one_after_the_other(
     make_config: Any, strategy: str, seed: int
 ) -> None:
     results = []
-    for parallel in (True, False):
-        config = replace(make_config(), strategy=strategy, parallel_arms=parallel)
+    for parallel_from in (0, None):
+        config = replace(make_config(), strategy=strategy, parallel_from=parallel_from)
         filters = before_somebody(config, seed)
         postures = [filters.scatter(FRONT)]
         for cycle in range(8):
@@ -99,9 +100,30 @@ def test_arms_in_threads_give_what_they_give_one_after_the_other(
         np.testing.assert_array_equal(parallel, sequential)
 
 
+@pytest.mark.parametrize(
+    ("particles", "parallel_from", "threads"), [(499, 500, 1), (500, 500, 2), (999, None, 1)]
+)
+def test_both_arms_run_at_once_where_there_is_enough_to_do(
+    particles: int, parallel_from: int | None, threads: int
+) -> None:
+    _, cost = on_constant_cost(paper_preset())
+    config = replace(paper_preset().with_particles(particles), parallel_from=parallel_from)
+    filters = HierarchicalFilter(cost, config, PICTURE_PX, np.random.default_rng(0))
+    seen = set()
+
+    def rate(side: str, arm_postures: np.ndarray) -> np.ndarray:
+        seen.add(threading.get_ident())
+        return np.zeros(len(arm_postures), np.int64)
+
+    cost.arm = rate  # type: ignore[method-assign]
+    filters.scatter(FRONT)
+    assert len(seen) == threads
+
+
 def test_an_error_in_the_other_thread_is_not_lost() -> None:
     filters, cost = on_constant_cost(paper_preset())
-    filters = HierarchicalFilter(cost, paper_preset(), PICTURE_PX, np.random.default_rng(0))
+    config = replace(paper_preset(), parallel_from=0)
+    filters = HierarchicalFilter(cost, config, PICTURE_PX, np.random.default_rng(0))
 
     def fail(side: str, arm_postures: np.ndarray) -> np.ndarray:
         if side == "left":
@@ -274,7 +296,7 @@ def test_an_arm_that_was_lost_is_found_by_exploring() -> None:
     raised = FRONT.copy()
     raised[4] = raised[8] = np.radians(150)
     for seed in range(3):
-        filters = before_somebody(default_preset(), seed, raised)
+        filters = before_somebody(default_preset().with_particles(200), seed, raised)
         filters.scatter(FRONT, 0.1)
         for _ in range(10):
             posture = filters.cycle(0.1, 0.3)

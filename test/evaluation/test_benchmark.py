@@ -100,8 +100,8 @@ def test_the_scene_moves_and_its_background_does_not() -> None:
 
 def test_both_arms_at_once_find_what_one_after_the_other_does() -> None:
     """What the benchmark compares is the same work."""
-    assert benchmark_tools.one_core(paper_preset()).parallel_arms is False
-    assert paper_preset().parallel_arms is True
+    assert benchmark_tools.one_core(paper_preset()).parallel_from is None
+    assert paper_preset().parallel_from is not None
 
 
 @pytest.mark.parametrize("nodes", [None, NODES])
