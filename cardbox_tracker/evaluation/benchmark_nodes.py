@@ -139,7 +139,7 @@ class _CameraAndListener:
         }
 
     def _publish(self, scene: BenchmarkScene, picture: NDArray[np.uint8], encoding: str) -> int:
-        """Publish a picture and its calibration, stamped now; return the stamp, ns."""
+        """Publish a picture, then its calibration, as drivers do, stamped now; the stamp in ns."""
         from builtin_interfaces.msg import Time
         from std_msgs.msg import Header
 
@@ -147,11 +147,12 @@ class _CameraAndListener:
 
         if encoding == "bgr8":
             picture = np.repeat(picture[..., None], 3, axis=2)
-        message = image_message(Header(frame_id="camera"), picture, encoding)
+        image = image_message(Header(frame_id="camera"), picture, encoding)
+        info = camera_info_message(image.header, scene.camera)
         now_ns = time.time_ns()
-        message.header.stamp = Time(sec=now_ns // 10**9, nanosec=now_ns % 10**9)
-        self._info.publish(camera_info_message(message.header, scene.camera))
-        self._image.publish(message)
+        image.header.stamp = Time(sec=now_ns // 10**9, nanosec=now_ns % 10**9)
+        self._image.publish(image)
+        self._info.publish(info)
         return now_ns
 
     def _spin_until(self, when_s: float) -> None:

@@ -15,6 +15,7 @@ from cardbox_tracker.ros.camera_info import calibration_from_info
 from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.parameters import LiveParameters
+from cardbox_tracker.vision import regions
 from cardbox_tracker.vision.background import (
     BackgroundLearner,
     BackgroundModel,
@@ -35,6 +36,7 @@ class BackgroundNode(CardboxNode):
     def __init__(self, **options: Any) -> None:
         """Subscribe to the camera and wait for its pictures."""
         super().__init__("background", **options)
+        regions.warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
         self._size = (settings.width, settings.height)
@@ -155,10 +157,10 @@ class BackgroundNode(CardboxNode):
     ) -> None:
         assert self._camera is not None
         silhouette = extractor(picture)
-        self._covered = np.count_nonzero(silhouette) / silhouette.size
         # The picture first: whoever tracks it need not wait for what hardly ever changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._silhouette_info.publish(conversions.camera_info_message(header, self._camera))
+        self._covered = np.count_nonzero(silhouette) / silhouette.size
 
     def _values(self) -> dict[str, str]:
         return {

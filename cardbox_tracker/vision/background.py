@@ -13,11 +13,12 @@ in twenty; the clean-up that follows is what makes a silhouette of it, and can b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from cardbox_tracker.vision.regions import recolour_small
 
 FloatPicture = NDArray[np.float32]
 Picture = NDArray[np.uint8]
@@ -187,29 +188,7 @@ def clean_silhouette(foreground: Picture, min_area: float, max_hole: float) -> P
         A new (H, W) picture, 0 or 255.
     """
     # Closing, not opening: it joins what noise cut, and thin fingers survive it.
-    closed = np.asarray(cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _KERNEL), dtype=np.uint8)
-    cleaned = _drop_small(closed, min_area * foreground.size)
-    filled = cv2.bitwise_not(
-        _drop_small(np.asarray(cv2.bitwise_not(cleaned), np.uint8), max_hole * foreground.size)
-    )
-    return np.asarray(filled, dtype=np.uint8)
-
-
-def _drop_small(picture: Picture, area_px: float) -> Picture:
-    """Blacken the connected white regions of fewer than ``area_px`` pixels."""
-    if area_px <= 1:
-        return picture
-    # Two regions never touch, so there are fewer than half as many as pixels; short labels are
-    # faster, and so is counting them apart from OpenCV's statistics of boxes and centres.
-    short = picture.size < 2**17
-    count, found = cv2.connectedComponents(
-        picture, connectivity=4, ltype=cv2.CV_16U if short else cv2.CV_32S
-    )
-    labels: NDArray[Any] = np.asarray(found)
-    if short:
-        areas = cv2.calcHist([labels], [0], None, [count], [0, count]).ravel()
-    else:
-        areas = np.bincount(labels.ravel())
-    keep = np.where(areas >= area_px, 255, 0).astype(np.uint8)
-    keep[0] = 0
-    return keep.take(labels)
+    closed = np.ascontiguousarray(cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _KERNEL), np.uint8)
+    recolour_small(closed, 255, min_area * foreground.size)
+    recolour_small(closed, 0, max_hole * foreground.size)
+    return closed

@@ -1,0 +1,90 @@
+"""Small regions: by hand, and as OpenCV's labels have them."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cardbox_tracker.vision.regions import recolour_small
+
+
+def picture(*rows: str) -> np.ndarray:
+    """White where there is an ``x``."""
+    return np.array([[255 * (letter == "x") for letter in row] for row in rows], np.uint8)
+
+
+def recoloured(before: np.ndarray, colour: int, area_px: float) -> np.ndarray:
+    after = before.copy()
+    recolour_small(after, colour, area_px)
+    return after
+
+
+def by_labels(before: np.ndarray, colour: int, area_px: float) -> np.ndarray:
+    """The same with OpenCV's labels."""
+    count, labels = cv2.connectedComponents((before == colour).astype(np.uint8), connectivity=4)
+    after = before.copy()
+    for label in range(1, count):
+        region = labels == label
+        if np.count_nonzero(region) < area_px:
+            after[region] = 255 - colour
+    return after
+
+
+def test_specks_by_hand() -> None:
+    before = picture("x..xx", "..x..", "xx.x.", "xx...")
+    np.testing.assert_array_equal(
+        recoloured(before, 255, 2), picture("...xx", ".....", "xx...", "xx...")
+    )
+    np.testing.assert_array_equal(
+        recoloured(before, 255, 4.5), picture(".....", ".....", ".....", ".....")
+    )
+    np.testing.assert_array_equal(recoloured(before, 255, 1), before)
+
+
+def test_holes_by_hand() -> None:
+    """What touches by a corner alone is apart; the outside is a region like any other."""
+    before = picture("xxxxx.", "x.xxx.", "xx..x.", "xxxxx.")
+    np.testing.assert_array_equal(
+        recoloured(before, 0, 2), picture("xxxxx.", "xxxxx.", "xx..x.", "xxxxx.")
+    )
+    np.testing.assert_array_equal(
+        recoloured(before, 0, 3), picture("xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.")
+    )
+    assert recoloured(before, 0, 5).all()
+
+
+def test_arms_that_meet_below_are_one_region() -> None:
+    before = picture("x.x.x", "x.x.x", "xxxxx")
+    np.testing.assert_array_equal(recoloured(before, 255, 11), before)
+    assert not recoloured(before, 255, 12).any()
+
+
+@pytest.mark.parametrize("width", [7, 8, 64, 65])
+def test_one_colour_is_one_region(width: int) -> None:
+    white = np.full((5, width), 255, np.uint8)
+    np.testing.assert_array_equal(recoloured(white, 255, 5 * width), white)
+    np.testing.assert_array_equal(recoloured(white, 0, 1e9), white)
+    assert not recoloured(white, 255, 5 * width + 1).any()
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.tuples(st.integers(1, 24), st.integers(1, 40)).flatmap(
+        lambda shape: arrays(np.bool_, shape, fill=st.nothing())
+    ),
+    st.sampled_from([(1, 1), (2, 3), (8, 1), (1, 8)]),
+    st.sampled_from([0, 255]),
+    st.integers(0, 200),
+)
+def test_equal_to_labelling_every_pixel(
+    cells: np.ndarray, scale: tuple[int, int], colour: int, area_px: int
+) -> None:
+    """Cells of several pixels have the long runs that real silhouettes have."""
+    before = np.kron(cells, np.ones(scale)).astype(np.uint8) * np.uint8(255)
+    np.testing.assert_array_equal(
+        recoloured(before, colour, area_px), by_labels(before, colour, area_px)
+    )
