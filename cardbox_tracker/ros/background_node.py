@@ -16,11 +16,7 @@ from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.vision import regions
-from cardbox_tracker.vision.background import (
-    BackgroundLearner,
-    BackgroundModel,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.brightness import to_working_size
 from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
 
@@ -51,8 +47,8 @@ class BackgroundNode(CardboxNode):
         self._picture_bytes = 0
         self._covered = 0.0
 
-        self._silhouette = self.advertise(Image, "silhouette", qos.SILHOUETTE)
-        self._silhouette_info = self.advertise(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+        self._silhouette = self.hand_over(Image, "silhouette", qos.SILHOUETTE)
+        self._infos = self.hand_over(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
         compressed = settings.image_transport == "compressed"
@@ -146,7 +142,7 @@ class BackgroundNode(CardboxNode):
                 "(learning the background: nobody may be in view)"
             )
             return
-        model: BackgroundModel = self._learner.model()
+        model = self._learner.model()
         self._extractor = SilhouetteExtractor(model, self._config)
         self._mean.publish(conversions.image_message(header, model.mean, "32FC1"))
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
@@ -159,7 +155,7 @@ class BackgroundNode(CardboxNode):
         silhouette = extractor(picture)
         # The picture first: whoever tracks it need not wait for what hardly ever changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
-        self._silhouette_info.publish(conversions.camera_info_message(header, self._camera))
+        self._infos.publish(conversions.camera_info_message(header, self._camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size
 
     def _values(self) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 from functools import partial
@@ -29,6 +30,8 @@ from cardbox_tracker.ros.node_parameters import InitializerParameters
 from cardbox_tracker.ros.parameters import LiveParameters
 from cardbox_tracker.ros.reference_capture import ReferenceCapture
 from cardbox_tracker.vision.camera import Camera
+
+_NICENESS = 5
 
 
 class InitializerNode(CardboxNode):
@@ -176,6 +179,8 @@ def _answer(result: InitializationResult) -> str:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
+    # Whoever tracks the same silhouette goes first.
+    os.nice(_NICENESS)
     return run_node(InitializerNode, args)
 
 

@@ -15,13 +15,13 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros import qos
 from cardbox_tracker.ros.diagnostics import NodeDiagnostics
+from cardbox_tracker.ros.handover import HandingPublisher, Handover
 from cardbox_tracker.ros.static_executor import StaticExecutor
 
 Callback = Callable[[Any, int], None]
@@ -41,9 +41,16 @@ N = TypeVar("N", bound=Closable)
 class CardboxNode(Node):
     """A node that says what it does, what it waits for, and what is wrong."""
 
-    def __init__(self, name: str, **options: Any) -> None:
-        """Create the node; ``options`` are those of :class:`rclpy.node.Node`."""
+    def __init__(self, name: str, handover: Handover | None = None, **options: Any) -> None:
+        """Create the node.
+
+        Args:
+            name: of the node.
+            handover: shared by the nodes of one process, those that offer a topic first.
+            options: those of :class:`rclpy.node.Node`.
+        """
         super().__init__(name, **options)
+        self._handover = handover
         self.diagnostics = NodeDiagnostics(self)
 
     def resolve(self, topic: str) -> str:
@@ -60,10 +67,18 @@ class CardboxNode(Node):
             qos_overriding_options=qos.overridable(profile),
         )
 
+    def hand_over(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher | HandingPublisher:
+        """As :meth:`advertise`, but nodes of this process are handed the messages themselves."""
+        publisher = self.advertise(kind, topic, profile)
+        return publisher if self._handover is None else self._handover.offer(publisher)
+
     def subscribe(
         self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
-    ) -> Subscription:
-        """Create a subscription; what ``callback`` raises is reported and the node goes on."""
+    ) -> None:
+        """Take the messages of a topic, handed over where a node of this process offers it.
+
+        What ``callback`` raises is reported and the node goes on.
+        """
 
         def guarded(message: Any, info: dict[str, Any]) -> None:
             try:
@@ -73,7 +88,9 @@ class CardboxNode(Node):
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
-        return self.create_subscription(
+        if self._handover is not None and self._handover.take(self.resolve(topic), guarded):
+            return
+        self.create_subscription(
             kind,
             topic,
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument

@@ -24,6 +24,7 @@ from rclpy.utilities import remove_ros_args, try_shutdown
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.background_node import BackgroundNode
 from cardbox_tracker.ros.camera_node import CameraNode
+from cardbox_tracker.ros.handover import Handover
 from cardbox_tracker.ros.initializer_node import InitializerNode
 from cardbox_tracker.ros.node import CardboxNode, run
 from cardbox_tracker.ros.play_bag_node import PlayBagNode
@@ -46,12 +47,14 @@ class AllNodes:
         self.nodes: list[CardboxNode] = []
         self._player: PlayBagNode | None = None
         self._playing: threading.Thread | None = None
-        kinds: list[Callable[[], CardboxNode]] = [BackgroundNode, InitializerNode, TrackerNode]
+        # The tracker is handed a silhouette before the initializer is.
+        kinds: list[Callable[..., CardboxNode]] = [BackgroundNode, TrackerNode, InitializerNode]
         if source == "camera":
             kinds.append(CameraNode)
         try:
+            handover = Handover()
             for kind in kinds:
-                self.nodes.append(kind())
+                self.nodes.append(kind(handover=handover))
             if source == "play_bag":
                 self._player = PlayBagNode()
         except Exception:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from contextlib import ExitStack, suppress
 from inspect import iscoroutinefunction
-from typing import Any
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
@@ -31,37 +30,46 @@ _KINDS = ("guard_condition", "timer", "client", "service")
 class StaticExecutor(SingleThreadedExecutor):
     """Serves nodes in the thread that calls :meth:`spin`; for the rest as its base class."""
 
+    _entities: _Entities | None = None
+
     def spin(self) -> None:
         """Serve until shutdown.
 
         Raises:
             ExternalShutdownException: a signal, or another thread, ended ROS.
         """
-        entities: _Entities | None = None
         try:
             while self._context.ok() and not self._is_shutdown:
                 if any(not task.done() for task, _, _ in self._tasks):
                     # A coroutine waits for something; rclpy looks after it.
+                    self._let_go()
                     self.spin_once()
-                    continue
-                entities = entities or _Entities(self)
-                try:
-                    ready, others = entities.wait()
-                except InvalidHandle:
-                    ready, others = [], True  # a callback destroyed one of them
-                if not self._context.ok():
-                    raise ExternalShutdownException
-                for subscription in ready:
-                    with suppress(InvalidHandle):
-                        _serve(subscription)
-                if others:
-                    # Among them the news that something was created or destroyed.
-                    entities.release()
-                    entities = None
-                    self._serve_others()
+                else:
+                    self._serve_once()
         finally:
-            if entities is not None:
-                entities.release()
+            self._let_go()
+
+    def _serve_once(self) -> None:
+        entities = self._entities = self._entities or _Entities(self)
+        try:
+            entities.wait()
+        except InvalidHandle:
+            # A callback destroyed one of them.
+            self._let_go()
+            return
+        if not self._context.ok():
+            raise ExternalShutdownException
+        for subscription in entities.ready_subscriptions():
+            _serve(subscription)
+        if entities.others_are_ready():
+            # Among them the news that something was created or destroyed.
+            self._let_go()
+            self._serve_others()
+
+    def _let_go(self) -> None:
+        if self._entities is not None:
+            self._entities.release()
+            self._entities = None
 
     def _serve_others(self) -> None:
         with suppress(TimeoutException, ShutdownException):
@@ -73,8 +81,11 @@ class StaticExecutor(SingleThreadedExecutor):
 
 
 def _serve(subscription: Subscription) -> None:
-    with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    try:
+        with subscription.handle:
+            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    except InvalidHandle:
+        return  # the callback before destroyed it
     if taken is None:
         return
     if subscription._callback_type is Subscription.CallbackType.MessageOnly:
@@ -128,8 +139,12 @@ class _Entities:
             if not iscoroutinefunction(entity.callback)
         }
 
-    def wait(self) -> tuple[list[Any], bool]:
-        """Wait until something is ready: subscriptions to serve, and whether anything else is."""
+    def wait(self) -> None:
+        """Wait until something is ready.
+
+        Raises:
+            InvalidHandle: something was destroyed.
+        """
         wait_set = self._set
         # A wait leaves only what is ready in the set.
         wait_set.clear_entities()
@@ -138,14 +153,23 @@ class _Entities:
         for waitable in self._waitables:
             waitable.add_to_wait_set(wait_set)
         wait_set.wait(_FOR_EVER)
-        found = wait_set.get_ready_entities("subscription")
-        ready = [self._at_once[pointer] for pointer in found if pointer in self._at_once]
-        others = (
-            len(ready) < len(found)
-            or any(wait_set.get_ready_entities(kind) for kind in _KINDS)
-            or any(waitable.is_ready(wait_set) for waitable in self._waitables)
+
+    def ready_subscriptions(self) -> list[Subscription]:
+        """Return those that have a message, but for those that rclpy looks after."""
+        found = self._found("subscription")
+        return [self._at_once[pointer] for pointer in found if pointer in self._at_once]
+
+    def others_are_ready(self) -> bool:
+        """Return whether there is anything for rclpy to look after."""
+        return (
+            any(pointer not in self._at_once for pointer in self._found("subscription"))
+            or any(self._found(kind) for kind in _KINDS)
+            or any(waitable.is_ready(self._set) for waitable in self._waitables)
         )
-        return ready, others
+
+    def _found(self, kind: str) -> list[int]:
+        pointers: list[int] = self._set.get_ready_entities(kind)
+        return pointers
 
     def release(self) -> None:
         """Let go of the entities, so that those destroyed meanwhile can end."""

@@ -1,0 +1,53 @@
+"""Messages that nodes of one process hand to each other, without DDS between them.
+
+A silhouette that goes over DDS is serialized, copied, announced to another thread and unpacked
+again, a millisecond or more with the waking; handed over, the tracker has it at once. Other nodes
+get it by DDS as ever, after those of this process.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.publisher import Publisher
+
+Taker = Callable[[Any, dict[str, Any]], None]
+"""What rclpy calls with a message and its circumstances."""
+
+
+class Handover:
+    """Which callbacks of this process take a topic's messages; one for all its nodes."""
+
+    def __init__(self) -> None:
+        """Start with no topic."""
+        self._takers: dict[str, list[Taker]] = {}
+
+    def offer(self, publisher: Publisher) -> HandingPublisher:
+        """Hand over what is published with ``publisher`` from now on."""
+        return HandingPublisher(publisher, self._takers.setdefault(publisher.topic_name, []))
+
+    def take(self, topic: str, taker: Taker) -> bool:
+        """Call ``taker`` with each message on ``topic``; False if nobody here offers it."""
+        takers = self._takers.get(topic)
+        if takers is None:
+            return False
+        takers.append(taker)
+        return True
+
+
+class HandingPublisher:
+    """Publishes to the takers of this process in their order, then to all others."""
+
+    def __init__(self, publisher: Publisher, takers: list[Taker]) -> None:
+        """Publish with ``publisher`` where a node of another process subscribes."""
+        self._publisher = publisher
+        self._takers = takers
+
+    def publish(self, message: Any) -> None:
+        """Return when the takers are done; they share ``message`` and leave it as it is."""
+        for taker in self._takers:
+            taker(message, {"source_timestamp": time.time_ns()})
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(message)
