@@ -127,12 +127,12 @@ def default_preset() -> TrackerConfig:
     More particles than these hardly track better (``docs/architecture.md``).
     """
     return replace(
-        TrackerConfig().with_particles(120),
-        cycles=3,
-        noise_decay=0.6,
+        TrackerConfig().with_particles(150),
+        cycles=2,
+        noise_decay=0.5,
         prior=0.012,
         average=20,
-        explore=0.25,
+        explore=0.2,
         recover=True,
     )
 
