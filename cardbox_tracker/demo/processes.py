@@ -47,10 +47,11 @@ class Nodes:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, *arguments: str) -> None:
-        """Start the node ``name`` of this package."""
+        """Start the node ``name`` of this package; ``single_process`` is all nodes in one."""
+        module = name if name == "single_process" else f"{name}_node"
         with (self._logs / f"{name}.log").open("wb") as log:
             self._processes[name] = subprocess.Popen(
-                [sys.executable, "-m", f"cardbox_tracker.ros.{name}_node", *arguments],
+                [sys.executable, "-m", f"cardbox_tracker.ros.{module}", *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )

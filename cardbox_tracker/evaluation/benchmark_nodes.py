@@ -1,15 +1,19 @@
 """How long the nodes take from an image's stamp to the joint states, over real DDS.
 
 A publisher in this process plays a camera: the empty scene, then a person who waves to and fro,
-each picture stamped with the time it is sent. The nodes are processes of their own, started as a
-user would. What counts is when a JointState with that stamp arrives.
+each picture stamped with the time it is sent. The nodes are started as a user would, each a process
+of its own or all in one. What counts is when a subscriber's callback has the JointState with that
+stamp; how long before that it had arrived in the subscriber's process is noted, too.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,26 +28,42 @@ from cardbox_tracker.evaluation.benchmark_scene import BenchmarkScene, make_scen
 
 RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))
-NODES = ("background", "initializer", "tracker")
+SEPARATE = ("background", "initializer", "tracker")
+TOGETHER = ("single_process",)
+PERCENTILES = (50, 95, 99)
 
 _START_S = 30.0
 _LAST_S = 0.5
 
 
 def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, Any] | None:
-    """Measure every stream at every rate for ``seconds``; None where ROS is not installed."""
+    """Measure every stream at every rate for ``seconds``; None where ROS is not installed.
+
+    ``single_process`` in what is returned has the same of all nodes in one process.
+    """
     try:
         import rclpy  # noqa: F401
     except ImportError:
         return None
     isolate()
+    scenes = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
+    separate = _measure(SEPARATE, scenes, seconds, lambda done: report(0.5 * done))
+    together = _measure(TOGETHER, scenes, seconds, lambda done: report(0.5 + 0.5 * done))
+    return {**separate, "single_process": together}
+
+
+def _measure(
+    processes: tuple[str, ...],
+    scenes: dict[tuple[str, int, int], BenchmarkScene],
+    seconds: float,
+    report: Callable[[float], None],
+) -> dict[str, Any]:
     with TemporaryDirectory() as folder, running_nodes(Path(folder)) as nodes:
-        camera = _CameraAndListener(nodes)
+        camera = _CameraAndListener(nodes, processes)
         try:
-            scenes = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
             model = Path(folder) / "body.yaml"
             save_body_model(scenes[STREAMS[0]].body, model)
-            ready_s = {name: camera.start(name, model) for name in NODES}
+            ready_s = {name: camera.start(name, model) for name in processes}
             streams = {}
             for i, (stream, scene) in enumerate(scenes.items()):
                 camera.learn(scene, stream[0])
@@ -51,7 +71,7 @@ def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, 
                     name = f"{stream[0]} {stream[1]}x{stream[2]} at {rate} Hz"
                     streams[name] = camera.measure(scene, stream[0], rate, seconds)
                     report((i * len(RATES_HZ) + j + 1) / (len(STREAMS) * len(RATES_HZ)))
-            memory = {name: _rss_mb(nodes.pid(name)) for name in NODES}
+            memory = {name: _rss_mb(nodes.pid(name)) for name in processes}
         finally:
             camera.close()
     return {"ready_s": ready_s, "rss_mb": memory, "streams": streams}
@@ -60,34 +80,45 @@ def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, 
 class _CameraAndListener:
     """Publishes pictures and takes note of when their joint states arrive."""
 
-    def __init__(self, nodes: Nodes) -> None:
+    def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import CameraInfo, Image, JointState
 
         from cardbox_tracker.ros import qos
+        from cardbox_tracker.ros.static_executor import StaticExecutor
 
         self._nodes = nodes
+        self._processes = processes
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_benchmark", enable_rosout=False)
-        self._executor = SingleThreadedExecutor()
+        self._executor = StaticExecutor()
         self._executor.add_node(self._node)
         self._image = self._node.create_publisher(Image, "image_raw", qos.CAMERA)
         self._info = self._node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)
-        self._node.create_subscription(JointState, "joint_states", self._arrived, qos.RESULT)
-        self._arrivals_ns: dict[int, int] = {}
+        self._node.create_subscription(
+            JointState,
+            "joint_states",
+            self._arrived,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
+            qos.RESULT,
+        )
+        self._arrivals_ns: dict[int, tuple[int, int]] = {}
+        self._listening = threading.Thread(target=partial(_listen, self._executor), daemon=True)
+        self._listening.start()
 
-    def _arrived(self, message: Any) -> None:
+    def _arrived(self, message: Any, info: dict[str, Any]) -> None:
+        from cardbox_tracker.ros.conversions import stamp_ns
+
         now_ns = time.time_ns()
-        stamp = message.header.stamp
-        self._arrivals_ns[stamp.sec * 10**9 + stamp.nanosec] = now_ns
+        self._arrivals_ns[stamp_ns(message.header.stamp)] = (now_ns, info["received_timestamp"])
 
     def start(self, name: str, model: Path) -> float:
-        """Start a node; return how long it took until it said what it waits for, seconds."""
+        """Start a process; return how long it took until its nodes said what they wait for, s."""
         began = time.monotonic()
-        arguments = ("--ros-args", "-p", f"model_file:={model}") if name == "tracker" else ()
+        together = name in TOGETHER
+        parameter = f"{'tracker:' * together}model_file:={model}"
+        arguments = ("--ros-args", "-p", parameter) if together or name == "tracker" else ()
         self._nodes.start(name, *arguments)
-        while "waiting for" not in self._nodes.text(name):
+        while self._nodes.text(name).count("waiting for") < (len(SEPARATE) if together else 1):
             time.sleep(0.01)
             self._nodes.check()
             if time.monotonic() - began > _START_S:
@@ -98,12 +129,12 @@ class _CameraAndListener:
         """Show the empty scene until silhouettes come; the camera changed, so it is learned."""
         end = time.monotonic() + _START_S
         while self._info.get_subscription_count() == 0 or self._image.get_subscription_count() == 0:
-            self._executor.spin_once(timeout_sec=0.05)
+            time.sleep(0.05)
             if time.monotonic() > end:
                 raise CardboxError("the background node did not subscribe to the pictures")
         for i in range(3 * len(scene.empty)):
             self._publish(scene, scene.empty[i % len(scene.empty)], encoding)
-            self._spin_until(time.monotonic() + 0.03)
+            time.sleep(0.03)
 
     def measure(
         self, scene: BenchmarkScene, encoding: str, rate_hz: float, seconds: float
@@ -114,26 +145,27 @@ class _CameraAndListener:
         count = max(2, int(seconds * rate_hz))
         sent = []
         began = time.monotonic()
-        used = {name: _cpu_s(self._nodes.pid(name)) for name in NODES}
+        used = {name: _cpu_s(self._nodes.pid(name)) for name in self._processes}
         for i in range(count):
             sent.append(self._publish(scene, there_and_back[i % len(there_and_back)], encoding))
-            self._spin_until(began + (i + 1) / rate_hz)
+            time.sleep(max(0.0, began + (i + 1) / rate_hz - time.monotonic()))
         lasted_s = time.monotonic() - began
         cpu = {
             name: 100.0 * (_cpu_s(self._nodes.pid(name)) - before) / lasted_s
             for name, before in used.items()
         }
-        self._spin_until(time.monotonic() + _LAST_S)
+        time.sleep(_LAST_S)
         self._nodes.check()
-        latencies = [
-            (self._arrivals_ns[stamp] - stamp) / 1e6 for stamp in sent if stamp in self._arrivals_ns
-        ]
-        if not latencies:
+        arrived = [stamp for stamp in sent if stamp in self._arrivals_ns]
+        if not arrived:
             raise CardboxError("no joint states arrived; the nodes do not track")
+        times_ns = np.array([self._arrivals_ns[stamp] for stamp in arrived])
+        called_ms, received_ms = (times_ns - np.array(arrived)[:, None]).T / 1e6
         return {
-            **{f"p{p}_ms": float(np.percentile(latencies, p)) for p in (50, 95, 99)},
+            **{f"p{p}_ms": float(np.percentile(called_ms, p)) for p in PERCENTILES},
+            **{f"received_p{p}_ms": float(np.percentile(received_ms, p)) for p in PERCENTILES},
             "sent": count,
-            "received": len(latencies),
+            "received": len(arrived),
             "cpu_percent": cpu,
             "cpu_percent_sum": sum(cpu.values()),
         }
@@ -155,17 +187,21 @@ class _CameraAndListener:
         self._info.publish(info)
         return now_ns
 
-    def _spin_until(self, when_s: float) -> None:
-        while (left_s := when_s - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left_s)
-
     def close(self) -> None:
         """Leave the graph."""
         from rclpy.utilities import try_shutdown
 
         self._executor.shutdown()
+        self._listening.join()
         self._node.destroy_node()  # type: ignore[no-untyped-call]
         try_shutdown()
+
+
+def _listen(executor: Any) -> None:
+    from rclpy.executors import ExternalShutdownException
+
+    with suppress(ExternalShutdownException):
+        executor.spin()
 
 
 def _cpu_s(pid: int) -> float:
