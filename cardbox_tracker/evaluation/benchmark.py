@@ -84,12 +84,19 @@ def short_table(results: dict[str, Any]) -> str:
         f"particles at 30 Hz, two cores       {results['particles_at_30hz']}",
         f"memory                              {results['rss_mb']:.0f} MB",
     ]
-    for name, stream in (results["nodes"] or {"streams": {}})["streams"].items():
-        lines.append(
-            f"{name:35} {stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95, "
-            f"{stream['cpu_percent_sum']:.0f} % of a core, {stream['received']}/{stream['sent']}"
-        )
+    nodes = results["nodes"]
+    if nodes:
+        lines += ["each node a process of its own:", *_streams(nodes["streams"])]
+        lines += ["all nodes in one process:", *_streams(nodes["single_process"]["streams"])]
     return "\n".join(lines)
+
+
+def _streams(streams: dict[str, Any]) -> list[str]:
+    return [
+        f"  {name:33} {stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95, "
+        f"{stream['cpu_percent_sum']:.0f} % of a core, {stream['received']}/{stream['sent']}"
+        for name, stream in streams.items()
+    ]
 
 
 def _times(ratio: float | None) -> str:

@@ -1,0 +1,32 @@
+"""The benchmark of the nodes runs, each in its own process and all in one; no time is asserted."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from cardbox_tracker.evaluation import benchmark_nodes
+
+
+def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "")
+    monkeypatch.setattr(benchmark_nodes, "RATES_HZ", (15,))
+    monkeypatch.setattr(benchmark_nodes, "STREAMS", benchmark_nodes.STREAMS[:1])
+    done: list[float] = []
+    measured = benchmark_nodes.measure_nodes(2.0, done.append)
+    assert measured is not None
+    assert done == [0.5, 1.0]
+    for processes, part in (
+        (benchmark_nodes.SEPARATE, measured),
+        (benchmark_nodes.TOGETHER, measured["single_process"]),
+    ):
+        assert set(part["ready_s"]) == set(part["rss_mb"]) == set(processes)
+        stream = part["streams"]["mono8 320x240 at 15 Hz"]
+        assert 0 < stream["received"] <= stream["sent"] == 30
+        assert 0 < stream["received_p50_ms"] <= stream["p50_ms"] <= stream["p95_ms"]
+        assert set(stream["cpu_percent"]) == set(processes)
+        assert stream["cpu_percent_sum"] == pytest.approx(sum(stream["cpu_percent"].values()))
