@@ -2,8 +2,8 @@
 
     cardbox_nodes [--with camera | --with play_bag] --ros-args --params-file NODES.yaml
 
-Nothing differs for other nodes: the same names, topics and services. Between ``background`` and
-``tracker`` no other process has to be woken; in exchange they share one core.
+Nothing differs for other nodes: the same names, topics and services. Silhouettes are handed over
+inside the process, so that no other has to be woken; in exchange the nodes share one core.
 
 Parameters are given by node in a YAML file, as ``config/cardbox_nodes.yaml`` has them, or without a
 namespace as ``-p tracker:preset:=paper``; remappings by node as
