@@ -45,14 +45,22 @@ def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any
 
 
 @_compile
-def _limit(costs: Any, count: int) -> Any:
-    """The cost of the dearest of the ``count`` cheapest, and how many of just that cost belong."""
+def _cheapest(costs: Any, count: int) -> Any:
+    """Indices (``count``,), ascending, of the lowest ``costs`` (N,); of equals the first ones."""
     limit = np.partition(costs, count - 1)[count - 1]
     ties = count
     for cost in costs:
         if cost < limit:
             ties -= 1
-    return limit, ties
+    chosen = np.zeros(count, np.intp)
+    place = 0
+    for i in range(costs.shape[0]):
+        if costs[i] < limit or (costs[i] == limit and ties > 0):
+            if costs[i] == limit:
+                ties -= 1
+            chosen[place] = i
+            place += 1
+    return chosen
 
 
 @_compile
@@ -63,15 +71,8 @@ def truncate(costs: Any, count: int) -> Any:
     """
     best = np.argmin(costs)
     ancestors = np.full(costs.shape[0], best)
-    limit, ties = _limit(costs, count)
     place = 1
-    for i in range(costs.shape[0]):
-        if costs[i] > limit:
-            continue
-        if costs[i] == limit:
-            if ties == 0:
-                continue
-            ties -= 1
+    for i in _cheapest(costs, count):
         if i != best:
             ancestors[place] = i
             place += 1
@@ -85,16 +86,9 @@ def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
     They are weighted by exp(-(W - W_best) / spread).
     """
     best = costs.min()
-    limit, ties = _limit(costs, count)
     total = 0.0
     mean = np.zeros(particles.shape[1])
-    for i in range(particles.shape[0]):
-        if costs[i] > limit:
-            continue
-        if costs[i] == limit:
-            if ties == 0:
-                continue
-            ties -= 1
+    for i in _cheapest(costs, count):
         weight = exp((best - costs[i]) / spread)
         total += weight
         for d in range(particles.shape[1]):

@@ -50,8 +50,8 @@ class StaticExecutor(SingleThreadedExecutor):
             self._let_go()
 
     def _serve_once(self) -> None:
-        entities = self._entities = self._entities or _Entities(self)
         try:
+            entities = self._entities = self._entities or _Entities(self)
             entities.wait()
         except InvalidHandle:
             # A callback destroyed one of them.
@@ -98,6 +98,11 @@ class _Entities:
     """What the nodes of an executor can be woken by, held until :meth:`release`."""
 
     def __init__(self, executor: StaticExecutor) -> None:
+        """Gather them.
+
+        Raises:
+            InvalidHandle: something was destroyed meanwhile.
+        """
         nodes = executor.get_nodes()
         subscriptions = [entity for node in nodes for entity in node.subscriptions]
         timers = [entity.handle for node in nodes for entity in node.timers]
@@ -107,12 +112,14 @@ class _Entities:
         guards += [executor._guard.handle, executor._sigint_gc.handle]
         handles = [entity.handle for entity in subscriptions]
         self._waitables = [entity for node in nodes for entity in node.waitables]
-        self._held = ExitStack()
-        for handle in (*handles, *timers, *clients, *services, *guards, *self._waitables):
-            self._held.enter_context(handle)
         context = executor.context.handle
         assert context is not None, "spin after ROS was ended"
-        self._held.enter_context(context)
+        with ExitStack() as stack:
+            for handle in (*handles, *timers, *clients, *services, *guards, context):
+                stack.enter_context(handle)
+            for waitable in self._waitables:
+                stack.enter_context(waitable)
+            self._held = stack.pop_all()
         events = NumberOfEntities()
         for waitable in self._waitables:
             events += waitable.get_num_entities()
