@@ -15,8 +15,7 @@ from cardbox_tracker.ros.camera_info import calibration_from_info
 from cardbox_tracker.ros.node import CardboxNode, run_node
 from cardbox_tracker.ros.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.parameters import LiveParameters
-from cardbox_tracker.vision import regions
-from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
+from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor, warm_up
 from cardbox_tracker.vision.brightness import to_working_size
 from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
 
@@ -32,7 +31,7 @@ class BackgroundNode(CardboxNode):
     def __init__(self, **options: Any) -> None:
         """Subscribe to the camera and wait for its pictures."""
         super().__init__("background", **options)
-        regions.warm_up()
+        warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
         self._size = (settings.width, settings.height)

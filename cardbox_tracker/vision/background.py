@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.vision.contrast import foreground_of
 from cardbox_tracker.vision.regions import recolour_small
 
 FloatPicture = NDArray[np.float32]
@@ -134,7 +135,7 @@ class SilhouetteExtractor:
         self._grid = (slice(None, None, step), slice(None, None, step))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
         # Fresh memory costs more than the arithmetic on it.
-        self._scratch = tuple(np.empty_like(model.mean) for _ in range(3))
+        self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
     def __call__(self, brightness: Picture) -> Picture:
         """Return the silhouette (H, W) of ``brightness`` (H, W): 255 for the person, else 0.
@@ -151,23 +152,14 @@ class SilhouetteExtractor:
             difference = np.abs(brightness - self.model.mean)
             return np.where(difference < self._limit, 0, 255).astype(np.uint8)
         self.gain = self._scene_gain(brightness)
-        signed, darker, score = self._scratch
+        signed, score = self._scratch
         cv2.addWeighted(
             brightness, 1.0, self.model.mean, -self.gain, 0.0, dst=signed, dtype=cv2.CV_32F
         )
         if config.smoothing_px > 0:
             cv2.GaussianBlur(signed, (0, 0), config.smoothing_px, dst=signed)
-        cv2.multiply(signed, self._darker, dst=darker)
-        cv2.multiply(signed, self._brighter, dst=score)
-        cv2.max(score, darker, dst=score)
-        limit = signed
-        cv2.dilate(score, _KERNEL, dst=limit)
-        np.multiply(limit, np.float32(config.edge), out=limit)
-        np.maximum(limit, np.float32(1.0), out=limit)
-        foreground = cv2.compare(score, limit, cv2.CMP_GE)
-        return clean_silhouette(
-            np.asarray(foreground, dtype=np.uint8), config.min_area, config.max_hole
-        )
+        foreground = foreground_of(signed, self._brighter, self._darker, config.edge, score)
+        return clean_silhouette(foreground, config.min_area, config.max_hole)
 
     def _scene_gain(self, brightness: Picture) -> float:
         """How much brighter the whole scene is now: the person covers less than half of it."""
@@ -179,6 +171,12 @@ class SilhouetteExtractor:
         if abs(ratio - 1.0) > self.config.flicker:
             return 1.0
         return ratio
+
+
+def warm_up() -> None:
+    """Cut one silhouette, so that no live picture waits for the compiler."""
+    model = BackgroundModel(np.zeros((8, 8), np.float32), np.ones((8, 8), np.float32))
+    SilhouetteExtractor(model)(np.zeros((8, 8), np.uint8))
 
 
 def clean_silhouette(foreground: Picture, min_area: float, max_hole: float) -> Picture:

@@ -36,11 +36,6 @@ def recolour_small(picture: Picture, colour: int, area_px: float) -> None:
     _recolour(picture, words, np.uint8(colour), float(area_px), runs)
 
 
-def warm_up() -> None:
-    """Compile what follows, or load it from the cache, so that no live picture waits for it."""
-    recolour_small(np.zeros((1, 8), np.uint8), 255, 1.0)
-
-
 @_inline
 def _root(parents: Any, run: Any) -> Any:
     """The first run of a region; the way there becomes shorter."""

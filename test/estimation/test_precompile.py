@@ -1,0 +1,54 @@
+"""After the warm-up nothing is left to compile, for any preset and wherever pixels come from."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+from numba.core.registry import CPUDispatcher
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation import kernels, particle_kernels
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.precompile import compile_all
+from cardbox_tracker.estimation.tracker import TRACKING, Tracker
+from cardbox_tracker.vision import contrast, regions
+from cardbox_tracker.vision.background import BackgroundModel, SilhouetteExtractor
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+
+
+def compiled() -> dict[str, int]:
+    """How many versions of each function there are."""
+    modules: tuple[ModuleType, ...] = (kernels, particle_kernels, contrast, regions)
+    return {
+        f"{module.__name__}.{name}": len(value.signatures)
+        for module in modules
+        for name, value in vars(module).items()
+        if isinstance(value, CPUDispatcher)
+    }
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_no_picture_waits_for_the_compiler(preset: str) -> None:
+    compile_all()
+    before = compiled()
+    assert before["cardbox_tracker.estimation.kernels.trunk_costs"] > 0
+    body = BodyModel()
+    person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
+    mean = np.full((240, 320), 90, np.float32)
+    extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
+    tracker = Tracker(body, CAMERA, PRESETS[preset]())
+    received = np.frombuffer(np.where(person > 0, 200, 90).astype(np.uint8).tobytes(), np.uint8)
+    for picture in (received.reshape(240, 320), received.reshape(240, 320).copy()):
+        silhouette = extractor(picture)
+        read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
+        for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
+            state = tracker.track(pixels).state
+        assert state == TRACKING
+    assert compiled() == before
