@@ -124,10 +124,9 @@ def paper_preset() -> TrackerConfig:
 def default_preset() -> TrackerConfig:
     """Return what tracks best: cycles with falling noise, a weak prior, a mean of the best.
 
-    More particles than these hardly track better (``docs/architecture.md``).
+    A third cycle does not track better (``docs/architecture.md``).
     """
-    return replace(
-        TrackerConfig().with_particles(150),
+    return TrackerConfig(
         cycles=2,
         noise_decay=0.5,
         prior=0.012,

@@ -296,7 +296,7 @@ def test_an_arm_that_was_lost_is_found_by_exploring() -> None:
     raised = FRONT.copy()
     raised[4] = raised[8] = np.radians(150)
     for seed in range(3):
-        filters = before_somebody(default_preset().with_particles(200), seed, raised)
+        filters = before_somebody(default_preset(), seed, raised)
         filters.scatter(FRONT, 0.1)
         for _ in range(10):
             posture = filters.cycle(0.1, 0.3)
