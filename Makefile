@@ -77,7 +77,7 @@ demo: setup
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
-	$(BIN)/python -m cardbox_tracker.evaluation.readme
+	$(BIN)/python -m tools.readme_figures
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

@@ -58,13 +58,13 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            f"cardbox = {NAME}.cli:main",
-            f"background = {NAME}.ros.background_node:main",
-            f"initializer = {NAME}.ros.initializer_node:main",
-            f"tracker = {NAME}.ros.tracker_node:main",
-            f"camera = {NAME}.ros.camera_node:main",
-            f"play_bag = {NAME}.ros.play_bag_node:main",
-            f"cardbox_nodes = {NAME}.ros.single_process:main",
+            f"cardbox = {NAME}.commands.main:main",
+            f"background = {NAME}.ros.nodes.background_node:main",
+            f"initializer = {NAME}.ros.nodes.initializer_node:main",
+            f"tracker = {NAME}.ros.nodes.tracker_node:main",
+            f"camera = {NAME}.ros.nodes.camera_node:main",
+            f"play_bag = {NAME}.ros.nodes.play_bag_node:main",
+            f"cardbox_nodes = {NAME}.ros.nodes.single_process:main",
         ],
     },
 )

@@ -23,7 +23,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader
 
 
 def _is_true(text: str) -> bool:

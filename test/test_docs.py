@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.cli import build_parser
+from cardbox_tracker.commands.main import build_parser
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(

@@ -18,10 +18,10 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from cardbox_tracker.demo.processes import Nodes
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.ros import qos
-from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.processes import Nodes
 
 _TOPICS = {
     "body_model": (String, "std_msgs/msg/String", qos.LATCHED),

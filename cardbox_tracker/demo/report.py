@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES
-from cardbox_tracker.demo.run import DemoResult
-from cardbox_tracker.estimation.compiled import CompiledCost
+from cardbox_tracker.demo.result import DemoResult
+from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.drawing.video import video_file
+from cardbox_tracker.estimation.cost.compiled import CompiledCost
 from cardbox_tracker.estimation.tracker import TRACKING, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
 from cardbox_tracker.files import atomic_path
-from cardbox_tracker.ros.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.drawing import draw_overlay
-from cardbox_tracker.vision.video import video_file
 
 matplotlib.use("Agg")
 

@@ -2,50 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
-from cardbox_tracker.demo.processes import Nodes, isolate, running_nodes
+from cardbox_tracker.demo.report import write_report
+from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.errors import CardboxError, RosMissingError
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
-from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
 from cardbox_tracker.simulation.session import synthesize_session
 
 _RATE = 2.0
 _TOPICS = ("/camera/image_raw", "/camera/camera_info")
 _NEUTRAL_S = 0.1
-
-
-@dataclass(frozen=True)
-class DemoResult:
-    """What the nodes published, and the truth.
-
-    Attributes:
-        body: the measured person.
-        truth: of the session.
-        start_ns: from this stamp on the person was measured and is tracked.
-        postures: (12,) by stamp.
-        keypoints_m: (6, 3) by stamp, metres in the optical frame.
-        silhouettes: (H, W) by stamp.
-        fps: joint states that arrived in a second.
-        answer: what the initializer answered.
-    """
-
-    body: BodyModel
-    truth: GroundTruth
-    start_ns: int
-    postures: dict[int, NDArray[np.float64]]
-    keypoints_m: dict[int, NDArray[np.float64]]
-    silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
-    fps: float
-    answer: str
 
 
 def run_demo(output: Path, preset: str, seed: int) -> None:
@@ -54,8 +28,6 @@ def run_demo(output: Path, preset: str, seed: int) -> None:
     Raises:
         CardboxError: something failed; the text says what.
     """
-    from cardbox_tracker.demo.report import write_report
-
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from cardbox_tracker.estimation.resampling import STRATEGIES
+from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
 
 def _check(name: str, value: float, lowest: float, highest: float) -> None:

@@ -14,10 +14,10 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import clip_to_limits, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.compiled import CompiledCost, CompiledKeypoints
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost import Silhouette, SilhouetteCost
-from cardbox_tracker.estimation.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.cost.compiled import CompiledCost, CompiledKeypoints
+from cardbox_tracker.estimation.cost.silhouette import Silhouette, SilhouetteCost
+from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 

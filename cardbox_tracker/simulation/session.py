@@ -19,7 +19,7 @@ from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, forward_kinematics, 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import EncodingError
-from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.vision.contrast import foreground_of
+from cardbox_tracker.vision.foreground import foreground_of
 from cardbox_tracker.vision.regions import recolour_small
 
 FloatPicture = NDArray[np.float32]

@@ -11,8 +11,8 @@ px, and an edge is a line that starts at the first row v0 of the picture below i
 and the columns ceil(min X / 65536) <= u < ceil(max X / 65536) are covered. Neighbouring patches
 that share an edge therefore neither overlap nor leave a gap.
 
-The compiled cost in :mod:`cardbox_tracker.estimation.compiled` must agree with this pixel by pixel;
-32 bits are enough for it, as long as corners beyond 16000 px are moved to there.
+The compiled cost (``estimation/cost/compiled.py``) must agree with this pixel by pixel; 32 bits are
+enough for it, as long as corners beyond 16000 px are moved to there.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pytest
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.demo.report import initialization_fit, write_report
-from cardbox_tracker.demo.run import DemoResult
+from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.evaluation.truth import load_ground_truth
 from cardbox_tracker.simulation.session import synthesize_session
 

@@ -11,11 +11,13 @@ from numba.core.registry import CPUDispatcher
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation import kernels, particle_kernels
 from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.filtering import particle_kernels
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
-from cardbox_tracker.vision import contrast, regions
+from cardbox_tracker.vision import foreground as contrast
+from cardbox_tracker.vision import regions
 from cardbox_tracker.vision.background import BackgroundModel, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -38,7 +40,7 @@ def compiled() -> dict[str, int]:
 def test_no_picture_waits_for_the_compiler(preset: str) -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.estimation.kernels.trunk_costs"] > 0
+    assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     mean = np.full((240, 320), 90, np.float32)

@@ -12,14 +12,14 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture
-from cardbox_tracker.estimation.compiled import CompiledCost
 from cardbox_tracker.estimation.config import (
     FilterConfig,
     TrackerConfig,
     default_preset,
     paper_preset,
 )
-from cardbox_tracker.estimation.cost import ReferenceCost
+from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.silhouette import ReferenceCost
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Estimate, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene

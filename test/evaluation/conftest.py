@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.evaluation.evaluate import Progress
-from cardbox_tracker.evaluation.plan import Plan
-from cardbox_tracker.evaluation.sessions import Session, synthetic_session
+from cardbox_tracker.evaluation.paper.evaluate import Progress
+from cardbox_tracker.evaluation.paper.plan import Plan
+from cardbox_tracker.evaluation.paper.sessions import Session, synthetic_session
 from cardbox_tracker.simulation.session import synthesize_session
 
 FPS, SIZE = 3.0, (160, 120)

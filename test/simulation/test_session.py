@@ -13,7 +13,7 @@ from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.ros.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.simulation.session import START_NS, TRUTH_TOPIC, synthesize_session
 
 SMALL: dict[str, Any] = {"fps": 2.0, "width": 160, "height": 120, "motion": "bow"}

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.ros.runtime.processes import EXECUTABLES
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -68,12 +69,12 @@ class Scene:
 class Process:
     """A node in a process of its own; its output goes to a file."""
 
-    def __init__(self, module: str, arguments: tuple[str, ...], log: Path, domain: int) -> None:
+    def __init__(self, name: str, arguments: tuple[str, ...], log: Path, domain: int) -> None:
         self.log = log
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
         with log.open("w") as output:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", f"cardbox_tracker.ros.{module}", *arguments],
+                [sys.executable, "-m", EXECUTABLES[name], *arguments],
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env=environment,
@@ -119,13 +120,12 @@ class Graph:
     def start(self, name: str, *arguments: str, **parameters: Any) -> Process:
         """Start the node ``name`` with ROS parameters; ``arguments`` come before them.
 
-        ``single_process`` is all nodes in one.
+        ``cardbox_nodes`` is all nodes in one process.
         """
         ros = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
         log = self.folder / f"{name}_{next(self._numbers)}.log"
         extra = ("--ros-args", *ros) if ros else ()
-        module = name if name == "single_process" else f"{name}_node"
-        process = Process(module, (*arguments, *extra), log, self.domain)
+        process = Process(name, (*arguments, *extra), log, self.domain)
         self.processes.append(process)
         return process
 
@@ -160,7 +160,7 @@ class Graph:
 
     def collect(self, kind: Any, topic: str, profile: Any = None) -> list[Any]:
         """Return a list that every message on ``topic`` is added to, from now on."""
-        from cardbox_tracker.ros import qos
+        from cardbox_tracker.ros.runtime import qos
 
         messages: list[Any] = []
         self.node.create_subscription(kind, topic, messages.append, profile or qos.RESULT)

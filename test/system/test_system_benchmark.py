@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.evaluation import benchmark_nodes
+from cardbox_tracker.benchmarks import nodes as benchmark_nodes
 
 
 def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from cardbox_tracker.ros import qos  # noqa: E402
 def called(graph: Any, service: str) -> subprocess.CompletedProcess[str]:
     """Run ``cardbox call`` while the graph's node serves; return what it printed."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "cardbox_tracker.cli", "call", service],
+        [sys.executable, "-m", "cardbox_tracker.commands.main", "call", service],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -14,7 +14,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
 
 CALIBRATION = """\
 image_width: 64
@@ -100,7 +100,7 @@ def test_devices_are_listed_without_a_graph(graph: Any) -> None:
 
 
 def test_an_unknown_option_is_told_without_a_traceback(graph: Any) -> None:
-    for name, wrong in (("camera", "--lst"), ("play_bag", "--rate=fast"), ("single_process", "x")):
+    for name, wrong in (("camera", "--lst"), ("play_bag", "--rate=fast"), ("cardbox_nodes", "x")):
         process = graph.start(name, wrong)
         graph.wait(lambda process=process: process.process.poll() is not None, "the end")
         graph.processes.remove(process)

@@ -21,7 +21,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 
 LEARN_IMAGES = 10
 LATERAL_M = {"left": -0.35, "right": 0.3}
@@ -56,7 +56,7 @@ class Eye:
             parameters = Path(self.graph.folder) / "nodes.yaml"
             sections = {f"/**/{node}": {"ros__parameters": own} for node, own in given.items()}
             parameters.write_text(yaml.safe_dump(sections))
-            self.graph.start("single_process", *space, "--params-file", str(parameters))
+            self.graph.start("cardbox_nodes", *space, "--params-file", str(parameters))
         else:
             self.graph.start("background", *space, learn_images=LEARN_IMAGES)
             self.graph.start("initializer", *space, model_file=self.model_file)
@@ -127,5 +127,5 @@ def test_diagnostics_tell_the_nodes_apart(eyes: list[Eye]) -> None:
 
 def test_the_single_process_ends_on_a_signal(eyes: list[Eye]) -> None:
     process = eyes[0].graph.processes[-1]
-    assert process.log.name.startswith("single_process")
+    assert process.log.name.startswith("cardbox_nodes")
     assert process.stop() == 0, process.text()

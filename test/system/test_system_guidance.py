@@ -13,9 +13,9 @@ from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
+from cardbox_tracker.drawing.guidance import WANTED_BGR  # noqa: E402
 from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
-from cardbox_tracker.vision.guidance_drawing import WANTED_BGR  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 
 
 class Person:

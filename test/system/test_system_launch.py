@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.model_file import save_body_model
-from cardbox_tracker.ros.bag_writer import BagWriter
+from cardbox_tracker.recordings.bag_writer import BagWriter
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("launch_ros", reason="launch_ros is not installed (not on PyPI)")

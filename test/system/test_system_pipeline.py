@@ -29,7 +29,7 @@ from std_msgs.msg import Header, String  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 
 LEARN_IMAGES = 10
 

@@ -16,7 +16,7 @@ from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.ros import qos  # noqa: E402
-from cardbox_tracker.ros.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
 from cardbox_tracker.simulation.session import synthesize_session  # noqa: E402
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

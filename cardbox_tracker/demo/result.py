@@ -1,0 +1,36 @@
+"""What a run of the demo found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.evaluation.truth import GroundTruth
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """What the nodes published, and the truth.
+
+    Attributes:
+        body: the measured person.
+        truth: of the session.
+        start_ns: from this stamp on the person was measured and is tracked.
+        postures: (12,) by stamp.
+        keypoints_m: (6, 3) by stamp, metres in the optical frame.
+        silhouettes: (H, W) by stamp.
+        fps: joint states that arrived in a second.
+        answer: what the initializer answered.
+    """
+
+    body: BodyModel
+    truth: GroundTruth
+    start_ns: int
+    postures: dict[int, NDArray[np.float64]]
+    keypoints_m: dict[int, NDArray[np.float64]]
+    silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
+    fps: float
+    answer: str

@@ -1,0 +1,1 @@
+"""Images and shapes for people to look at: overlay, guidance, markers, video."""

@@ -1,0 +1,1 @@
+"""The hierarchical particle filter: resampling schemes, one filter, the hierarchy."""

@@ -1,0 +1,125 @@
+"""One particle filter over a few joints (paper, algorithm "Online Motion Tracking").
+
+A cycle is: resample, add noise, keep within the joint limits, rate. The initial particles are
+d_ref + N(0, sigma_beta^2 E).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.estimation.config import FilterConfig
+from cardbox_tracker.estimation.filtering.particle_kernels import (
+    propagate,
+    weighted_mean,
+    weighted_stddev,
+)
+from cardbox_tracker.estimation.filtering.resampling import Ancestors, Resampler
+
+FloatArray = NDArray[np.float64]
+CostFunction = Callable[[FloatArray], FloatArray]
+"""Particles (N, D) -> costs (N,), px."""
+
+SPREAD_PX = 60.0
+"""Particles this much costlier than the best weigh 1/e in the mean, px at 320x240."""
+
+
+class ParticleFilter:
+    """N particles over D joints; all its randomness comes from the generator it is given."""
+
+    def __init__(
+        self,
+        config: FilterConfig,
+        resampler: Resampler,
+        noise: FloatArray,
+        limits: FloatArray,
+        rng: np.random.Generator,
+    ) -> None:
+        """Set the filter up; :meth:`scatter` gives it particles.
+
+        Args:
+            config: numbers of Table I.
+            resampler: a strategy of :mod:`cardbox_tracker.estimation.filtering.resampling`.
+            noise: sigma_beta of each joint, (D,), rad and metres.
+            limits: lowest and highest value of each joint, (D, 2).
+            rng: the source of noise.
+        """
+        self.config = config
+        self.noise = noise
+        self._resampler = resampler
+        self._limits = limits
+        self._rng = rng
+        self.particles = np.zeros((config.particles, len(noise)))
+        self.costs = np.zeros(config.particles)
+
+    def scatter(self, posture: FloatArray, rate: CostFunction, noise_scale: float = 1.0) -> None:
+        """Start with particles around ``posture`` (D,), itself among them, and rate them."""
+        self.particles[:] = posture
+        self._rate(np.arange(len(self.particles)), noise_scale, rate)
+
+    def cycle(
+        self,
+        rate: CostFunction,
+        noise_scale: float = 1.0,
+        sigma_scale: float = 1.0,
+        explorers: int = 0,
+    ) -> None:
+        """Run one estimation cycle.
+
+        Args:
+            rate: costs of particles against the present silhouette.
+            noise_scale: factor on sigma_beta.
+            sigma_scale: factor on sigma_gamma, such as for a larger picture.
+            explorers: so many particles, the last ones, are drawn from anywhere within the limits.
+        """
+        ancestors = self._resampler(
+            self.costs,
+            self.config.survival_rate,
+            self.config.sigma_gamma_px * sigma_scale,
+            self._rng,
+            self.config.elite,
+        )
+        self._rate(ancestors, noise_scale, rate, explorers)
+
+    def _rate(
+        self, ancestors: Ancestors, noise_scale: float, rate: CostFunction, explorers: int = 0
+    ) -> None:
+        steps = self._rng.standard_normal(self.particles.shape)
+        if self.config.elite:
+            steps[0] = 0.0
+        propagate(steps, self.particles, ancestors, self.noise * noise_scale, self._limits)
+        if explorers > 0:
+            low, high = self._limits.T
+            steps[-explorers:] = low + (high - low) * self._rng.random((explorers, len(low)))
+        self.particles = steps
+        self.costs = rate(self.particles)
+
+    def best(self) -> FloatArray:
+        """Return the particle (D,) of lowest cost."""
+        best: FloatArray = self.particles[np.argmin(self.costs)]
+        return best
+
+    def mean(self, count: int, spread_scale: float = 1.0) -> FloatArray:
+        """Return the mean (D,) of the ``count`` best particles; with 1 it is the best one.
+
+        They are weighted by exp(-(W - W_best) / spread).
+        """
+        if count == 1:
+            return self.best()
+        mean: FloatArray = weighted_mean(
+            self.particles, self.costs, count, SPREAD_PX * spread_scale
+        )
+        return mean
+
+    def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
+        """Return the standard deviation (D,) of the particles around ``mean`` (D,).
+
+        They are weighted as for the mean: it says how far one could go without fitting worse.
+        """
+        stddev: FloatArray = weighted_stddev(
+            self.particles, self.costs, mean, SPREAD_PX * spread_scale
+        )
+        return stddev

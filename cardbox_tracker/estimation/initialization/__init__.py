@@ -1,0 +1,1 @@
+"""Measure a person from three reference silhouettes, and lead them through the postures."""

@@ -1,0 +1,267 @@
+"""Measure the 18 body sizes from three silhouettes (paper, "Offline Model Initialization").
+
+In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset are drawn around the
+best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy
+is reached. Beyond the paper:
+
+- sigma_alpha starts at the paper's 5 cm and shrinks whenever a round finds nothing better; the
+  accuracy is reached when it falls below ``accuracy_m``.
+- Nobody holds a reference posture to the degree, so its angles are estimated beside the sizes, with
+  a standard deviation of a few degrees around what was asked for; so is the place.
+- A weak prior keeps sizes that an outline hardly shows, such as where the chin ends, near the
+  proportions of a person of that stature.
+- The three steps are passed twice, since each starts from what the others found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import (
+    LEFT_ARM,
+    N_JOINTS,
+    RIGHT_ARM,
+    reference_posture,
+)
+from cardbox_tracker.body.sizes import (
+    DEFAULT_SIZES,
+    N_SIZES,
+    SIZE_LIMITS,
+    SIZE_NAMES,
+    SUBSETS,
+    FloatArray,
+)
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.initialization.references import (
+    Silhouette,
+    check_references,
+    lateral_m,
+)
+from cardbox_tracker.estimation.initialization.stature import (
+    CROWN_TO_HIP,
+    height_of_row_m,
+    stature_m,
+)
+from cardbox_tracker.vision.camera import Camera
+
+STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
+"""Subset and the reference that shows it, in the order of the paper."""
+
+_DEFAULT_STATURE_M = 1.72
+# Among people of one stature, lengths along the bones scatter by about 6 %, breadths and depths by
+# about 20 % (ANSUR II, 2012, rounded), and small offsets by 1.5 cm or more.
+_LENGTH_SCATTER, _BREADTH_SCATTER, _LEAST_SCATTER_M = 0.06, 0.20, 0.015
+_ALONG_BONES = np.array(
+    [name.endswith(("length", "height", "drop", "breadth")) for name in SIZE_NAMES]
+)
+# Which angles a person misses when asked for a reference posture, and by how much.
+_LOOSE_ANGLE_RAD = np.radians(5.0)
+
+
+@dataclass(frozen=True)
+class InitializationConfig:
+    """Settings of the initialization.
+
+    Attributes:
+        distance_m: level distance from the camera to the person; a silhouette cannot tell it.
+        camera_pitch_rad: how far the camera looks down.
+        side_turn: the way the person turned for ``side``, ``left`` or ``right``.
+        hypotheses: M.
+        max_rounds: rounds a step takes at most.
+        sigma_alpha_m: initial noise of the sizes.
+        accuracy_m: a step ends when its noise has shrunk below this.
+        prior: cost of a size one standard deviation off, as a fraction of the silhouette's pixels.
+        min_iou: a mean IoU of the three references below this is refused.
+        seed: of the generator of the hypotheses.
+    """
+
+    distance_m: float = 2.0
+    camera_pitch_rad: float = 0.0
+    side_turn: str = "left"
+    hypotheses: int = 500
+    max_rounds: int = 100
+    sigma_alpha_m: float = 0.05
+    accuracy_m: float = 0.002
+    prior: float = 0.003
+    min_iou: float = 0.6
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class InitializationResult:
+    """What the initialization found.
+
+    Attributes:
+        body: the measured person.
+        iou: fit of each reference, by name.
+        rounds: rounds that were needed, by subset, both passes together.
+        costs_px: cost and prior of the best hypothesis before the first and after each round, one
+            tuple a pass, by subset.
+    """
+
+    body: BodyModel
+    iou: dict[str, float]
+    rounds: dict[str, int]
+    costs_px: dict[str, list[tuple[float, ...]]]
+
+    @property
+    def mean_iou(self) -> float:
+        """Mean fit of the three references."""
+        return float(np.mean(list(self.iou.values())))
+
+
+def initialize_body(
+    references: Mapping[str, Silhouette],
+    camera: Camera,
+    config: InitializationConfig | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> InitializationResult:
+    """Measure a person.
+
+    Args:
+        references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
+        camera: working camera, of the silhouettes' size.
+        config: settings.
+        progress: called with the finished fraction.
+
+    Raises:
+        InitializationError: the references are unusable, or the model does not fit them.
+    """
+    config = config or InitializationConfig()
+    check_references(references)
+    camera = camera.with_pitch(config.camera_pitch_rad)
+    search = _Search(references, camera, config)
+    for number in range(2 * len(STEPS)):
+        search.step(*STEPS[number % len(STEPS)])
+        if progress is not None:
+            progress((number + 1) / (2 * len(STEPS)))
+    result = search.result()
+    if result.mean_iou < config.min_iou:
+        fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
+        raise InitializationError(
+            f"the model fits the references poorly (IoU {fits}; mean {result.mean_iou:.2f}, "
+            f"expected {config.min_iou:.2f} or more); check person_distance_m "
+            f"({config.distance_m:g} m), the camera's pitch "
+            f"({np.degrees(config.camera_pitch_rad):g} degrees), the side the person turned to "
+            f"({config.side_turn}), and look at the silhouettes"
+        )
+    return result
+
+
+class _Search:
+    """The state of one initialization: sizes, and posture of each reference."""
+
+    def __init__(
+        self, references: Mapping[str, Silhouette], camera: Camera, config: InitializationConfig
+    ) -> None:
+        self._config = config
+        self._references = references
+        self._rng = np.random.default_rng(config.seed)
+        stature = stature_m(references, camera, config.distance_m)
+        crown_row = np.nonzero(np.any(references["front"], axis=1))[0][0] - 0.5
+        crown_m = height_of_row_m(camera, crown_row, config.distance_m)
+        self._initial = np.clip(
+            DEFAULT_SIZES * stature / _DEFAULT_STATURE_M, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]
+        )
+        self._sizes = self._initial.copy()
+        self._scatter = np.maximum(
+            np.where(_ALONG_BONES, _LENGTH_SCATTER, _BREADTH_SCATTER) * self._initial,
+            _LEAST_SCATTER_M,
+        )
+        self._place = BodyModel(
+            self._sizes,
+            config.distance_m,
+            crown_m - CROWN_TO_HIP * stature,
+            lateral_m(references["front"], camera, config.distance_m),
+            config.camera_pitch_rad,
+            config.side_turn,
+        )
+        self._costs = {}
+        self._asked = {}
+        self._postures = {}
+        for name, silhouette in references.items():
+            self._costs[name] = CompiledCost(self._place, camera)
+            self._costs[name].observe(silhouette)
+            self._asked[name] = reference_posture(name, config.side_turn)
+            self._postures[name] = self._asked[name].copy()
+            self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
+        self._rounds = dict.fromkeys(SUBSETS, 0)
+        self._history: dict[str, list[tuple[float, ...]]] = {subset: [] for subset in SUBSETS}
+
+    def step(self, subset: str, name: str) -> None:
+        """Estimate one subset of the sizes, and the posture of the reference that shows it."""
+        config = self._config
+        size_mask = np.zeros(N_SIZES)
+        size_mask[SUBSETS[subset]] = 1.0
+        loose = _loose_joints(name)
+        posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
+        posture_noise[0] = 0.02
+        sizes, posture = self._sizes, self._postures[name]
+        best = float(self._rate(name, sizes[None], posture[None])[0])
+        scale = 1.0
+        history = [best]
+        for _ in range(config.max_rounds):
+            self._rounds[subset] += 1
+            noise = self._rng.standard_normal((config.hypotheses, N_SIZES + N_JOINTS)) * scale
+            hypotheses = np.clip(
+                sizes + noise[:, :N_SIZES] * size_mask * config.sigma_alpha_m,
+                SIZE_LIMITS[:, 0],
+                SIZE_LIMITS[:, 1],
+            )
+            postures = posture + noise[:, N_SIZES:] * posture_noise
+            # No joint limits here: whoever turns for the side reference moves the feet, too.
+            costs = self._rate(name, hypotheses, postures)
+            winner = int(np.argmin(costs))
+            if costs[winner] < best:
+                best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
+            else:
+                scale *= 0.7
+            history.append(best)
+            if scale * config.sigma_alpha_m < config.accuracy_m:
+                break
+        self._history[subset].append(tuple(history))
+        self._sizes, self._postures[name] = sizes, posture
+
+    def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
+        cost = self._costs[name]
+        weight_px = self._config.prior * cost.silhouette_px
+        size_steps = (sizes - self._initial) / self._scatter
+        angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
+        prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
+        rated: FloatArray = cost.bodies(sizes, postures) + weight_px * prior
+        return rated
+
+    def result(self) -> InitializationResult:
+        """Return the sizes rounded to a tenth of a millimetre, and the fit."""
+        place = self._place
+        body = replace(
+            place,
+            sizes=np.round(self._sizes, 4),
+            hip_height_m=round(float(place.hip_height_m), 4),
+            lateral_m=round(float(self._postures["front"][0]), 4),
+        )
+        iou = {}
+        for name, cost in self._costs.items():
+            fitted = CompiledCost(body, cost.camera)
+            fitted.observe(self._references[name])
+            iou[name] = fitted.overlap(self._postures[name])[1]
+        return InitializationResult(body, iou, self._rounds, self._history)
+
+
+def _loose_joints(name: str) -> FloatArray:
+    """1 for each joint (12,) that the reference shows and a person misses, else 0."""
+    loose = np.zeros(N_JOINTS)
+    if name == "side":
+        loose[2] = 1.0  # leaning
+        for arm in (LEFT_ARM, RIGHT_ARM):
+            loose[arm] = (0.0, 1.0, 0.0, 1.0)
+    else:
+        loose[1] = 1.0
+        for arm in (LEFT_ARM, RIGHT_ARM):
+            loose[arm] = (1.0, 0.0, 1.0, 0.0)
+    return loose

@@ -1,0 +1,128 @@
+"""The three reference silhouettes: what makes them usable, and what they say of the place.
+
+The size estimation itself is in :mod:`cardbox_tracker.estimation.initialization.measure`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.posture import REFERENCE_NAMES
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.vision.camera import Camera
+
+Silhouette = NDArray[np.uint8]
+
+MIN_PERSON_FRACTION = 0.02
+"""Somebody close enough to be measured covers at least this fraction of the picture."""
+
+MAX_LIKENESS = 0.80
+"""Two different reference postures overlap less than this, as IoU when laid over each other."""
+
+_POSTURE_TEXT = {
+    "front": "face the camera, arms 20 degrees away from the body",
+    "side": "turn by 90 degrees, arms as before",
+    "arms": "face the camera, both arms stretched sideways",
+}
+
+
+def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
+    """Return the majority (H, W) of the pictures of one held posture.
+
+    Raises:
+        InitializationError: there are none.
+    """
+    if not silhouettes:
+        raise InitializationError(
+            "no silhouette was captured; check the times, or that the background node runs"
+        )
+    votes = np.sum([silhouette > 0 for silhouette in silhouettes], axis=0)
+    return np.where(2 * votes > len(silhouettes), 255, 0).astype(np.uint8)
+
+
+def check_reference(name: str, silhouette: Silhouette) -> None:
+    """Refuse a silhouette (H, W) that cannot show the reference posture ``name``.
+
+    Raises:
+        InitializationError: nobody is in the picture, or the person is cut off at its border.
+    """
+    if name not in REFERENCE_NAMES:
+        raise ValueError(f"reference {name!r} is unknown; it is one of {REFERENCE_NAMES}")
+    share = np.count_nonzero(silhouette) / silhouette.size
+    if share < MIN_PERSON_FRACTION:
+        raise InitializationError(
+            f"reference '{name}': nobody is in the picture ({100 * share:.1f} % foreground, "
+            f"expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of the camera "
+            f"and {_POSTURE_TEXT[name]}"
+        )
+    if share > 0.6:
+        raise InitializationError(
+            f"reference '{name}': {100 * share:.0f} % of the picture are foreground, more than a "
+            "person can be; the background was learned in another light or with somebody in it: "
+            "leave the picture and learn it again (background/learn)"
+        )
+    for border, pixels in (
+        ("left", silhouette[:, 0]),
+        ("right", silhouette[:, -1]),
+        ("upper", silhouette[0]),
+    ):
+        if np.any(pixels):
+            raise InitializationError(
+                f"reference '{name}': the person is cut off at the {border} border of the "
+                f"picture; step back or to the middle, and {_POSTURE_TEXT[name]}"
+            )
+
+
+def check_references(references: Mapping[str, Silhouette]) -> None:
+    """Refuse silhouettes that are missing, differ in size, or show the same posture twice.
+
+    Raises:
+        InitializationError: the text says which and what to do.
+    """
+    missing = [name for name in REFERENCE_NAMES if name not in references]
+    if missing:
+        raise InitializationError(f"missing references: {', '.join(missing)}; capture them first")
+    sizes = {references[name].shape for name in REFERENCE_NAMES}
+    if len(sizes) > 1:
+        raise InitializationError(
+            f"the references have different sizes {sorted(sizes)}; capture all with one camera"
+        )
+    for name in REFERENCE_NAMES:
+        check_reference(name, references[name])
+    for name in ("side", "arms"):
+        likeness = aligned_iou(references["front"], references[name])
+        if likeness > MAX_LIKENESS:
+            action = "the person did not turn" if name == "side" else "the arms were not raised"
+            raise InitializationError(
+                f"references 'front' and '{name}' are too alike (IoU {likeness:.2f}, expected "
+                f"below {MAX_LIKENESS:.2f}): {action}; capture '{name}' again: "
+                f"{_POSTURE_TEXT[name]}"
+            )
+
+
+def aligned_iou(first: Silhouette, second: Silhouette) -> float:
+    """Return the IoU of two silhouettes after moving the second sideways over the first."""
+    shift = round(_middle_column(first) - _middle_column(second))
+    moved = np.zeros_like(second)
+    width = second.shape[1]
+    moved[:, max(0, shift) : width + min(0, shift)] = second[
+        :, max(0, -shift) : width - max(0, shift)
+    ]
+    union = np.count_nonzero(first | moved)
+    return np.count_nonzero(first & moved) / union if union else 0.0
+
+
+def _middle_column(silhouette: Silhouette) -> float:
+    return float(np.mean(np.nonzero(silhouette)[1]))
+
+
+def lateral_m(silhouette: Silhouette, camera: Camera, distance_m: float) -> float:
+    """``torso_y`` under which the head and chest of a silhouette lie, metres."""
+    rows = np.nonzero(np.any(silhouette, axis=1))[0]
+    upper = silhouette[rows[0] : rows[0] + max(1, (rows[-1] - rows[0]) // 3)]
+    columns = np.count_nonzero(upper, axis=0).cumsum()
+    middle = float(np.searchsorted(columns, columns[-1] / 2))
+    return (middle - camera.cx) / camera.fx * distance_m

@@ -1,0 +1,1 @@
+"""The experiments of the paper: runs, results, claims, plots, report."""

@@ -1,1 +1,0 @@
-"""The ``cardbox`` commands that work on recordings, without a running graph."""

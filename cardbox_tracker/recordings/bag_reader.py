@@ -1,0 +1,242 @@
+"""Read rosbag2 recordings (mcap or sqlite3) without a ROS installation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.typesys import Stores, get_typestore
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.camera_info import calibration_from_info
+from cardbox_tracker.vision.encodings import decode_bgr, decode_compressed, decode_grey
+
+IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
+_REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
+_FILE_ENDINGS = (".mcap", ".db3", ".bag")
+
+
+class BagMessage(NamedTuple):
+    """One message: its topic, the time it was recorded, its type, and its CDR bytes."""
+
+    topic: str
+    time_ns: int
+    msgtype: str
+    raw: bytes
+
+
+@dataclass(frozen=True)
+class BagPicture:
+    """One picture of a recording, decoded when asked for.
+
+    Attributes:
+        stamp_ns: the stamp in its header.
+        frame_id: the frame in its header.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    _decode: Callable[[bool], NDArray[np.uint8]]
+
+    @property
+    def grey(self) -> NDArray[np.uint8]:
+        """Brightness (H, W) uint8."""
+        return self._decode(True)
+
+    @property
+    def color(self) -> NDArray[np.uint8]:
+        """Colours (H, W, 3) uint8, bgr."""
+        return self._decode(False)
+
+
+class BagReader:
+    """Context of an open recording.
+
+    Raises, in all its methods:
+        BagError: the recording cannot be read, or has not what was asked for.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Name the recording; it is opened on entry.
+
+        Args:
+            path: folder of a rosbag2 recording, or its .mcap or .db3 file.
+        """
+        self.path = Path(path)
+        self._reader: AnyReader | None = None
+
+    def __enter__(self) -> BagReader:
+        """Open the recording."""
+        path = self.path
+        if not path.exists():
+            raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
+        if path.is_dir() and not (path / "metadata.yaml").exists():
+            files = [f for f in sorted(path.iterdir()) if f.suffix in _FILE_ENDINGS]
+            if (path / "bag" / "metadata.yaml").exists():
+                path = path / "bag"
+            elif len(files) == 1:
+                path = files[0]
+            else:
+                raise BagError(
+                    f"{path} is no rosbag2 recording (it has no metadata.yaml); give the folder "
+                    "that 'ros2 bag record' or 'cardbox synthesize' made"
+                )
+        try:
+            store = get_typestore(Stores.ROS2_JAZZY)
+            self._reader = AnyReader([path], default_typestore=store)
+            self._reader.open()
+        except Exception as error:
+            # rosbags passes on whatever its parsers raise at damaged files.
+            self._reader = None
+            raise BagError(
+                f"cannot read the recording {self.path}: {_reason(error)}; give a rosbag2 "
+                f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
+            ) from None
+        if self._reader.message_count == 0:
+            self.__exit__(None, None, None)
+            raise BagError(f"the recording {self.path} has no messages; record it again")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the recording."""
+        if self._reader is not None:
+            with suppress(AnyReaderError):
+                self._reader.close()
+            self._reader = None
+
+    @property
+    def _open(self) -> AnyReader:
+        if self._reader is None:
+            raise BagError(f"the recording {self.path} is not open; use it in a 'with' statement")
+        return self._reader
+
+    @property
+    def start_ns(self) -> int:
+        """Time of the first message."""
+        return int(self._open.start_time)
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last message."""
+        # rosbags counts to one nanosecond after the last message.
+        return float(self._open.duration - 1) / 1e9
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Message type of each topic."""
+        return {c.topic: c.msgtype for c in self._open.connections}
+
+    def count(self, topics: Sequence[str] | None = None) -> int:
+        """Messages on ``topics``, or on all."""
+        return sum(
+            c.msgcount for c in self._open.connections if topics is None or c.topic in topics
+        )
+
+    def image_topic(self) -> str:
+        """Return the one topic of pictures."""
+        return self._only(IMAGE_TYPES, "picture")
+
+    def camera_info_topic(self) -> str:
+        """Return the camera_info topic that belongs to the pictures."""
+        found = [name for name, kind in self.topics.items() if kind == CAMERA_INFO_TYPE]
+        folder = self.image_topic().removesuffix("/compressed").rpartition("/")[0]
+        beside = [name for name in found if name.rpartition("/")[0] == folder]
+        return beside[0] if len(beside) == 1 else self._only((CAMERA_INFO_TYPE,), "CameraInfo")
+
+    def _only(self, types: tuple[str, ...], what: str) -> str:
+        found = sorted(name for name, kind in self.topics.items() if kind in types)
+        if len(found) != 1:
+            raise BagError(
+                f"{self.path} has {len(found)} {what} topics; expected one. It has {self._list()}"
+            )
+        return found[0]
+
+    def messages(self, topics: Sequence[str] | None = None) -> Iterator[BagMessage]:
+        """Yield the messages of ``topics``, or of all, in the order of their time.
+
+        Raises:
+            BagError: the recording lacks one of the topics, or turns out to be damaged.
+        """
+        missing = sorted(set(topics or ()) - set(self.topics))
+        if missing:
+            raise BagError(f"{self.path} has no topic {', '.join(missing)}; it has {self._list()}")
+        chosen = [c for c in self._open.connections if topics is None or c.topic in topics]
+        if not chosen:
+            return
+        try:
+            for connection, time_ns, raw in self._open.messages(chosen):
+                yield BagMessage(connection.topic, time_ns, connection.msgtype, bytes(raw))
+        except Exception as error:
+            # As on opening; a consumer's errors do not arise here.
+            raise self._damaged(error) from None
+
+    def deserialize(self, message: BagMessage) -> Any:
+        """Return the message as an object with the fields of its type."""
+        try:
+            return self._open.deserialize(message.raw, message.msgtype)
+        except AnyReaderError as error:
+            raise self._damaged(error) from None
+
+    def _damaged(self, error: Exception) -> BagError:
+        return BagError(
+            f"the recording {self.path} is damaged: {_reason(error)}; record it again, or {_REPAIR}"
+        )
+
+    def _list(self) -> str:
+        return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
+
+    def pictures(self, topic: str | None = None) -> Iterator[BagPicture]:
+        """Yield the pictures of ``topic``, or of the only picture topic, in order."""
+        for message in self.messages([topic or self.image_topic()]):
+            image = self.deserialize(message)
+            stamp = image.header.stamp
+            yield BagPicture(
+                stamp.sec * 10**9 + stamp.nanosec, image.header.frame_id, _decoder(image)
+            )
+
+    def calibration(self) -> Calibration:
+        """Return what the recording's first CameraInfo says.
+
+        Raises:
+            BagError: there is none.
+            CameraError: the camera was not calibrated; the text names both topics.
+        """
+        topic = self.camera_info_topic()
+        for message in self.messages([topic]):
+            return calibration_from_info(self.deserialize(message), self.image_topic(), topic)
+        raise BagError(f"{self.path} has no message on {topic}; record it with the pictures")
+
+
+def _reason(error: Exception) -> str:
+    return str(error) or type(error).__name__
+
+
+def _decoder(image: Any) -> Callable[[bool], NDArray[np.uint8]]:
+    def decode(grey: bool) -> NDArray[np.uint8]:
+        if not hasattr(image, "encoding"):
+            return decode_compressed(image.data, grey)
+        return (decode_grey if grey else decode_bgr)(
+            image.data,
+            image.height,
+            image.width,
+            image.step,
+            image.encoding,
+            bool(image.is_bigendian),
+        )
+
+    return decode

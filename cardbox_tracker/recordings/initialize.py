@@ -1,0 +1,42 @@
+"""``cardbox initialize``: measure a person from three spans of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from cardbox_tracker.estimation.initialization.measure import (
+    InitializationConfig,
+    InitializationResult,
+    initialize_body,
+)
+from cardbox_tracker.estimation.initialization.references import average_silhouette
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+
+
+def initialize_from_recording(
+    source: SilhouetteSource,
+    spans: Mapping[str, TimeSpan],
+    config: InitializationConfig,
+    progress: Callable[[float], None] | None = None,
+) -> InitializationResult:
+    """Measure the person who holds the reference postures in ``spans`` (by reference name).
+
+    Raises:
+        CardboxError: a span has no picture.
+        InitializationError: the references are unusable, or the model does not fit them.
+    """
+    references = {
+        name: average_silhouette(source.silhouettes(span, name)) for name, span in spans.items()
+    }
+    return initialize_body(references, source.camera, config, progress)
+
+
+def describe(result: InitializationResult) -> str:
+    """Return the sizes and the fit, as text for a person."""
+    body = result.body
+    fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
+    return (
+        f"{body}\n"
+        f"mid-hip {100 * body.hip_height_m:+.1f} cm above the camera, at {body.distance_m:g} m\n"
+        f"fit (IoU): {fits}, mean {result.mean_iou:.3f}"
+    )

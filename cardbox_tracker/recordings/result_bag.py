@@ -1,0 +1,80 @@
+"""The bag that ``cardbox track --bag`` writes: what the tracker node would have published."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import dumps_body_model
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.drawing.markers import marker_shapes
+from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.recordings.bag_markers import write_markers
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.silhouettes import Frame
+
+_LATCHED = ("/body_model", "/robot_description")
+
+
+class ResultBag:
+    """Context that collects estimates in a bag; without a path it does nothing."""
+
+    def __init__(self, path: Path | None, body: BodyModel, frame_id: str) -> None:
+        """Set up; the file is opened on entry and appears, whole, on exit."""
+        self._writer = None if path is None else BagWriter(path, compress=True, latched=_LATCHED)
+        self._body = body
+        self._frame_id = frame_id
+        self._is_first = True
+        self._is_shown = False
+
+    def __enter__(self) -> ResultBag:
+        """Open the bag."""
+        if self._writer is not None:
+            self._writer.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the bag; after an error nothing is left of it."""
+        if self._writer is not None:
+            self._writer.__exit__(kind, error, trace)
+
+    def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+        """Write what is known of one picture."""
+        if self._writer is None:
+            return
+        self._write(self._writer, frame, estimate, tracker)
+
+    def _write(self, bag: BagWriter, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+        stamp, optical = frame.stamp_ns, self._frame_id
+        body, camera = self._body, tracker.camera
+        if self._is_first:
+            bag.write_string("/body_model", stamp, dumps_body_model(body))
+            bag.write_string("/robot_description", stamp, urdf_from_body(body, optical or None))
+        self._is_first = False
+        bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
+        bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
+        overlay = draw_overlay(frame.brightness, body, camera, estimate)
+        bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
+        if estimate.posture is None or estimate.keypoints_m is None:
+            if self._is_shown:
+                write_markers(bag, "/markers", stamp, optical, None)
+            self._is_shown = False
+            return
+        # The header is that of the picture, as the node has it.
+        bag.write_joint_state("/joint_states", stamp, optical, JOINT_NAMES, estimate.posture)
+        if estimate.posture_stddev is not None:
+            bag.write_joint_state(
+                "/joint_states_stddev", stamp, optical, JOINT_NAMES, estimate.posture_stddev
+            )
+        bag.write_pose_array("/keypoints", stamp, optical, estimate.keypoints_m)
+        shapes = marker_shapes(body, camera, estimate.posture)
+        write_markers(bag, "/markers", stamp, optical, shapes)
+        self._is_shown = True

@@ -1,0 +1,139 @@
+"""Silhouettes of a recording: its pictures, cut out before its own empty scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.vision.background import (
+    BackgroundConfig,
+    BackgroundLearner,
+    SilhouetteExtractor,
+)
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.resize import to_working_size
+
+WORKING_SIZE = (320, 240)
+
+
+class TimeSpan(NamedTuple):
+    """Seconds from the bag's start; the end belongs to it."""
+
+    start_s: float
+    end_s: float
+
+    @classmethod
+    def parse(cls, text: str) -> TimeSpan:
+        """Read ``T0:T1``.
+
+        Raises:
+            ValueError: the text is no such span.
+        """
+        start, colon, end = text.partition(":")
+        try:
+            span = cls(float(start), float(end))
+        except ValueError:
+            colon = ""
+        if not colon or not 0 <= span.start_s < span.end_s:
+            raise ValueError(f"{text!r} is no span; expected T0:T1 in seconds, such as 0:4")
+        return span
+
+    def contains(self, time_s: float) -> bool:
+        """Return whether ``time_s`` lies in the span."""
+        return self.start_s <= time_s <= self.end_s
+
+    def __str__(self) -> str:
+        """Return it as it is written."""
+        return f"{self.start_s:g}:{self.end_s:g}"
+
+
+class Frame(NamedTuple):
+    """One picture of a recording and the silhouette in it.
+
+    Attributes:
+        stamp_ns: the image's stamp.
+        time_s: seconds from the bag's start.
+        brightness: (H, W) uint8, undistorted, at the working resolution.
+        silhouette: (H, W) uint8, 0 or 255.
+    """
+
+    stamp_ns: int
+    time_s: float
+    brightness: NDArray[np.uint8]
+    silhouette: NDArray[np.uint8]
+
+
+class SilhouetteSource:
+    """The pictures of one bag at the working resolution, after learning its background."""
+
+    def __init__(
+        self,
+        bag: BagReader,
+        background: TimeSpan,
+        config: BackgroundConfig | None = None,
+        size: tuple[int, int] = WORKING_SIZE,
+    ) -> None:
+        """Learn the empty scene from the pictures of the span ``background``.
+
+        Args:
+            bag: an open recording.
+            background: when nobody is in the picture.
+            config: settings of the background model.
+            size: working resolution (width, height), px.
+
+        Raises:
+            BagError: the span has too few pictures.
+            CameraError: the recording's camera is not calibrated.
+        """
+        self._bag = bag
+        self._size = size
+        calibration = bag.calibration()
+        self.frame_id = calibration.frame_id
+        self.camera: Camera = calibration.camera(*size)
+        self._rectifier = calibration.rectifier(*size)
+        learner = BackgroundLearner(config)
+        for _, time_s, brightness in self._pictures():
+            if time_s > background.end_s:
+                break
+            if background.contains(time_s):
+                learner.add(brightness)
+        if learner.count < 2:
+            raise BagError(
+                f"{learner.count} pictures lie in the background span {background} s of a bag of "
+                f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
+            )
+        self._extractor = SilhouetteExtractor(learner.model(), config)
+
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
+        """Yield every picture from ``start_s`` to ``end_s``, in order, none left out."""
+        for stamp_ns, time_s, brightness in self._pictures():
+            if time_s > end_s:
+                break
+            if time_s >= start_s:
+                yield Frame(stamp_ns, time_s, brightness, self._extractor(brightness))
+
+    def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:
+        """Return the silhouettes of a span.
+
+        Raises:
+            CardboxError: no picture lies in it; the text says what it was meant for.
+        """
+        found = [frame.silhouette for frame in self.frames(*span)]
+        if not found:
+            raise CardboxError(
+                f"no picture lies in the {what} span {span} s of a bag of "
+                f"{self._bag.duration_s:.1f} s; give seconds from the bag's start"
+            )
+        return found
+
+    def _pictures(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
+        for picture in self._bag.pictures():
+            brightness = to_working_size(picture.grey, *self._size)
+            if self._rectifier is not None:
+                brightness = self._rectifier(brightness)
+            yield picture.stamp_ns, (picture.stamp_ns - self._bag.start_ns) / 1e9, brightness

@@ -1,0 +1,124 @@
+"""``cardbox track``: follow the posture through a recording; no picture is dropped."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.drawing.video import video_file
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.tracker import TRACKING, Estimate, Tracker
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
+
+CSV_HEADER = (
+    "stamp",
+    "state",
+    *JOINT_NAMES,
+    *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
+    "cost",
+    "iou",
+)
+
+_VIDEO_SCALE = 2
+
+
+@dataclass(frozen=True)
+class TrackSummary:
+    """What a run did: pictures seen and tracked, and means over the tracked ones."""
+
+    frames: int
+    frames_tracked: int
+    mean_cost_px: float
+    mean_iou: float
+
+
+def track_recording(
+    source: SilhouetteSource,
+    body: BodyModel,
+    config: TrackerConfig,
+    seed: int,
+    start_s: float,
+    csv_path: Path,
+    video_path: Path | None = None,
+    fps: float = 15.0,
+    observers: tuple[Callable[[Frame, Estimate, Tracker], None], ...] = (),
+) -> TrackSummary:
+    """Track every picture from ``start_s`` on and write one CSV row for each.
+
+    Args:
+        source: the recording.
+        body: the measured person.
+        config: settings of the tracker.
+        seed: the same recording and seed give the same bytes.
+        start_s: when the person stands in the front reference posture, from the bag's start.
+        csv_path: written atomically.
+        video_path: where to write the overlay, if at all.
+        fps: frames a second of the video.
+        observers: called after each picture, such as a progress bar or a bag writer.
+
+    Raises:
+        CardboxError: no picture lies after ``start_s``, or a file cannot be written.
+    """
+    tracker = Tracker(body, source.camera, config, np.random.default_rng(seed))
+    costs: list[int] = []
+    ious: list[float] = []
+    frames = 0
+    with ExitStack() as stack:
+        table = stack.enter_context(
+            stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
+        )
+        rows = csv.writer(table, lineterminator="\n")
+        rows.writerow(CSV_HEADER)
+        draw = None
+        if video_path is not None:
+            size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
+            draw = stack.enter_context(video_file(video_path, size, fps))
+        for frame, estimate in _estimates(source, tracker, start_s):
+            frames += 1
+            rows.writerow(csv_row(frame.stamp_ns, estimate))
+            if estimate.cost_px is not None and estimate.iou is not None:
+                costs.append(estimate.cost_px)
+                ious.append(estimate.iou)
+            if draw is not None:
+                draw(draw_overlay(frame.brightness, body, tracker.camera, estimate, _VIDEO_SCALE))
+            for observe in observers:
+                observe(frame, estimate, tracker)
+        if frames == 0:
+            raise CardboxError(
+                f"no picture lies after --start {start_s:g} s; give seconds from the bag's start"
+            )
+    mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
+    return TrackSummary(frames, len(costs), *mean)
+
+
+def _estimates(
+    source: SilhouetteSource, tracker: Tracker, start_s: float
+) -> Iterator[tuple[Frame, Estimate]]:
+    for frame in source.frames(start_s):
+        yield frame, tracker.track(frame.silhouette)
+
+
+def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
+    """Return the row of one picture; what is not known is left empty."""
+    stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+    if estimate.state != TRACKING or estimate.posture is None or estimate.keypoints_m is None:
+        return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]
+    return [
+        stamp,
+        estimate.state,
+        *(f"{value:.6f}" for value in estimate.posture),
+        *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
+        str(estimate.cost_px),
+        f"{estimate.iou:.4f}",
+    ]

@@ -1,0 +1,162 @@
+"""The node ``camera``: a V4L2 device or a video file, through OpenCV, as Image and CameraInfo."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import threading
+import time
+from typing import Any
+
+import cv2
+import numpy as np
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.input_parameters import CameraParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.vision.camera import Calibration, load_calibration
+from cardbox_tracker.vision.camera_device import (
+    describe_devices,
+    lock_exposure,
+    open_device,
+    open_video,
+)
+
+_RETRY_S = 1.0
+
+
+class CameraNode(CardboxNode):
+    """Reads pictures in a thread of its own and publishes each with its calibration."""
+
+    def __init__(self, **options: Any) -> None:
+        """Open the device or file and start reading.
+
+        Raises:
+            CameraError: it cannot be opened, or the calibration cannot be read.
+        """
+        super().__init__("camera", **options)
+        self.parameters = LiveParameters(self, CameraParameters)
+        settings = self.parameters.value
+        self._images = self.advertise(Image, "image_raw", qos.CAMERA)
+        self._infos = self.advertise(CameraInfo, "camera_info", qos.CAMERA)
+        self._capture = open_video(settings.file) if settings.file else self._open_device()
+        self._period_s = self._period(settings.rate_hz)
+        self._calibration = (
+            load_calibration(settings.calibration_file) if settings.calibration_file else None
+        )
+        self._locked = bool(settings.file) or not settings.lock_exposure
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
+        self._thread.start()
+
+    def _open_device(self) -> cv2.VideoCapture:
+        settings = self.parameters.value
+        capture = open_device(settings.device)
+        capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width)
+        capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height)
+        if settings.rate_hz > 0:
+            capture.set(cv2.CAP_PROP_FPS, settings.rate_hz)
+        return capture
+
+    def _period(self, rate_hz: float) -> float:
+        if rate_hz <= 0:
+            rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
+        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / 15.0
+
+    def _read(self) -> None:
+        """Read, publish, keep the rate; a file that ends stops or starts over."""
+        started_s = due_s = time.monotonic()
+        while not self._stop.is_set():
+            settings = self.parameters.value
+            ok, picture = self._capture.read()
+            if not ok:
+                if not settings.file:
+                    self.diagnostics.problem(
+                        f"{settings.device} delivers no picture; is it plugged in, and used by no "
+                        "other program? ('fuser -v' tells)"
+                    )
+                    self._stop.wait(_RETRY_S)
+                elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
+                    continue
+                else:
+                    self.diagnostics.wait_for(f"nothing: the end of {settings.file} is reached")
+                    return
+                continue
+            if not self._locked and time.monotonic() - started_s >= settings.settle_s:
+                self._lock_exposure()
+            if settings.file:
+                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                self._stop.wait(max(due_s - time.monotonic(), 0.0))
+            try:
+                self._publish(np.asarray(picture, dtype=np.uint8), settings)
+            except Exception as error:
+                if not self._stop.is_set():
+                    self.diagnostics.problem(f"cannot publish the picture: {error!r}")
+
+    def _publish(self, picture: conversions.Picture, settings: CameraParameters) -> None:
+        header = Header(frame_id=settings.frame_id, stamp=self.get_clock().now().to_msg())
+        if settings.encoding == "mono8" and picture.ndim == 3:
+            picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        elif settings.encoding == "bgr8" and picture.ndim == 2:
+            picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+        height, width = picture.shape[:2]
+        calibration = self._calibration or assumed_calibration(
+            width, height, settings.horizontal_fov_deg
+        )
+        self._infos.publish(conversions.calibration_message(header, calibration))
+        self._images.publish(conversions.image_message(header, picture, settings.encoding))
+        self.diagnostics.input.add(conversions.stamp_ns(header.stamp))
+        self.diagnostics.working()
+
+    def _lock_exposure(self) -> None:
+        """Switch to manual where possible: a scene whose brightness drifts is no background."""
+        self._locked = True
+        for what, done in lock_exposure(self._capture).items():
+            if done:
+                self.get_logger().info(f"{what} is manual now")
+            else:
+                self.diagnostics.warn(
+                    f"the device does not let its {what} be set to manual; if the background "
+                    "drifts, look for a control in 'v4l2-ctl --list-ctrls'"
+                )
+
+    def close(self) -> None:
+        """Stop reading and release the device."""
+        self._stop.set()
+        self._thread.join(timeout=2.0)
+        self._capture.release()
+
+
+def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> Calibration:
+    """Return an ideal lens of that field of view; an uncalibrated camera (K zero) if it is 0."""
+    k = np.zeros((3, 3))
+    if horizontal_fov_deg > 0:
+        focal_px = width / 2 / np.tan(np.radians(horizontal_fov_deg) / 2)
+        k = np.array(
+            [(focal_px, 0.0, (width - 1) / 2), (0.0, focal_px, (height - 1) / 2), (0.0, 0.0, 1.0)]
+        )
+    return Calibration(width, height, k, np.zeros(5))
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    command_line = list(sys.argv) if args is None else ["camera", *args]
+    parser = argparse.ArgumentParser(
+        prog="camera",
+        description="Publish a V4L2 device or a video file.",
+        epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
+    )
+    parser.add_argument("--list", action="store_true", help="say what each device offers, and end")
+    if parser.parse_args(remove_ros_args(command_line)[1:]).list:
+        print(describe_devices())
+        return 0
+    return run_node(CameraNode, command_line)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,189 @@
+"""The node ``initializer``: silhouettes of three reference postures in, a measured body out."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import dumps_body_model, load_body_model, save_body_model
+from cardbox_tracker.body.posture import REFERENCE_NAMES
+from cardbox_tracker.body.sizes import SIZE_NAMES
+from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.errors import CardboxError, InitializationError
+from cardbox_tracker.estimation.initialization.guidance import Guidance
+from cardbox_tracker.estimation.initialization.measure import InitializationResult, initialize_body
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.guide_overlay import GuideOverlay
+from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.vision.camera import Camera
+
+_NICENESS = 5
+
+
+class InitializerNode(CardboxNode):
+    """Captures reference silhouettes and measures the person in them."""
+
+    def __init__(self, **options: Any) -> None:
+        """Subscribe to silhouettes; publish the body of ``model_file`` if there is one."""
+        super().__init__("initializer", **options)
+        self.parameters = LiveParameters(self, InitializerParameters)
+        self._camera: Camera | None = None
+        self._frame_id = ""
+        self._body: BodyModel | None = None
+        self._busy = threading.Lock()
+        self._stop = threading.Event()
+
+        self._model = self.advertise(String, "body_model", qos.LATCHED)
+        self._description = self.advertise(String, "robot_description", qos.LATCHED)
+        self._status = self.advertise(String, "~/status", qos.LATCHED)
+        self._guide = GuideOverlay(self)
+        self._topic = self.resolve("silhouette")
+        self._references = ReferenceCapture(self._topic)
+        self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
+        self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
+        for name in REFERENCE_NAMES:
+            self.offer(f"~/capture_{name}", partial(self._capture, name))
+        # Its answer comes when the work is done; meanwhile another call is refused, not queued.
+        self.create_service(
+            Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
+        )
+        self.diagnostics.extra = self._values
+        self.diagnostics.wait_for(
+            f"silhouettes on {self._topic} (is the background node running, and has it learned?)"
+        )
+        path = self._path()
+        if path is not None and path.exists():
+            self._publish(load_body_model(path))
+            self.get_logger().info(f"body model read from {path}")
+
+    def _path(self) -> Path | None:
+        name = self.parameters.value.model_file
+        return Path(name).expanduser() if name else None
+
+    def _on_info(self, message: CameraInfo, _: int) -> None:
+        self._camera = conversions.camera_of(message)
+
+    def _on_silhouette(self, message: Image, sent_ns: int) -> None:
+        self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        self._references.add(message)
+        self._guide.show(message, self._camera, self.parameters.value)
+        self.diagnostics.working(sent_ns)
+        if message.header.frame_id != self._frame_id:
+            self._frame_id = message.header.frame_id
+            if self._body is not None:
+                self._describe(self._body)
+
+    def _say(self, text: str) -> None:
+        self._guide.status = text
+        self._status.publish(String(data=text))
+
+    def _capture(self, name: str) -> str:
+        return self._references.capture(name, self.parameters.value.capture_frames)
+
+    async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Measure in another thread, so that silhouettes and captures go on meanwhile."""
+        if not self._busy.acquire(blocking=False):
+            response.message = "an initialization is already running; wait for its answer"
+            return response
+        done: Future = Future()
+
+        def work() -> None:
+            done.set_result(self.outcome("initialize", self._measure))
+            if self.executor is not None:
+                self.executor.wake()
+
+        try:
+            threading.Thread(target=work, name="initialize", daemon=True).start()
+            response.success, response.message = await done
+        finally:
+            self._busy.release()
+        self._say(response.message)
+        return response
+
+    def _measure(self) -> str:
+        settings, references = self.parameters.value, self._references
+        references.check_running()
+        before = dict(references.captured)
+        try:
+            Guidance(self._say, self._capture, self._wait).run(
+                references.missing, settings.side_turn, settings.count_down_s, settings.attempts
+            )
+            if self._camera is None:
+                raise InitializationError(
+                    f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
+                    "silhouettes from the background node, which publishes it"
+                )
+            result = initialize_body(
+                references.captured, self._camera, settings.config(), self._progress
+            )
+        except CardboxError:
+            references.captured = before  # captured on request: stays, to be replaced singly
+            raise
+        references.captured = {}
+        self._publish(result.body)
+        path = self._path()
+        if path is not None:
+            save_body_model(result.body, path)
+        return _answer(result) + (f"; saved to {path}" if path is not None else "")
+
+    def _wait(self, duration_s: float) -> None:
+        if self._stop.wait(duration_s):
+            raise InitializationError("the initializer was stopped")
+
+    def _progress(self, fraction: float) -> None:
+        self._say(f"measuring: {100 * fraction:.0f} %")
+
+    def _publish(self, body: BodyModel) -> None:
+        self._body = body
+        self._model.publish(String(data=dumps_body_model(body)))
+        self._describe(body)
+
+    def _describe(self, body: BodyModel) -> None:
+        frame_id = self._frame_id if self.parameters.value.optical_frame_in_urdf else None
+        self._description.publish(String(data=urdf_from_body(body, frame_id or None)))
+
+    def _values(self) -> dict[str, str]:
+        return {
+            "captured": ", ".join(self._references.captured) or "none",
+            "body model": "published" if self._body is not None else "none yet",
+            "initializing": str(self._busy.locked()),
+        }
+
+    def close(self) -> None:
+        """End a guidance that is still counting."""
+        self._stop.set()
+
+
+def _answer(result: InitializationResult) -> str:
+    fit = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
+    sizes = ", ".join(
+        f"{name} {100 * value:.1f}"
+        for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)
+    )
+    return f"measured; fit (IoU) {fit}, mean {result.mean_iou:.2f}; sizes in cm: {sizes}"
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    # Whoever tracks the same silhouette goes first.
+    os.nice(_NICENESS)
+    return run_node(InitializerNode, args)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,102 @@
+"""The parameters of the nodes that feed the others: ``camera`` and ``play_bag``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cardbox_tracker.ros.runtime.parameters import NodeParameters, parameter
+
+
+@dataclass(frozen=True)
+class CameraParameters(NodeParameters):
+    """Publish a V4L2 device or a video file."""
+
+    device: str = parameter(
+        "/dev/video0", "V4L2 device; not used when a file is given", read_only=True
+    )
+    file: str = parameter("", "video file to play instead of a device", read_only=True)
+    loop: bool = parameter(False, "play the file again and again")
+    width: int = parameter(
+        640, "width to ask the device for", unit="px", limits=(32, 8192), read_only=True
+    )
+    height: int = parameter(
+        480, "height to ask the device for", unit="px", limits=(32, 8192), read_only=True
+    )
+    rate_hz: float = parameter(
+        15.0,
+        "pictures a second; 0 takes the file's own rate",
+        unit="Hz",
+        limits=(0.0, 240.0),
+        read_only=True,
+    )
+    encoding: str = parameter(
+        "mono8",
+        "mono8 is all the tracker needs and a third of the bytes; bgr8 for colour",
+        choices=("mono8", "bgr8"),
+    )
+    frame_id: str = parameter("camera_optical_frame", "name of the camera's optical frame")
+    calibration_file: str = parameter("", "YAML file of camera_calibration", read_only=True)
+    horizontal_fov_deg: float = parameter(
+        0.0,
+        "without a calibration file: assume an ideal lens of this field of view; 0: publish the "
+        "camera as uncalibrated",
+        unit="deg",
+        limits=(0.0, 170.0),
+        read_only=True,
+    )
+    settle_s: float = parameter(
+        2.0,
+        "time for the automatic exposure before it is locked; the background must not change",
+        unit="s",
+        limits=(0.0, 60.0),
+        read_only=True,
+    )
+    lock_exposure: bool = parameter(
+        True, "switch exposure and white balance to manual where the device allows", read_only=True
+    )
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        if not self.device and not self.file:
+            raise ValueError("device and file are both empty; give one, such as /dev/video0")
+
+
+@dataclass(frozen=True)
+class PlayBagParameters(NodeParameters):
+    """Play a recording."""
+
+    bag: str = parameter("", "rosbag2 folder or .mcap file to play", read_only=True)
+    rate: float = parameter(1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0))
+    loop: bool = parameter(False, "play again and again; the stamps start over too")
+    topics: list[str] = parameter([], "topics to play; all if empty", read_only=True)
+    start_s: float = parameter(
+        0.0, "begin so long after the bag's start", unit="s", limits=(0.0, 1e6), read_only=True
+    )
+    duration_s: float = parameter(
+        0.0, "play so much of the bag; 0 is all", unit="s", limits=(0.0, 1e6), read_only=True
+    )
+    pause_at: list[float] = parameter(
+        [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
+    )
+    wait_for_subscribers: bool = parameter(
+        True, "begin when somebody subscribes to a played picture topic", read_only=True
+    )
+    wait_for_topics: list[str] = parameter(
+        [],
+        "begin when somebody publishes these topics, such as keypoints: at its very first start "
+        "the tracker compiles for half a minute",
+        read_only=True,
+    )
+    delay_s: float = parameter(
+        0.5,
+        "wait so long before the first message, and as long again whenever somebody subscribes "
+        "meanwhile, so that nobody misses the beginning",
+        unit="s",
+        limits=(0.0, 600.0),
+        read_only=True,
+    )
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        if not self.bag:
+            raise ValueError("no bag is given; run 'play_bag BAG' or set the parameter 'bag'")

@@ -1,0 +1,198 @@
+"""The node ``play_bag``: play a rosbag2 recording with its original stamps.
+
+    play_bag BAG [--rate 2] [--loop] [--topics /image_raw] [--pause-at 4.5 9] ...
+
+It pauses by itself at the times of ``--pause-at`` and on the service ``play_bag/pause``, and goes
+on with ``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
+``paused at 4.500 s`` or ``finished``. So a script can have the recording stand still at a reference
+posture, call ``initializer/capture_front``, and resume. The exit code is 0 at the end of the bag.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.publisher import Publisher
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import String
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.ros.messages.types import message_class
+from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
+from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, run
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+_PROGRESS_S = 5.0
+_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+# Recorded once, at the time of their making; a late subscriber needs them too.
+_LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
+
+
+class PlayBagNode(CardboxNode):
+    """Publishes the messages of a bag as they were recorded, byte for byte."""
+
+    def __init__(self, **options: Any) -> None:
+        """Open the bag and advertise its topics.
+
+        Raises:
+            CardboxError: no bag is given, or it cannot be read or lacks a topic.
+        """
+        super().__init__("play_bag", **options)
+        self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
+        settings = self.parameters.value
+        self._resources = ExitStack()
+        self._reader = self._resources.enter_context(BagReader(settings.bag))
+        self._position_s = settings.start_s
+        self._paused = False
+        self._anchor = (0.0, 0.0)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+        self._status = self.advertise(String, "~/status", qos.LATCHED)
+        self.offer("~/pause", self._pause)
+        self.offer("~/resume", self._resume)
+        unknown = [topic for topic in settings.topics if topic not in self._reader.topics]
+        if unknown:
+            raise BagError(
+                f"{settings.bag} has no topic {', '.join(unknown)}; it has "
+                f"{', '.join(sorted(self._reader.topics))}"
+            )
+        self._publishers_of = {
+            topic: self._advertise(topic, kind)
+            for topic, kind in self._reader.topics.items()
+            if not settings.topics or topic in settings.topics
+        }
+        self._watched = [
+            publisher
+            for topic, publisher in self._publishers_of.items()
+            if self._reader.topics[topic] in _PICTURES
+        ] or self._all()
+
+    def _advertise(self, topic: str, kind: str) -> Publisher:
+        latched = topic.endswith(_LATCHED_ENDINGS)
+        profile = qos.LATCHED if latched else qos.PLAYED
+        return self.advertise(message_class(topic, kind), topic, profile)
+
+    def play(self) -> None:
+        """Play the bag to its end, or forever with ``loop``."""
+        settings = self.parameters.value
+        if settings.wait_for_subscribers:
+            topics = ", ".join(publisher.topic_name for publisher in self._watched)
+            self._wait_for(f"a subscriber of {topics}", self._is_watched)
+        for topic in map(self.resolve, settings.wait_for_topics):
+            self._wait_for(f"a publisher of {topic}", partial(self.count_publishers, topic))
+        self._settle(settings.delay_s)
+        while True:
+            self._play_once()
+            if not self.parameters.value.loop:
+                break
+        for publisher in self._all():
+            publisher.wait_for_all_acked(Duration(seconds=5))
+        self._say("finished")
+        self.get_logger().info(f"end of {settings.bag}")
+
+    def _is_watched(self) -> bool:
+        return any(publisher.get_subscription_count() for publisher in self._watched)
+
+    def _wait_for(self, what: str, is_there: Callable[[], bool | int]) -> None:
+        self._say("waiting")
+        self.diagnostics.wait_for(what)
+        while not is_there():
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _play_once(self) -> None:
+        settings = self.parameters.value
+        end_s = settings.start_s + (settings.duration_s or float("inf"))
+        pauses = sorted(at_s for at_s in settings.pause_at if at_s >= settings.start_s)
+        progress_s = time.monotonic()
+        self._position_s = settings.start_s
+        self._set_anchor()
+        self._say("playing")
+        start_ns, length_s = self._reader.start_ns, self._reader.duration_s
+        for message in self._reader.messages(list(self._publishers_of)):
+            at_s = (message.time_ns - start_ns) / 1e9
+            if at_s < settings.start_s:
+                continue
+            if at_s > end_s:
+                break
+            while pauses and pauses[0] <= at_s:
+                self._position_s = pauses.pop(0)
+                self._pause()
+            self._wait_until_due(at_s)
+            self._publishers_of[message.topic].publish(message.raw)
+            self.diagnostics.working()
+            self._position_s = at_s
+            if time.monotonic() - progress_s >= _PROGRESS_S:
+                progress_s = time.monotonic()
+                self.get_logger().info(f"at {at_s:.1f} of {length_s:.1f} s")
+
+    def _wait_until_due(self, at_s: float) -> None:
+        """Serve calls until the message of that bag time is due and nothing is paused."""
+        while True:
+            since, from_s = self._anchor
+            left_s = since + (at_s - from_s) / self.parameters.value.rate - time.monotonic()
+            if left_s <= 0 and not self._paused:
+                return
+            self._executor.spin_once(timeout_sec=0.1 if self._paused else min(left_s, 0.1))
+
+    def _settle(self, delay_s: float) -> None:
+        """Serve calls until nobody has subscribed or left for ``delay_s``.
+
+        Whoever subscribes is found topic by topic; so their first picture has its CameraInfo.
+        """
+        subscribers: list[int] = []
+        since_s = time.monotonic()
+        while (left_s := since_s + delay_s - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=min(left_s, 0.1))
+            found = [publisher.get_subscription_count() for publisher in self._all()]
+            if found != subscribers:
+                subscribers, since_s = found, time.monotonic()
+
+    def _set_anchor(self) -> None:
+        """From now on, bag time runs from the present position."""
+        self._anchor = (time.monotonic(), self._position_s)
+
+    def _all(self) -> list[Publisher]:
+        return list(self._publishers_of.values())
+
+    def _say(self, text: str) -> None:
+        self._status.publish(String(data=text))
+
+    def _pause(self) -> str:
+        self._paused = True
+        text = f"paused at {self._position_s:.3f} s"
+        self._say(text)
+        self.get_logger().info(f"{text}; goes on with {self.resolve('~/resume')}")
+        return text
+
+    def _resume(self) -> str:
+        if not self._paused:
+            raise BagError(f"not paused; playing at {self._position_s:.3f} s")
+        self._paused = False
+        self._set_anchor()
+        self._say("playing")
+        return f"playing from {self._position_s:.3f} s"
+
+    def close(self) -> None:
+        """Close the bag."""
+        self._resources.close()
+
+
+def main(args: list[str] | None = None) -> int:
+    """Play a bag; the exit code is 0 at its end, 1 for a bag that cannot be played."""
+    command_line = list(sys.argv) if args is None else ["play_bag", *args]
+    overrides = overrides_from(remove_ros_args(command_line)[1:])
+    return run(partial(PlayBagNode, parameter_overrides=overrides), command_line, PlayBagNode.play)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,84 @@
+"""Keep the latest silhouettes, and make reference silhouettes of them on request."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+
+from sensor_msgs.msg import Image
+
+from cardbox_tracker.body.posture import REFERENCE_NAMES
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.references import (
+    Silhouette,
+    average_silhouette,
+    check_reference,
+)
+from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
+
+_KEPT = 30
+_ONE_POSTURE_NS = 1_000_000_000
+_OLD_S = 2.0
+
+
+class ReferenceCapture:
+    """The references captured so far, by name.
+
+    Attributes:
+        captured: reference silhouettes (H, W), 0 or 255.
+    """
+
+    def __init__(self, topic: str) -> None:
+        """``topic`` is where silhouettes come from, for the texts."""
+        self.captured: dict[str, Silhouette] = {}
+        self._topic = topic
+        self._recent: deque[Image] = deque(maxlen=_KEPT)
+        self._received_s = 0.0
+
+    def add(self, message: Image) -> None:
+        """Take note of the latest silhouette."""
+        self._recent.append(message)
+        self._received_s = time.monotonic()
+
+    @property
+    def missing(self) -> list[str]:
+        """Names of the references still to be captured."""
+        return [name for name in REFERENCE_NAMES if name not in self.captured]
+
+    def check_running(self) -> None:
+        """Raise InitializationError if no silhouette was received yet."""
+        if not self._recent:
+            raise InitializationError(
+                f"no silhouette was received yet on {self._topic}; start the background node, let "
+                "it learn the empty scene, then step in front of the camera"
+            )
+
+    def capture(self, name: str, frames: int) -> str:
+        """Keep the majority of the latest ``frames`` silhouettes as the reference ``name``.
+
+        Returns:
+            What was done and what is missing, for a person.
+
+        Raises:
+            InitializationError: there is no silhouette, nobody in it, or they are cut off.
+        """
+        self.check_running()
+        messages = list(self._recent)[-frames:]
+        latest = messages[-1]
+        now_ns = stamp_ns(latest.header.stamp)
+        silhouettes = [
+            silhouette_of(message)
+            for message in messages
+            if (message.width, message.height) == (latest.width, latest.height)
+            and 0 <= now_ns - stamp_ns(message.header.stamp) <= _ONE_POSTURE_NS
+        ]
+        silhouette = average_silhouette(silhouettes)
+        check_reference(name, silhouette)
+        self.captured[name] = silhouette
+        text = f"captured '{name}' from {len(silhouettes)} silhouettes"
+        age_s = time.monotonic() - self._received_s
+        if age_s > _OLD_S:
+            text += f"; the latest came {age_s:.0f} s ago, is the camera running?"
+        if self.missing:
+            return f"{text}; missing: {', '.join(self.missing)}"
+        return f"{text}; all three are there"

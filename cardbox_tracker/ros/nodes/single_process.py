@@ -1,0 +1,123 @@
+"""All nodes in one process, served by one executor: ``cardbox_nodes``.
+
+    cardbox_nodes [--with camera | --with play_bag] --ros-args --params-file NODES.yaml
+
+Nothing differs for other nodes: the same names, topics and services. Silhouettes are handed over
+inside the process, so that no other has to be woken; in exchange the nodes share one core.
+
+Parameters are given by node in a YAML file, as ``config/cardbox_nodes.yaml`` has them, or without a
+namespace as ``-p tracker:preset:=paper``; remappings by node as
+``-r background:image_raw:=/camera/image_raw``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from rclpy.executors import ExternalShutdownException
+from rclpy.utilities import remove_ros_args, try_shutdown
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+from cardbox_tracker.ros.nodes.camera_node import CameraNode
+from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
+from cardbox_tracker.ros.runtime.handover import Handover
+from cardbox_tracker.ros.runtime.node import CardboxNode, run
+from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+
+_STOP_S = 5.0
+SOURCES = ("camera", "play_bag")
+
+
+class AllNodes:
+    """The nodes of one camera, in the order of the data."""
+
+    def __init__(self, source: str | None) -> None:
+        """Create them, with the ``source`` of pictures if it is one of ``SOURCES``.
+
+        Raises:
+            CardboxError: one of them cannot start.
+        """
+        self.nodes: list[CardboxNode] = []
+        self._player: PlayBagNode | None = None
+        self._playing: threading.Thread | None = None
+        # The tracker is handed a silhouette before the initializer is.
+        kinds: list[Callable[..., CardboxNode]] = [BackgroundNode, TrackerNode, InitializerNode]
+        if source == "camera":
+            kinds.append(CameraNode)
+        try:
+            handover = Handover()
+            for kind in kinds:
+                self.nodes.append(kind(handover=handover))
+            if source == "play_bag":
+                self._player = PlayBagNode()
+        except Exception:
+            self.close()
+            raise
+
+    def work(self) -> None:
+        """Serve all nodes until they are told to stop."""
+        executor = StaticExecutor()
+        for node in self.nodes:
+            executor.add_node(node)
+        if self._player is not None:
+            # It keeps the time of the recording, whatever the others do.
+            self._playing = threading.Thread(target=partial(_play, self._player), daemon=True)
+            self._playing.start()
+        executor.spin()
+
+    def close(self) -> None:
+        """Release what the nodes hold, the source first."""
+        if self._playing is not None:
+            # It notices the end of ROS; a thread that still used it would abort the process.
+            try_shutdown()
+            self._playing.join(timeout=_STOP_S)
+        if self._player is not None:
+            self._player.close()
+        for node in reversed(self.nodes):
+            node.close()
+
+
+def _play(player: PlayBagNode) -> None:
+    try:
+        player.play()
+    except CardboxError as error:
+        player.diagnostics.problem(str(error))
+    except ExternalShutdownException:
+        pass
+    except Exception:
+        # As in every node: what fails because ROS ends is no error.
+        if player.context.ok():
+            raise
+
+
+def source_from(arguments: Sequence[str]) -> str | None:
+    """Return the source asked for on the command line (without ROS arguments)."""
+    parser = argparse.ArgumentParser(
+        prog="cardbox_nodes",
+        description="background, initializer and tracker in one process.",
+        epilog="Parameters of one node: --ros-args -p tracker:preset:=paper, or a YAML file with "
+        "--params-file; the bag of play_bag: -p play_bag:bag:=BAG.",
+    )
+    parser.add_argument(
+        "--with", dest="source", choices=SOURCES, help="also the source of the pictures"
+    )
+    source: str | None = parser.parse_args(arguments).source
+    return source
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the nodes; the exit code is 0 unless one could not start."""
+    command_line = list(sys.argv) if args is None else ["cardbox_nodes", *args]
+    source = source_from(remove_ros_args(command_line)[1:])
+    return run(partial(AllNodes, source), command_line, AllNodes.work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

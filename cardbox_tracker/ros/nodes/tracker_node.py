@@ -1,0 +1,169 @@
+"""The node ``tracker``: silhouettes and a body model in, joint states out."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import String
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import load_body_model, loads_body_model
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.precompile import compile_all
+from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.node_parameters import TrackerParameters
+from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.vision.camera import Camera
+
+_REASONS = {
+    NO_PERSON: "nobody is in the picture",
+    LOST: (
+        "the person was lost (the model does not fit the silhouette); call tracker/reset when they "
+        "stand in the front reference posture, or initialize again if it is another person"
+    ),
+}
+
+
+class TrackerNode(CardboxNode):
+    """Follows one measured person from silhouette to silhouette."""
+
+    def __init__(self, **options: Any) -> None:
+        """Subscribe to silhouettes and wait for a body model."""
+        super().__init__("tracker", **options)
+        self.parameters = LiveParameters(self, TrackerParameters, self._changed)
+        # Compiles what no cache has yet, so that no live picture waits for it.
+        self.get_logger().info("preparing (the very first start compiles for half a minute)")
+        compile_all()
+        self._body: BodyModel | None = None
+        self._camera: Camera | None = None
+        self._tracker: Tracker | None = None
+        self._state = ""
+        self._counts: dict[str, int] = {}
+        self._estimate: Estimate | None = None
+
+        self._outputs = TrackerOutputs(self, self.parameters.value.rep155_id)
+        self._model_topic = self.resolve("body_model")
+        self._silhouette_topic = self.resolve("silhouette")
+        self._info_topic = self.resolve("silhouette/camera_info")
+        self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
+        self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
+        self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
+        self.offer("~/reset", self._reset)
+        self.diagnostics.extra = self._values
+        if self.parameters.value.model_file:
+            self._use(load_body_model(self.parameters.value.model_file))
+        self._wait()
+
+    def _wait(self) -> None:
+        if self._body is None:
+            self.diagnostics.wait_for(
+                f"a body model on {self._model_topic} (call initializer/initialize, or give "
+                "model_file)"
+            )
+        elif self._camera is None:
+            self.diagnostics.wait_for(
+                f"silhouettes on {self._silhouette_topic} and their CameraInfo on "
+                f"{self._info_topic} (is the background node running, and has it learned?)"
+            )
+
+    def _changed(self, _: TrackerParameters) -> None:
+        self._build("parameters changed")
+
+    def _on_model(self, message: String, _: int) -> None:
+        body = loads_body_model(message.data, source=self._model_topic)
+        if body != self._body:
+            self._use(body)
+
+    def _use(self, body: BodyModel) -> None:
+        self._body = body
+        self._build("new body model")
+        self._wait()
+
+    def _on_info(self, message: CameraInfo, _: int) -> None:
+        camera = conversions.camera_of(message)
+        if camera != self._camera:
+            self._camera = camera
+            self._build("new camera")
+
+    def _build(self, reason: str) -> None:
+        """Set the tracker up for the body, the camera and the parameters of now."""
+        if self._body is None or self._camera is None:
+            return
+        settings = self.parameters.value
+        rng = np.random.default_rng(settings.seed)
+        self._tracker = Tracker(self._body, self._camera, settings.config(), rng)
+        self.get_logger().info(f"{reason}: tracking starts from the front reference posture")
+
+    def _reset(self) -> str:
+        if self._tracker is None:
+            missing = self._model_topic if self._body is None else self._info_topic
+            raise CameraError(
+                f"nothing to reset: the tracker has not started, it waits for {missing}"
+            )
+        self._tracker.reset()
+        self._state = ""
+        return "tracking starts again from the front reference posture"
+
+    def _on_silhouette(self, message: Image, sent_ns: int) -> None:
+        header = message.header
+        if not self.diagnostics.input.add(conversions.stamp_ns(header.stamp)) and self._tracker:
+            self.get_logger().warning("the stamps went back (a bag that loops?): tracking restarts")
+            self._tracker.reset()
+        if self._tracker is None or self._body is None or self._camera is None:
+            self._wait()
+            self._outputs.waiting(message, "no body model yet: call initializer/initialize")
+            return
+        silhouette = conversions.silhouette_of(message)
+        height, width = silhouette.shape
+        if (width, height) != (self._camera.width, self._camera.height):
+            raise CameraError(
+                f"the silhouette is {width}x{height} but {self._info_topic} describes "
+                f"{self._camera.width}x{self._camera.height}; expected the same size"
+            )
+        estimate = self._tracker.track(silhouette)
+        self._outputs.publish(header, estimate, silhouette, self._tracker)
+        self._note(estimate)
+        self.diagnostics.working(sent_ns)
+
+    def _note(self, estimate: Estimate) -> None:
+        self._estimate = estimate
+        self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
+        if estimate.state != self._state:
+            self._state = estimate.state
+            reason = _REASONS.get(estimate.state)
+            text = f"not tracking: {reason}" if reason else "tracking"
+            self.get_logger().info(text)
+        self.diagnostics.advice = self._advice
+
+    def _advice(self) -> list[str]:
+        reason = _REASONS.get(self._state)
+        return [f"no joint states: {reason}"] if reason else []
+
+    def _values(self) -> dict[str, str]:
+        values = {"state": self._state or "not started"}
+        values |= {f"pictures {state}": str(count) for state, count in self._counts.items()}
+        estimate = self._estimate
+        if estimate is not None and estimate.posture is not None:
+            values["cost (px)"] = f"{estimate.cost_px}"
+            values["iou"] = f"{estimate.iou:.3f}"
+            if estimate.posture_stddev is not None:
+                angles = estimate.posture_stddev[1:]
+                values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
+        return values
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    return run_node(TrackerNode, args)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""What all nodes run on: executor, parameters, QoS, diagnostics, processes."""

@@ -1,0 +1,85 @@
+"""``cardbox call``: call a service of the running nodes, where there is no ``ros2`` command.
+
+Packages of the Python index bring rclpy but not ROS's command line.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import try_shutdown
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.runtime import qos
+
+_FIND_S = 10.0
+_GONE_S = 5.0
+_STEP_S = 0.05
+_TYPE = "std_srvs/srv/Trigger"
+
+
+def call_service(service: str, say: Callable[[str], None]) -> str:
+    """Call the Trigger service ``service`` and return its answer.
+
+    Args:
+        service: its name, such as ``initializer/initialize``.
+        say: is given what the same node publishes on its topic ``status`` meanwhile.
+
+    Raises:
+        CardboxError: nobody offers the service, or it refused; the text says why.
+    """
+    rclpy.init(args=[])
+    try:
+        node = rclpy.create_node("cardbox_call", enable_rosout=False)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        client = node.create_client(Trigger, service)
+        end_s = time.monotonic() + _FIND_S
+        while not client.service_is_ready():
+            if time.monotonic() > end_s:
+                raise CardboxError(_not_found(node, service))
+            executor.spin_once(timeout_sec=_STEP_S)
+        status = f"{service.rpartition('/')[0]}/status".lstrip("/")
+        topic = f"/{status}" if service.startswith("/") else status
+        asked = False
+
+        def show(message: String) -> None:
+            # The latched line from before the call would tell of an earlier one.
+            if asked:
+                say(message.data)
+
+        node.create_subscription(String, topic, show, qos.LATCHED)
+        settled_s = time.monotonic() + 0.3
+        while time.monotonic() < settled_s:
+            executor.spin_once(timeout_sec=_STEP_S)
+        asked = True
+        future = client.call_async(Trigger.Request())
+        seen_s = time.monotonic()
+        while not future.done():
+            executor.spin_once(timeout_sec=_STEP_S)
+            if client.service_is_ready():
+                seen_s = time.monotonic()
+            elif time.monotonic() > seen_s + _GONE_S:
+                raise CardboxError(f"the node of {service} ended before it answered")
+        answer: Trigger.Response = future.result()
+    finally:
+        try_shutdown()
+    if not answer.success:
+        raise CardboxError(str(answer.message))
+    return str(answer.message)
+
+
+def _not_found(node: Node, service: str) -> str:
+    own = node.resolve_service_name(service)
+    known = node.get_service_names_and_types()
+    offered = sorted(name for name, types in known if _TYPE in types and name != own)
+    return (
+        f"nobody offers the service {service}; offered are: {', '.join(offered) or 'none at all'}. "
+        "Is the node running, with the same ROS_DOMAIN_ID?"
+    )

@@ -1,0 +1,178 @@
+"""What the nodes share: parameters, QoS, diagnostics, and callbacks that no message can kill."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import traceback
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+import rclpy
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import ROSInterruptException
+from rclpy.executors import ExternalShutdownException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.utilities import ok, try_shutdown
+from std_srvs.srv import Trigger
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
+from cardbox_tracker.ros.runtime.handover import HandingPublisher, Handover
+from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+
+Callback = Callable[[Any, int], None]
+"""Takes a message and when it left its sender, ns since the epoch."""
+
+
+class Closable(Protocol):
+    """A node or several that hold something to release."""
+
+    def close(self) -> None:
+        """Release it."""
+
+
+N = TypeVar("N", bound=Closable)
+
+
+class CardboxNode(Node):
+    """A node that says what it does, what it waits for, and what is wrong."""
+
+    def __init__(self, name: str, handover: Handover | None = None, **options: Any) -> None:
+        """Create the node.
+
+        Args:
+            name: of the node.
+            handover: shared by the nodes of one process, those that offer a topic first.
+            options: those of :class:`rclpy.node.Node`.
+        """
+        super().__init__(name, **options)
+        self._handover = handover
+        self.diagnostics = NodeDiagnostics(self)
+
+    def resolve(self, topic: str) -> str:
+        """Return the full name of ``topic`` after namespace and remapping."""
+        return self.resolve_topic_name(topic)
+
+    def advertise(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher:
+        """Create a publisher whose QoS can be overridden and whose mismatches are reported."""
+        return self.create_publisher(
+            kind,
+            topic,
+            qos.copy_of(profile),
+            event_callbacks=qos.publisher_events(self.resolve(topic), self.diagnostics.warn),
+            qos_overriding_options=qos.overridable(profile),
+        )
+
+    def hand_over(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher | HandingPublisher:
+        """As :meth:`advertise`, but nodes of this process are handed the messages themselves."""
+        publisher = self.advertise(kind, topic, profile)
+        return publisher if self._handover is None else self._handover.offer(publisher)
+
+    def subscribe(
+        self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
+    ) -> None:
+        """Take the messages of a topic, handed over where a node of this process offers it.
+
+        What ``callback`` raises is reported and the node goes on.
+        """
+
+        def guarded(message: Any, info: dict[str, Any]) -> None:
+            try:
+                callback(message, int(info["source_timestamp"]))
+            except CardboxError as error:
+                self.diagnostics.problem(str(error))
+            except Exception as error:
+                self._unexpected(f"a message on {self.resolve(topic)}", error)
+
+        if self._handover is not None and self._handover.take(self.resolve(topic), guarded):
+            return
+        self.create_subscription(
+            kind,
+            topic,
+            guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
+            qos.copy_of(profile),
+            event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
+            qos_overriding_options=qos.overridable(profile),
+            raw=raw,
+        )
+
+    def offer(
+        self, name: str, action: Callable[[], str], group: CallbackGroup | None = None
+    ) -> None:
+        """Offer a Trigger service that answers with the text of ``action`` or of its error."""
+
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = self.outcome(name, action)
+            return response
+
+        self.create_service(Trigger, name, answer, callback_group=group)
+
+    def outcome(self, name: str, action: Callable[[], str]) -> tuple[bool, str]:
+        """Run ``action``; return whether it succeeded, and its text or that of its error."""
+        try:
+            text = action()
+        except CardboxError as error:
+            self.get_logger().warning(f"{name}: {error}")
+            return False, str(error)
+        except Exception as error:
+            self._unexpected(f"service {name}", error)
+            return False, f"unexpected error, see the log of {self.get_name()}: {error!r}"
+        self.get_logger().info(f"{name}: {text}")
+        return True, text
+
+    def close(self) -> None:
+        """Release what the node holds besides its ROS entities."""
+
+    def _unexpected(self, where: str, error: Exception) -> None:
+        if not self.context.ok():
+            return  # a signal ended the node in the middle of it
+        self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
+        self.get_logger().debug(traceback.format_exc())
+
+
+def spin(node: CardboxNode) -> None:
+    """Serve the node until it is told to stop."""
+    executor = StaticExecutor()
+    executor.add_node(node)
+    executor.spin()
+
+
+def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
+    """Create a node and serve it until it is told to stop; return the process's exit code."""
+    return run(create, args, spin)
+
+
+def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
+    """Create what works until it is told to stop; return the process's exit code."""
+    try:
+        rclpy.init(args=args)
+    except Exception as error:
+        print(f"cannot start: {error}", file=sys.stderr)
+        return 2
+    node: N | None = None
+    try:
+        node = create()
+        # What was made so far stays, compiled code above all; looking through it for garbage in the
+        # middle of a picture takes a tenth of a second.
+        gc.collect()
+        gc.freeze()
+        work(node)
+    except CardboxError as error:
+        get_logger("cardbox_tracker").fatal(str(error))
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+        pass
+    except Exception:
+        # A signal ends ROS in the midst of whatever runs; what then fails is no error.
+        if ok():
+            raise
+    finally:
+        if node is not None:
+            node.close()
+        try_shutdown()
+    return 0

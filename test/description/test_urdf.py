@@ -1,0 +1,163 @@
+"""The URDF of a body moves as the body itself does."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.description.rep155_urdf import rep155_urdf
+from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.vision.camera import Camera
+
+KEYPOINT_LINKS = (
+    "left_upper_arm",
+    "left_forearm",
+    "left_hand",
+    "right_upper_arm",
+    "right_forearm",
+    "right_hand",
+)
+# From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
+TO_ROOT = np.diag([-1.0, -1.0, 1.0])
+
+
+def child(element: Xml.Element, tag: str) -> dict[str, str]:
+    """Return the attributes of the first child of that tag."""
+    found = element.find(tag)
+    assert found is not None, f"no <{tag}>"
+    return dict(found.attrib)
+
+
+def axis_angle(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues' formula, (3, 3)."""
+    x, y, z = axis
+    cross = np.array([(0, -z, y), (z, 0, -x), (-y, x, 0)])
+    turned: np.ndarray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return turned
+
+
+def numbers(text: str) -> np.ndarray:
+    return np.array([float(value) for value in text.split()])
+
+
+def link_poses(xml: str, positions: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """Forward kinematics of a URDF, written from its specification: link name to (4, 4)."""
+    robot = Xml.fromstring(xml)
+    poses = {ROOT_LINK: np.eye(4)}
+    for joint in robot.findall("joint"):  # parents come before children in our files
+        origin = child(joint, "origin")
+        roll, pitch, yaw = numbers(origin["rpy"])
+        placed = np.eye(4)
+        placed[:3, :3] = (
+            axis_angle(np.array([0, 0, 1]), yaw)
+            @ axis_angle(np.array([0, 1, 0]), pitch)
+            @ axis_angle(np.array([1, 0, 0]), roll)
+        )
+        placed[:3, 3] = numbers(origin["xyz"])
+        moved = np.eye(4)
+        if joint.attrib["type"] != "fixed":
+            axis = numbers(child(joint, "axis")["xyz"])
+            value = positions[joint.attrib["name"]]
+            if joint.attrib["type"] == "prismatic":
+                moved[:3, 3] = axis * value
+            else:
+                moved[:3, :3] = axis_angle(axis, value)
+        parent = poses[child(joint, "parent")["link"]]
+        poses[child(joint, "child")["link"]] = parent @ placed @ moved
+    return poses
+
+
+def random_postures(count: int) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    return rng.uniform(JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1], (count, 12))
+
+
+@pytest.mark.parametrize("posture", random_postures(8))
+def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -> None:
+    body = BodyModel(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
+    poses = link_poses(urdf_from_body(body), dict(zip(JOINT_NAMES, posture, strict=True)))
+
+    frames = forward_kinematics(body, posture)
+    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+        np.testing.assert_allclose(poses[link][:3, 3], TO_ROOT @ point, atol=1e-9)
+    np.testing.assert_allclose(poses["head"][:3, 3], TO_ROOT @ frames.head, atol=1e-9)
+    np.testing.assert_allclose(poses["torso"][:3, 3], TO_ROOT @ frames.hip, atol=1e-9)
+
+
+def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
+    body = BodyModel(camera_pitch_rad=0.2)
+    xml = urdf_from_body(body, optical_frame="cam_optical")
+    poses = link_poses(xml, dict.fromkeys(JOINT_NAMES, 0.0))
+    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.2)
+    for point in np.array([(1.0, 0, 0), (0, 1.0, 0), (-2.0, 0.3, 0.5)]):
+        optical = camera.reference_to_optical(point)
+        np.testing.assert_allclose(
+            poses["cam_optical"][:3, :3] @ optical, TO_ROOT @ point, atol=1e-9
+        )
+
+
+def test_movable_joints_are_those_of_the_joint_state_with_limits() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel()))
+    movable = {j.attrib["name"]: j for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
+    assert set(movable) == set(JOINT_NAMES)
+    for name, (lower, upper) in zip(JOINT_NAMES, JOINT_LIMITS, strict=True):
+        limit = child(movable[name], "limit")
+        assert float(limit["lower"]) == pytest.approx(lower)
+        assert float(limit["upper"]) == pytest.approx(upper)
+
+
+def test_links_form_one_tree() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel(), optical_frame="optical"))
+    links = {link.attrib["name"] for link in robot.findall("link")}
+    children = [child(joint, "child")["link"] for joint in robot.findall("joint")]
+    assert sorted([*children, ROOT_LINK]) == sorted(links)
+
+
+def test_visuals_are_the_fifteen_patches() -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel()))
+    assert len(robot.findall("link/visual")) == 15
+
+
+def test_yourdfpy_loads_it_and_agrees() -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
+    body = BodyModel(distance_m=2.3)
+    posture = random_postures(1)[0]
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
+    assert robot.validate()
+    robot.update_cfg(dict(zip(JOINT_NAMES, posture, strict=True)))
+    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+        np.testing.assert_allclose(
+            robot.get_transform(link, ROOT_LINK)[:3, 3], TO_ROOT @ point, atol=1e-6
+        )
+
+
+def test_the_example_body_is_a_person_to_try_it_with(capsys: pytest.CaptureFixture[str]) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
+    example = Path(__file__).resolve().parents[2] / "config" / "example_body.yaml"
+    assert main(["urdf", str(example)]) == 0
+    robot = yourdfpy.URDF.load(io.BytesIO(capsys.readouterr().out.encode()))
+    assert robot.validate()
+    assert set(robot.actuated_joint_names) == set(JOINT_NAMES)
+    assert len(load_body_model(example).sizes) == 18
+
+
+@pytest.mark.skipif(shutil.which("check_urdf") is None, reason="check_urdf is not installed")
+@pytest.mark.parametrize("kind", ["own", "rep155"])
+def test_check_urdf_accepts_it(tmp_path: Path, kind: str) -> None:
+    body = BodyModel()
+    path = tmp_path / "person.urdf"
+    path.write_text(urdf_from_body(body, "eye") if kind == "own" else rep155_urdf(body, "a", "eye"))
+    checked = subprocess.run(["check_urdf", str(path)], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout + checked.stderr

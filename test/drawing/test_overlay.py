@@ -1,0 +1,104 @@
+"""Overlays: the model is drawn where it is, and only if there is one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.drawing.overlay import (
+    JOINT_BGR,
+    OUTLINE_BGR,
+    SKELETON_BGR,
+    draw_model,
+    draw_overlay,
+    draw_text,
+)
+from cardbox_tracker.estimation.tracker import Estimate
+from cardbox_tracker.vision.camera import Camera
+
+BODY = BodyModel()
+CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)
+FRONT = reference_posture("front")
+FOUND = Estimate("tracking", FRONT, np.zeros(12), np.zeros((6, 3)), 1234, 0.87)
+GREY = np.full((240, 320), 90, np.uint8)
+
+
+def near(canvas: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    return np.abs(canvas.astype(int) - colour).max(axis=2) < 30
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+@pytest.mark.parametrize("shape", [(240, 320), (240, 320, 3)])
+def test_an_overlay_is_a_colour_picture_of_the_asked_size(
+    shape: tuple[int, ...], scale: int
+) -> None:
+    picture = np.full(shape, 90, np.uint8)
+    overlay = draw_overlay(picture, BODY, CAMERA, FOUND, scale)
+    assert overlay.shape == (240 * scale, 320 * scale, 3)
+    assert overlay.dtype == np.uint8
+    assert near(overlay, OUTLINE_BGR).any()
+    assert near(overlay, SKELETON_BGR).any()
+    assert np.all(picture == 90)
+
+
+@pytest.mark.parametrize("scale", [1, 3])
+def test_the_skeleton_is_where_the_joints_are(scale: int) -> None:
+    overlay = draw_overlay(GREY, BODY, CAMERA, FOUND, scale)
+    view = CAMERA.scaled(320 * scale, 240 * scale)
+    pixels = view.project(view.reference_to_optical(keypoints_m(BODY, FRONT)))
+    for u, v in pixels.round().astype(int):
+        assert near(overlay, JOINT_BGR)[v, u]
+
+
+def test_the_outline_frames_the_head_and_nothing_far_from_it() -> None:
+    canvas = np.zeros((240, 320, 3), np.uint8)
+    draw_model(canvas, BODY, CAMERA, FRONT)
+    rows, columns = np.nonzero(near(canvas, OUTLINE_BGR))
+    # The crown is 0.33 m above the camera at 1.96 m: 250 x 0.33 / 1.96 = 42 px above the middle.
+    assert rows.min() == pytest.approx(119.5 - 42.1, abs=2)
+    # The hands reach 0.18 + 0.63 sin 20 = 0.395 m to either side: 49 px, and half a wrist.
+    assert columns.min() == pytest.approx(159.5 - 49.4 - 5, abs=3)
+    assert columns.max() == pytest.approx(159.5 + 49.4 + 5, abs=3)
+    assert not canvas[:, :90].any()
+    assert not canvas[:70].any()
+
+
+@pytest.mark.parametrize("state", ["no_person", "lost"])
+def test_without_a_posture_there_is_only_text(state: str) -> None:
+    overlay = draw_overlay(GREY, BODY, CAMERA, Estimate(state))
+    assert np.all(overlay[40:] == 90)
+    assert np.any(overlay[:40] != 90)
+    assert not near(overlay, OUTLINE_BGR).any()
+
+
+def test_the_text_tells_the_state() -> None:
+    overlays = [draw_overlay(GREY, BODY, CAMERA, Estimate(s)) for s in ("lost", "no_person")]
+    assert np.any(overlays[0] != overlays[1])
+
+
+def test_lines_of_text_go_down() -> None:
+    def rows(line: int) -> np.ndarray:
+        canvas = np.full((240, 320, 3), 90, np.uint8)
+        draw_text(canvas, "lost", line)
+        return np.nonzero(np.any(canvas != 90, axis=(1, 2)))[0]
+
+    assert rows(0).max() < rows(1).min() + 3
+    assert rows(1).max() < rows(3).min()
+
+
+def test_a_person_behind_the_camera_is_not_drawn() -> None:
+    canvas = np.zeros((240, 320, 3), np.uint8)
+    draw_model(canvas, BODY, CAMERA.with_pitch(np.pi), FRONT)
+    assert not canvas.any()
+
+
+def test_a_person_half_outside_does_not_fail() -> None:
+    aside = FRONT.copy()
+    aside[0] = 1.3
+    canvas = np.zeros((240, 320, 3), np.uint8)
+    draw_model(canvas, BODY, CAMERA, aside)
+    assert canvas[:, 250:].any()
+    assert not canvas[:, :200].any()

@@ -1,0 +1,332 @@
+"""The compiled cost is the reference cost to the last pixel, and both count what one counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
+from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
+from cardbox_tracker.estimation.cost.compiled import CompiledCost, CompiledKeypoints
+from cardbox_tracker.estimation.cost.silhouette import (
+    ReferenceCost,
+    SilhouetteCost,
+    rows_above_hips,
+)
+from cardbox_tracker.vision.camera import Camera
+
+SMALL = ((33, 57), (57, 33), (64, 48), (97, 41), (160, 120))
+LARGE = ((320, 240), (321, 241), (640, 480))
+SILHOUETTES = ("person", "speckled person", "noise", "empty", "full")
+POSTURES = 3
+
+
+@dataclass(frozen=True)
+class Case:
+    """One body before one camera, several postures, one silhouette."""
+
+    body: BodyModel
+    camera: Camera
+    postures: np.ndarray
+    silhouette: np.ndarray
+
+    def costs(self) -> tuple[ReferenceCost, CompiledCost]:
+        both = ReferenceCost(self.body, self.camera), CompiledCost(self.body, self.camera)
+        for cost in both:
+            cost.observe(self.silhouette)
+        return both
+
+
+def make_case(
+    seed: int, size: tuple[int, int], distance_m: float, pitch_rad: float, kind: str
+) -> Case:
+    """Everything but the arguments is drawn from continuous distributions by ``seed``.
+
+    So no corner comes to lie on the very border between two places of the 1/256 px grid, where the
+    last bit of a product decides.
+    """
+    rng = np.random.default_rng(seed)
+    width, height = size
+    focal = rng.uniform(0.5, 2.0) * width
+    middle = rng.uniform(-0.1, 1.1, 2) * size
+    camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *middle, pitch_rad)
+    body = BodyModel(
+        random_sizes(rng),
+        distance_m * rng.uniform(0.9, 1.1),
+        rng.uniform(-0.6, 0.1) * distance_m,
+        camera_pitch_rad=pitch_rad,
+    )
+    low, high = JOINT_LIMITS.T
+    postures = rng.uniform(low, high, (POSTURES, 12))
+    postures[:, 0] = rng.normal(0.0, 0.2 * distance_m, POSTURES)
+    # Whoever turns for the side reference goes beyond the joint limits.
+    postures[-1, 3] = rng.uniform(-np.pi, np.pi)
+    return Case(body, camera, postures, make_silhouette(rng, kind, body, camera, postures[0]))
+
+
+def random_sizes(rng: np.random.Generator) -> np.ndarray:
+    """A person, or anything within the limits."""
+    if rng.random() < 0.5:
+        return np.clip(DEFAULT_SIZES * rng.uniform(0.7, 1.4, 18), *SIZE_LIMITS.T)
+    return rng.uniform(*SIZE_LIMITS.T)
+
+
+def make_silhouette(
+    rng: np.random.Generator, kind: str, body: BodyModel, camera: Camera, posture: np.ndarray
+) -> np.ndarray:
+    shape = (camera.height, camera.width)
+    if kind == "noise":
+        return np.where(rng.random(shape) < rng.uniform(0.1, 0.9), 255, 0).astype(np.uint8)
+    if kind in ("empty", "full"):
+        return np.full(shape, 255 if kind == "full" else 0, np.uint8)
+    silhouette = np.zeros(shape, np.uint8)
+    drawn = ReferenceCost(body, camera).draw(posture + rng.normal(0.0, 0.15, 12))
+    silhouette[: len(drawn)] = drawn
+    if kind == "speckled person":
+        silhouette[rng.random(shape) < 0.05] ^= 255
+    return silhouette
+
+
+CASE = {
+    "seed": st.integers(0, 2**32 - 1),
+    "distance_m": st.sampled_from((0.34, 0.4, 0.7, 1.5, 2.0, 3.0, 8.0)),
+    "pitch_rad": st.sampled_from((0.0, 0.0, 0.1, -0.1, 0.5, -0.4, 1.2)),
+    "kind": st.sampled_from(SILHOUETTES),
+}
+SMALL_CASES = st.builds(make_case, size=st.sampled_from(SMALL), **CASE)
+LARGE_CASES = st.builds(make_case, size=st.sampled_from(LARGE), **CASE)
+
+
+def assert_all_equal(case: Case) -> None:
+    reference, compiled = case.costs()
+    assert compiled.rows == reference.rows
+    assert compiled.silhouette_px == reference.silhouette_px
+    postures = case.postures
+    np.testing.assert_array_equal(compiled.full(postures), reference.full(postures))
+    for posture in postures[:2]:
+        got, expected = compiled.overlap(posture), reference.overlap(posture)
+        assert got[0] == expected[0]
+        assert got[1] == pytest.approx(expected[1], abs=1e-12)
+    torsos = postures[:, TORSO]
+    for arms in (None, postures[0], postures[1], None):
+        reference.fix_arms(arms)
+        compiled.fix_arms(arms)
+        np.testing.assert_array_equal(compiled.torso(torsos), reference.torso(torsos))
+    for torso in torsos[:2]:
+        reference.fix_torso(torso)
+        compiled.fix_torso(torso)
+        for side, joints in (("left", LEFT_ARM), ("right", RIGHT_ARM)):
+            arms = postures[:, joints]
+            np.testing.assert_array_equal(compiled.arm(side, arms), reference.arm(side, arms))
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES)
+def test_every_cost_of_small_pictures_is_equal(case: Case) -> None:
+    assert_all_equal(case)
+
+
+@settings(max_examples=8)
+@given(LARGE_CASES)
+def test_every_cost_of_large_pictures_is_equal(case: Case) -> None:
+    assert_all_equal(case)
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES, st.integers(0, 2**32 - 1))
+def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sizes = np.array([random_sizes(rng) for _ in case.postures])
+    expected = []
+    for one, posture in zip(sizes, case.postures, strict=True):
+        reference = ReferenceCost(replace(case.body, sizes=one), case.camera)
+        reference.observe(case.silhouette)
+        expected.append(reference.full(posture[None])[0])
+    compiled = case.costs()[1]
+    np.testing.assert_array_equal(compiled.bodies(sizes, case.postures), expected)
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES)
+def test_the_model_itself_as_silhouette_leaves_no_pixel_over(case: Case) -> None:
+    """Equal counts could hide pixels that differ; a cost of 0 cannot."""
+    reference, compiled = case.costs()
+    for posture in case.postures:
+        silhouette = np.zeros((case.camera.height, case.camera.width), np.uint8)
+        silhouette[: reference.rows] = reference.draw(posture)
+        compiled.observe(silhouette)
+        assert compiled.full(posture[None]).tolist() == [0]
+        assert compiled.overlap(posture) == (0, 1.0 if silhouette.any() else 0.0)
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES)
+def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
+    compiled = CompiledKeypoints(case.body, case.camera)
+    for posture in case.postures:
+        expected = case.camera.reference_to_optical(keypoints_m(case.body, posture))
+        np.testing.assert_allclose(compiled(posture), expected, atol=1e-12)
+
+
+# A body made of rectangles on whole pixels: 20 px a metre at 2 m, the torso's top at the height of
+# the camera, so that it is seen edge-on, as are all patches in the plane of X and Z.
+HAND_CAMERA = Camera(64, 48, 40.0, 40.0, 31.5, 23.5)
+HAND_SIZES = {
+    "torso_top_width": 0.4,
+    "torso_bottom_width": 0.4,
+    "torso_height": 0.4,
+    "waist_width": 0.3,
+    "waist_height": 0.2,
+    "head_width": 0.2,
+    "head_height": 0.3,
+    "neck_length": 0.1,
+    "torso_depth": 0.2,
+    "waist_depth": 0.2,
+    "head_depth": 0.2,
+    "head_offset": 0.0,
+    "shoulder_breadth": 0.5,
+    "shoulder_drop": 0.0,
+    "upper_arm_length": 0.3,
+    "upper_arm_width": 0.1,
+    "forearm_length": 0.3,
+    "forearm_width": 0.1,
+}
+TRUNK_PX = 8 * 8 + 4 * 6 + 6 * 4
+ARM_PX = 12 * 2
+
+
+def hand_body() -> BodyModel:
+    sizes = np.empty(len(HAND_SIZES))
+    for name, value in HAND_SIZES.items():
+        sizes[SIZE_INDEX[name]] = value
+    return BodyModel(sizes, distance_m=2.0, hip_height_m=-0.6)
+
+
+def hand_trunk() -> np.ndarray:
+    expected = np.zeros((48, 64), np.uint8)
+    expected[16:22, 30:34] = 255  # head
+    expected[24:32, 28:36] = 255  # torso
+    expected[32:36, 29:35] = 255  # waist
+    return expected
+
+
+def hand_full() -> np.ndarray:
+    expected = hand_trunk()
+    # The person's left is to the right of the picture.
+    expected[24:36, 36:38] = 255
+    expected[24:36, 26:28] = 255
+    return expected
+
+
+@pytest.fixture(params=[ReferenceCost, CompiledCost])
+def hand_cost(request: pytest.FixtureRequest) -> SilhouetteCost:
+    return request.param(hand_body(), HAND_CAMERA)
+
+
+def test_the_model_by_hand_covers_the_pixels_of_its_rectangles() -> None:
+    drawn = ReferenceCost(hand_body(), HAND_CAMERA).draw(np.zeros(12))
+    np.testing.assert_array_equal(drawn, hand_full()[:36])
+
+
+def test_costs_by_hand_before_nobody(hand_cost: SilhouetteCost) -> None:
+    hand_cost.observe(np.zeros((48, 64), np.uint8))
+    rest = np.zeros(12)
+    aside = np.array([[0.05, 0.0, 0.0, 0.0]])  # one pixel to the right
+    assert (hand_cost.rows, hand_cost.silhouette_px) == (36, 0)
+    assert hand_cost.full(rest[None]).tolist() == [TRUNK_PX + 2 * ARM_PX]
+    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [TRUNK_PX]
+    hand_cost.fix_torso(np.zeros(4))
+    assert hand_cost.arm("left", np.zeros((1, 4))).tolist() == [TRUNK_PX + ARM_PX]
+    assert hand_cost.arm("right", np.zeros((1, 4))).tolist() == [TRUNK_PX + ARM_PX]
+    assert hand_cost.overlap(rest) == (TRUNK_PX + 2 * ARM_PX, 0.0)
+    hand_cost.fix_arms(rest)
+    # The arms stay, and 8 pixels of the torso move onto the left one.
+    assert hand_cost.torso(aside).tolist() == [TRUNK_PX + 2 * ARM_PX - 8]
+    hand_cost.fix_arms(None)
+    assert hand_cost.torso(aside).tolist() == [TRUNK_PX]
+
+
+def test_costs_by_hand_before_somebody(hand_cost: SilhouetteCost) -> None:
+    seen = hand_full()
+    seen[24:26, 28:33] = 0  # 10 px of the torso are missing
+    seen[0, :5] = 255  # 5 px too many
+    seen[36:] = 255  # legs
+    hand_cost.observe(seen)
+    assert hand_cost.silhouette_px == TRUNK_PX + 2 * ARM_PX - 10 + 5
+    assert hand_cost.full(np.zeros((1, 12))).tolist() == [15]
+    cost_px, iou = hand_cost.overlap(np.zeros(12))
+    common, union = TRUNK_PX + 2 * ARM_PX - 10, TRUNK_PX + 2 * ARM_PX + 5
+    assert cost_px == 15
+    assert iou == pytest.approx(common / union)
+    # Without arms both of them are missing, with one the other is.
+    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [15 + 2 * ARM_PX]
+    hand_cost.fix_torso(np.zeros(4))
+    assert hand_cost.arm("left", np.zeros((2, 4))).tolist() == [15 + ARM_PX] * 2
+
+
+def test_a_new_silhouette_forgets_the_fixed_arms(hand_cost: SilhouetteCost) -> None:
+    nobody = np.zeros((48, 64), np.uint8)
+    hand_cost.observe(nobody)
+    hand_cost.fix_arms(np.zeros(12))
+    hand_cost.observe(nobody)
+    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [TRUNK_PX]
+
+
+def test_a_model_outside_of_the_picture_costs_the_silhouette(hand_cost: SilhouetteCost) -> None:
+    hand_cost.observe(hand_full())
+    away = np.zeros((2, 12))
+    away[:, 0] = (-2.9, 2.9)
+    assert hand_cost.full(away).tolist() == [TRUNK_PX + 2 * ARM_PX] * 2
+    assert hand_cost.overlap(away[0]) == (TRUNK_PX + 2 * ARM_PX, 0.0)
+
+
+def test_nothing_against_nothing_costs_nothing(hand_cost: SilhouetteCost) -> None:
+    hand_cost.observe(np.zeros((48, 64), np.uint8))
+    away = np.zeros(12)
+    away[0] = 2.9
+    assert hand_cost.overlap(away) == (0, 0.0)
+
+
+def test_read_only_and_strided_silhouettes_are_taken(hand_cost: SilhouetteCost) -> None:
+    frozen = hand_full()
+    frozen.setflags(write=False)
+    hand_cost.observe(frozen)
+    assert hand_cost.full(np.zeros((1, 12))).tolist() == [0]
+    wide = np.zeros((48, 128), np.uint8)
+    wide[:, ::2] = hand_full()
+    hand_cost.observe(wide[:, ::2])
+    assert hand_cost.full(np.zeros((1, 12))).tolist() == [0]
+
+
+@pytest.mark.parametrize("shape", [(64, 48), (48, 63), (47, 64), (48, 64, 1)])
+def test_a_silhouette_of_another_size_is_refused(
+    hand_cost: SilhouetteCost, shape: tuple[int, ...]
+) -> None:
+    with pytest.raises(ValueError, match=r"silhouette has shape .*; the camera's is \(48, 64\)"):
+        hand_cost.observe(np.zeros(shape, np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("hip_height_m", "pitch_rad", "rows"),
+    [
+        # 20 px a metre below row 23.5; whatever lies outside of the picture is its border.
+        (-0.6, 0.0, 36),
+        (0.0, 0.0, 24),
+        (-1.1, 0.0, 46),
+        (-3.0, 0.0, 48),
+        (2.0, 0.0, 1),
+        # Looking down by as much as the hips are low moves them to the middle.
+        (-0.6, np.arctan2(0.6, 2.0), 24),
+        # Behind a camera that looks up steeply is no row of the picture.
+        (-4.0, -1.2, 48),
+    ],
+)
+def test_rows_above_the_hips_by_hand(hip_height_m: float, pitch_rad: float, rows: int) -> None:
+    body = replace(hand_body(), hip_height_m=hip_height_m)
+    assert rows_above_hips(body, HAND_CAMERA.with_pitch(pitch_rad)) == rows

@@ -1,0 +1,94 @@
+"""The cardbox and the volumetric model under the same drawing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.posture import N_JOINTS, TORSO, clip_to_limits, reference_posture
+from cardbox_tracker.estimation.cost.silhouette import ARMS, ReferenceCost
+from cardbox_tracker.evaluation.paper.models import (
+    MODELS,
+    PlaneCost,
+    make_cost,
+    microseconds_a_particle,
+)
+from cardbox_tracker.evaluation.paper.sessions import Session
+
+
+def postures(count: int) -> np.ndarray:
+    noise = np.random.default_rng(1).normal(0.0, 0.2, (count, N_JOINTS))
+    return clip_to_limits(reference_posture("front") + noise)
+
+
+def test_the_paper_counts_fewer_planes_for_the_cardbox() -> None:
+    assert {name: planes.n_planes for name, planes in MODELS.items()} == {
+        "cardbox": 15,
+        "volumetric": 42,
+    }
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_trunk_and_arms_are_all_planes(name: str) -> None:
+    planes = MODELS[name]
+    covered = np.zeros(planes.n_planes, int)
+    for part in (planes.trunk, *planes.arms.values()):
+        covered[part] += 1
+    assert np.all(covered == 1)
+
+
+def test_drawn_cardbox_costs_what_the_reference_says_but_for_its_outline(session: Session) -> None:
+    """OpenCV paints every pixel an edge touches, so the outline may differ, and only that."""
+    drawn = make_cost("cardbox", session.body, session.camera)
+    reference = ReferenceCost(session.body, session.camera)
+    silhouette = session.silhouettes[0]
+    drawn.observe(silhouette)
+    reference.observe(silhouette)
+    some = postures(12)
+    outline_px = 1500
+    np.testing.assert_allclose(drawn.full(some), reference.full(some), atol=outline_px / 4)
+    np.testing.assert_allclose(
+        drawn.torso(some[:, TORSO]), reference.torso(some[:, TORSO]), atol=outline_px / 4
+    )
+    assert np.corrcoef(drawn.full(some), reference.full(some))[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_parts_of_the_cost_agree_with_the_whole(name: str, session: Session) -> None:
+    """A torso beside fixed arms, in the posture of both, is the full model."""
+    cost = make_cost(name, session.body, session.camera)
+    cost.observe(session.silhouettes[3])
+    posture = postures(1)[0]
+    cost.fix_arms(posture)
+    assert cost.torso(posture[None, TORSO])[0] == cost.full(posture[None])[0]
+    assert cost.overlap(posture)[0] == cost.full(posture[None])[0]
+    cost.fix_torso(posture[TORSO])
+    cost.fix_arms(None)
+    hidden = posture.copy()
+    alone = cost.torso(posture[None, TORSO])[0]
+    arms = {side: cost.arm(side, hidden[None, joints])[0] for side, joints in ARMS.items()}
+    whole = cost.full(posture[None])[0]
+    # The arms do not overlap in the picture, so each changes the cost by itself.
+    assert whole == arms["left"] + arms["right"] - alone
+
+
+def test_a_volumetric_model_covers_the_cardbox(session: Session) -> None:
+    empty = np.zeros_like(session.silhouettes[0])
+    areas = {}
+    for name in MODELS:
+        cost = make_cost(name, session.body, session.camera)
+        cost.observe(empty)
+        areas[name] = cost.full(postures(5))
+    assert np.all(areas["volumetric"] >= areas["cardbox"])
+
+
+def test_a_silhouette_of_another_size_is_refused(session: Session) -> None:
+    cost = PlaneCost(MODELS["cardbox"], session.body, session.camera)
+    with pytest.raises(ValueError, match="silhouette has shape"):
+        cost.observe(np.zeros((5, 5), np.uint8))
+
+
+def test_timing_names_every_model(session: Session) -> None:
+    times = microseconds_a_particle(session.body, session.camera, session.silhouettes[0], 20, 2)
+    assert set(times) == {"compiled", "cardbox", "volumetric"}
+    assert all(time > 0 for time in times.values())

@@ -1,0 +1,63 @@
+"""Recorded people, through 'cardbox initialize' and 'cardbox track', against ground truth."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+MEAN_ERROR_M = 0.15
+INITIALIZATION_IOU = 0.80
+# Nobody takes a posture, or leaves the picture, to the frame.
+MARGIN_S = 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["person_a", "person_b"])
+def test_a_recorded_session_is_measured_and_tracked_to_its_end(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if not (DATA / name).is_dir():
+        pytest.skip(f"no recorded session {name} in ../shared/data")
+    truth = load_ground_truth(DATA / name / "ground_truth.json")
+    spans = {
+        segment: f"{start_s + MARGIN_S:g}:{end_s - MARGIN_S:g}"
+        for segment, (start_s, end_s) in truth.spans.items()
+    }
+    recording = [str(DATA / name / "bag"), "--background", spans["empty"]]
+    model, table = tmp_path / "person.yaml", tmp_path / "person.csv"
+    words = [word for n in ("front", "side", "arms") for word in (f"--{n}", spans[n])]
+    words += ["--distance", f"{truth.distance_m}", "--camera-pitch-deg", f"{truth.pitch_deg}"]
+    words += ["--side-turn", truth.side_turn, "--output", str(model)]
+    assert main(["initialize", *recording, *words]) == 0
+    iou = float(capsys.readouterr().out.split("mean ")[1].split()[0])
+    assert iou >= INITIALIZATION_IOU
+    assert load_body_model(model).distance_m == truth.distance_m
+
+    start_s = truth.spans["neutral"][0]
+    words = ["--model", str(model), "--start", f"{start_s}", "--csv", str(table)]
+    assert main(["track", *recording, *words]) == 0
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    estimates_m, states = {}, {}
+    for row in rows:
+        stamp_ns = int(row["stamp"].replace(".", ""))
+        states[stamp_ns] = row["state"]
+        if row["state"] == "tracking":
+            points = [float(row[f"{joint}_{axis}"]) for joint in KEYPOINT_NAMES for axis in "xyz"]
+            estimates_m[stamp_ns] = np.array(points).reshape(6, 3)
+    # Every picture with somebody in it, to the last one.
+    expected = [s for s in truth.frames if s >= truth.start_ns + round(start_s * 1e9)]
+    assert [s for s in expected if states.get(s) != "tracking"] == []
+    error = tracking_error(estimates_m, truth)
+    motions = ", ".join(f"{n} {100 * e:.1f}" for n, e in error.by_segment_m.items())
+    print(f"{name}: IoU {iou:.2f}, mean error {100 * error.mean_m:.1f} cm ({motions})")
+    assert error.mean_m < MEAN_ERROR_M

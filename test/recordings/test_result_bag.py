@@ -1,0 +1,126 @@
+"""The tools of mcap read the bag of results: all topics, their schemas and type hashes."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+from cardbox_tracker.recordings.track import TrackSummary, track_recording
+
+# As ROS 2 Jazzy's own message packages have them.
+TYPES = {
+    "/body_model": "std_msgs/msg/String",
+    "/robot_description": "std_msgs/msg/String",
+    "/silhouette": "sensor_msgs/msg/Image",
+    "/silhouette/camera_info": "sensor_msgs/msg/CameraInfo",
+    "/overlay": "sensor_msgs/msg/Image",
+    "/joint_states": "sensor_msgs/msg/JointState",
+    "/joint_states_stddev": "sensor_msgs/msg/JointState",
+    "/keypoints": "geometry_msgs/msg/PoseArray",
+    "/markers": "visualization_msgs/msg/MarkerArray",
+}
+
+
+@pytest.fixture(scope="module")
+def results(
+    recording: Any, source: SilhouetteSource, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, TrackSummary]:
+    folder = tmp_path_factory.mktemp("results")
+    with ResultBag(folder / "bag", recording.body, source.frame_id) as bag:
+        summary = track_recording(
+            *(source, recording.body, default_preset(), 0, 0.0, folder / "person.csv"),
+            observers=(bag.add,),
+        )
+    return folder / "bag", summary
+
+
+@pytest.fixture(scope="module")
+def decoded(results: tuple[Path, TrackSummary]) -> dict[str, list[Any]]:
+    reader = pytest.importorskip("mcap.reader", reason="the tools of mcap are not installed")
+    decoder = pytest.importorskip("mcap_ros2.decoder", reason="mcap-ros2-support is missing")
+    messages: dict[str, list[Any]] = {}
+    with next(results[0].glob("*.mcap")).open("rb") as stream:
+        tools = reader.make_reader(stream, decoder_factories=[decoder.DecoderFactory()])
+        for _, channel, _, message in tools.iter_decoded_messages():
+            messages.setdefault(channel.topic, []).append(message)
+    return messages
+
+
+def test_every_topic_is_there_once_a_picture(
+    decoded: dict[str, list[Any]], results: tuple[Path, TrackSummary]
+) -> None:
+    summary = results[1]
+    assert set(decoded) == set(TYPES)
+    for topic in ("/silhouette", "/silhouette/camera_info", "/overlay"):
+        assert len(decoded[topic]) == summary.frames
+    for topic in ("/joint_states", "/joint_states_stddev", "/keypoints"):
+        assert len(decoded[topic]) == summary.frames_tracked < summary.frames
+    assert len(decoded["/body_model"]) == len(decoded["/robot_description"]) == 1
+
+
+def test_markers_follow_the_person_and_go_with_them(
+    decoded: dict[str, list[Any]], recording: Any, source: SilhouetteSource
+) -> None:
+    shown = [array for array in decoded["/markers"] if array.markers[0].action == 0]
+    assert len(shown) == len(decoded["/joint_states"])
+    camera = source.camera.with_pitch(recording.body.camera_pitch_rad)
+    for array, state in zip(shown[:5], decoded["/joint_states"], strict=False):
+        triangles, bones = array.markers
+        assert (triangles.ns, triangles.type, len(triangles.points)) == ("patches", 11, 90)
+        assert (bones.ns, bones.type, len(bones.points)) == ("skeleton", 5, 16)
+        hand = camera.reference_to_optical(keypoints_m(recording.body, np.array(state.position)))[2]
+        last = bones.points[9]
+        np.testing.assert_allclose((last.x, last.y, last.z), hand, atol=1e-9)
+
+
+def test_pictures_are_those_of_the_tracker(
+    decoded: dict[str, list[Any]], source: SilhouetteSource
+) -> None:
+    for frame, silhouette in zip(source.frames(0.0, 8.0), decoded["/silhouette"], strict=False):
+        assert bytes(silhouette.data) == frame.silhouette.tobytes()
+    overlay = decoded["/overlay"][-1]
+    assert (overlay.encoding, overlay.width, overlay.height) == ("bgr8", 320, 240)
+
+
+def test_type_hashes_are_those_of_the_installed_messages(
+    results: tuple[Path, TrackSummary],
+) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    text = (results[0] / "metadata.yaml").read_text()
+    information = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    for entry in information["topics_with_message_count"]:
+        topic = entry["topic_metadata"]
+        assert topic["type"] == TYPES[topic["name"]]
+        assert topic["type_description_hash"] == installed_hash(topic["type"])
+
+
+def installed_hash(kind: str) -> str:
+    package, _, name = kind.split("/")
+    share = Path(importlib.import_module(package).__file__ or "").parents[4]
+    found = sorted(share.rglob(f"share/{package}/msg/{name}.json"))
+    if not found:
+        pytest.skip("the message packages are installed without their descriptions")
+    hashes = yaml.safe_load(found[0].read_text())["type_hashes"]
+    return str(next(h["hash_string"] for h in hashes if h["type_name"] == kind))
+
+
+def test_latched_topics_are_latched_when_played(results: tuple[Path, TrackSummary]) -> None:
+    text = (results[0] / "metadata.yaml").read_text()
+    information = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    durabilities = {
+        entry["topic_metadata"]["name"]: [
+            profile["durability"] for profile in entry["topic_metadata"]["offered_qos_profiles"]
+        ]
+        for entry in information["topics_with_message_count"]
+    }
+    assert durabilities["/body_model"] == durabilities["/robot_description"]
+    assert durabilities["/body_model"] in (["transient_local"], [1])

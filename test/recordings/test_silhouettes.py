@@ -1,0 +1,91 @@
+"""Silhouettes of a recording: spans of time, the background, and every picture once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("0:4", (0, 4)), ("6.8:8.2", (6.8, 8.2)), ("1e1:20", (10, 20)), ("0:inf", (0, np.inf))],
+)
+def test_spans_are_read(text: str, expected: tuple[float, float]) -> None:
+    assert TimeSpan.parse(text) == expected
+    assert TimeSpan.parse(str(TimeSpan.parse(text))) == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["5", "9:3", "3:3", "-1:3", ":", "1:", ":2", "", "a:b", "1:2:3", "nan:3", "0:nan"]
+)
+def test_what_is_no_span_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"is no span; expected T0:T1 in seconds, such as 0:4"):
+        TimeSpan.parse(text)
+
+
+def test_the_ends_belong_to_a_span() -> None:
+    span = TimeSpan(1.0, 2.0)
+    assert [span.contains(t) for t in (0.99, 1.0, 1.5, 2.0, 2.01)] == [0, 1, 1, 1, 0]
+
+
+def test_every_picture_comes_once_and_in_order(recording: Any, source: SilhouetteSource) -> None:
+    with BagReader(recording.folder) as bag:
+        stamps = [picture.stamp_ns for picture in bag.pictures()]
+    frames = list(source.frames())
+    assert [frame.stamp_ns for frame in frames] == stamps
+    assert [frame.time_s for frame in frames] == pytest.approx(np.arange(len(stamps)) / 5.0)
+    later = [frame.stamp_ns for frame in source.frames(2.0, 3.0)]
+    assert later == stamps[10:16]
+
+
+def test_silhouettes_are_the_person_and_the_empty_scene_has_none(
+    recording: Any, source: SilhouetteSource
+) -> None:
+    archive = np.load(recording.folder / "masks.npz")
+    masks = np.unpackbits(archive["packed"], axis=1).reshape(archive["shape"])
+    fits = []
+    for frame, mask in zip(source.frames(), masks, strict=True):
+        assert frame.silhouette.shape == frame.brightness.shape == (240, 320)
+        assert set(np.unique(frame.silhouette)) <= {0, 255}
+        seen = frame.silhouette > 0
+        if mask.any():
+            fits.append(np.count_nonzero(seen & (mask > 0)) / np.count_nonzero(seen | (mask > 0)))
+        else:
+            assert not seen.any()
+    assert np.mean(fits) > 0.95
+
+
+def test_pictures_are_brought_to_the_working_size(recording: Any) -> None:
+    with BagReader(recording.folder) as bag:
+        small = SilhouetteSource(bag, TimeSpan(0, 3.9), size=(160, 120))
+        frame = next(small.frames(7.0))
+    assert frame.silhouette.shape == (120, 160)
+    assert (small.camera.width, small.camera.height, small.camera.fx) == (160, 120, 165.0)
+
+
+@pytest.mark.parametrize(("span", "count"), [(TimeSpan(50, 60), 0), (TimeSpan(0.0, 0.1), 1)])
+def test_a_background_without_pictures_is_refused(
+    recording: Any, span: TimeSpan, count: int
+) -> None:
+    with (
+        BagReader(recording.folder) as bag,
+        pytest.raises(
+            BagError,
+            match=rf"{count} pictures lie in the background span {span} s of a bag of 24.2 s;",
+        ),
+    ):
+        SilhouetteSource(bag, span)
+
+
+def test_a_span_without_pictures_is_refused_by_name(source: SilhouetteSource) -> None:
+    with pytest.raises(
+        CardboxError,
+        match=r"no picture lies in the arms span 90:91 s of a bag of 24.2 s; give",
+    ):
+        source.silhouettes(TimeSpan(90, 91), "arms")

@@ -1,0 +1,282 @@
+"""Initialize and track on a recording: table, bag and video, and the same bytes for one seed."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
+from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.track import CSV_HEADER, TrackSummary, csv_row, track_recording
+
+CONFIG = default_preset()
+
+HEADER = (
+    "stamp,state,torso_y,torso_roll,torso_pitch,torso_yaw,"
+    "left_shoulder_abduction,left_shoulder_flexion,left_elbow_abduction,left_elbow_flexion,"
+    "right_shoulder_abduction,right_shoulder_flexion,right_elbow_abduction,right_elbow_flexion,"
+    "left_shoulder_x,left_shoulder_y,left_shoulder_z,left_elbow_x,left_elbow_y,left_elbow_z,"
+    "left_hand_x,left_hand_y,left_hand_z,"
+    "right_shoulder_x,right_shoulder_y,right_shoulder_z,right_elbow_x,right_elbow_y,right_elbow_z,"
+    "right_hand_x,right_hand_y,right_hand_z,cost,iou"
+)
+
+
+def track(
+    recording: Any, source: SilhouetteSource, path: Path, seed: int = 0, **rest: Any
+) -> TrackSummary:
+    start_s = rest.pop("start_s", recording.start_s())
+    return track_recording(source, recording.body, CONFIG, seed, start_s, path, **rest)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_person_of_a_recording_is_measured(recording: Any) -> None:
+    assert recording.result.mean_iou >= 0.80
+    for name, expected_m in (("upper_arm_length", 0.27), ("forearm_length", 0.36)):
+        assert recording.body.size(name) == pytest.approx(expected_m, abs=0.04)
+
+
+def test_the_measures_are_described_for_a_person(recording: Any) -> None:
+    text = describe(recording.result)
+    for part in ("upper_arm_length", " cm", "at 2 m", "fit (IoU): front 0.", "mean 0."):
+        assert part in text
+
+
+def test_a_reference_outside_of_the_recording_is_refused(
+    recording: Any, source: SilhouetteSource
+) -> None:
+    spans = {name: TimeSpan(7.0, 8.0) for name in ("front", "side")} | {"arms": TimeSpan(70, 80)}
+    with pytest.raises(CardboxError, match="no picture lies in the arms span 70:80 s of a bag of"):
+        initialize_from_recording(source, spans, InitializationConfig())
+
+
+def test_the_header_is_that_of_the_design() -> None:
+    assert ",".join(CSV_HEADER) == HEADER
+
+
+def test_there_is_one_row_a_picture_with_its_stamp(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    summary = track(recording, source, tmp_path / "person.csv")
+    text = (tmp_path / "person.csv").read_text()
+    assert text.splitlines()[0] == HEADER
+    assert text.endswith("\n")
+    assert "\r" not in text
+    rows = rows_of(tmp_path / "person.csv")
+    stamps = [frame.stamp_ns for frame in source.frames(recording.start_s())]
+    assert [row["stamp"] for row in rows] == [stamp_text(s) for s in stamps]
+    assert summary.frames == summary.frames_tracked == len(rows)
+    assert summary.mean_cost_px == pytest.approx(np.mean([int(row["cost"]) for row in rows]))
+    assert summary.mean_iou == pytest.approx(np.mean([float(row["iou"]) for row in rows]), abs=1e-4)
+
+
+def stamp_text(stamp_ns: int) -> str:
+    seconds, nanoseconds = divmod(stamp_ns, 10**9)
+    return f"{seconds}.{nanoseconds:09d}"
+
+
+def test_the_numbers_of_a_row_belong_together(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    track(recording, source, tmp_path / "person.csv")
+    names = HEADER.split(",")
+    errors_m = []
+    for row in rows_of(tmp_path / "person.csv"):
+        assert row["state"] == "tracking"
+        posture = np.array([float(row[name]) for name in JOINT_NAMES])
+        points_m = np.array([float(row[name]) for name in names[14:32]]).reshape(6, 3)
+        expected = source.camera.reference_to_optical(keypoints_m(recording.body, posture))
+        np.testing.assert_allclose(points_m, expected, atol=5e-6)
+        assert 0.5 < float(row["iou"]) <= 1.0
+        assert int(row["cost"]) > 0
+        stamp_ns = int(row["stamp"].replace(".", ""))
+        errors_m.append(
+            np.linalg.norm(points_m - recording.truth.frames[stamp_ns].keypoints_m, axis=1)
+        )
+    assert np.mean(errors_m) < 0.15
+
+
+def test_what_is_not_known_is_left_empty(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    """From the start of the recording on: first there is nobody."""
+    summary = track(recording, source, tmp_path / "person.csv", start_s=0.0)
+    rows = rows_of(tmp_path / "person.csv")
+    assert summary.frames == len(rows)
+    empty = [row for row in rows if row["state"] == "no_person"]
+    assert len(empty) >= 20
+    assert summary.frames_tracked <= len(rows) - len(empty)
+    for row in rows:
+        values = set(list(row.values())[2:])
+        assert ("" in values) == (row["state"] != "tracking")
+        if row["state"] != "tracking":
+            assert values == {""}
+
+
+@pytest.mark.parametrize("state", ["no_person", "lost"])
+def test_a_row_without_an_estimate_by_hand(state: str) -> None:
+    assert csv_row(1_700_000_000_000_000_005, Estimate(state)) == [
+        "1700000000.000000005",
+        state,
+        *[""] * 32,
+    ]
+
+
+def test_a_row_by_hand() -> None:
+    estimate = Estimate(
+        "tracking", np.arange(12) / 10, np.ones(12), np.arange(18).reshape(6, 3) / 4, 812, 0.87654
+    )
+    row = csv_row(42, estimate)
+    assert len(row) == len(CSV_HEADER)
+    assert row[:4] == ["0.000000042", "tracking", "0.000000", "0.100000"]
+    assert row[13:16] == ["1.100000", "0.000000", "0.250000"]
+    assert row[-3:] == ["4.250000", "812", "0.8765"]
+
+
+def test_one_seed_gives_the_same_bytes_and_another_others(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    for name, seed in (("first", 4), ("second", 4), ("other", 5)):
+        track(recording, source, tmp_path / name, seed)
+    first, second, other = ((tmp_path / n).read_bytes() for n in ("first", "second", "other"))
+    assert first == second
+    assert first != other
+
+
+def test_a_start_after_the_end_is_refused_and_leaves_nothing(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    with pytest.raises(
+        CardboxError, match="no picture lies after --start 99 s; give seconds from the bag's start"
+    ):
+        track(recording, source, tmp_path / "person.csv", start_s=99.0)
+    assert os.listdir(tmp_path) == []
+
+
+def test_observers_see_every_picture(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    seen = []
+
+    def observe(frame: Any, estimate: Estimate, tracker: Tracker) -> None:
+        assert isinstance(tracker, Tracker)
+        seen.append((frame.stamp_ns, estimate.state))
+
+    track(recording, source, tmp_path / "person.csv", observers=(observe,))
+    rows = rows_of(tmp_path / "person.csv")
+    assert [(stamp_text(stamp_ns), state) for stamp_ns, state in seen] == [
+        (row["stamp"], row["state"]) for row in rows
+    ]
+
+
+def test_the_video_has_every_picture(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    summary = track(recording, source, tmp_path / "person.csv", video_path=tmp_path / "person.mp4")
+    video = cv2.VideoCapture(str(tmp_path / "person.mp4"))
+    count = 0
+    while (picture := video.read()[1]) is not None:
+        assert picture.shape == (480, 640, 3)
+        # The model is drawn in colour over grey.
+        assert np.ptp(picture.astype(int), axis=2).max() > 60
+        count += 1
+    assert count == summary.frames
+    assert sorted(os.listdir(tmp_path)) == ["person.csv", "person.mp4"]
+
+
+@pytest.mark.parametrize("name", ["person.txt", "missing/person.mp4"])
+def test_a_video_that_cannot_be_written_is_refused_and_leaves_nothing(
+    recording: Any, source: SilhouetteSource, tmp_path: Path, name: str
+) -> None:
+    with pytest.raises(CardboxError, match="cannot write"):
+        track(recording, source, tmp_path / "person.csv", video_path=tmp_path / name)
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_bag_of_results_holds_what_the_tracker_would_publish(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    with ResultBag(tmp_path / "results", recording.body, source.frame_id) as results:
+        track(recording, source, tmp_path / "person.csv", observers=(results.add,))
+    rows = rows_of(tmp_path / "person.csv")
+    with BagReader(tmp_path / "results") as bag:
+        assert {
+            "body_model": "std_msgs/msg/String",
+            "robot_description": "std_msgs/msg/String",
+            "joint_states": "sensor_msgs/msg/JointState",
+            "keypoints": "geometry_msgs/msg/PoseArray",
+        }.items() <= {name.strip("/"): kind for name, kind in bag.topics.items()}.items()
+        messages: dict[str, list[Any]] = {}
+        for message in bag.messages():
+            messages.setdefault(message.topic.strip("/"), []).append(bag.deserialize(message))
+    assert loads_body_model(messages["body_model"][0].data, "bag") == recording.body
+    assert messages["robot_description"][0].data.lstrip().startswith("<")
+    assert len(messages["joint_states"]) == len(messages["keypoints"]) == len(rows)
+    for state, points, row in zip(
+        messages["joint_states"], messages["keypoints"], rows, strict=True
+    ):
+        for header in (state.header, points.header):
+            assert f"{header.stamp.sec}.{header.stamp.nanosec:09d}" == row["stamp"]
+        assert tuple(state.name) == JOINT_NAMES
+        expected = [float(row[name]) for name in JOINT_NAMES]
+        np.testing.assert_allclose(state.position, expected, atol=5.1e-7)
+        assert points.header.frame_id == source.frame_id
+        assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x"]), abs=1e-6)
+
+
+def test_pictures_without_a_person_have_no_results(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    with ResultBag(tmp_path / "results", recording.body, source.frame_id) as results:
+        summary = track(
+            recording, source, tmp_path / "person.csv", start_s=0.0, observers=(results.add,)
+        )
+    with BagReader(tmp_path / "results") as bag:
+        states = [name for name in bag.topics if name.endswith("joint_states")]
+        assert bag.count(states) == summary.frames_tracked < summary.frames
+
+
+def test_a_recording_of_that_name_is_kept(recording: Any, tmp_path: Path) -> None:
+    before = sorted(os.listdir(recording.folder))
+    with (
+        pytest.raises(BagError, match="exists and is a recording already; choose another name"),
+        ResultBag(recording.folder, recording.body, "camera"),
+    ):
+        pytest.fail("it must not be opened")
+    assert sorted(os.listdir(recording.folder)) == before
+
+
+def test_after_an_error_no_bag_is_left(recording: Any, tmp_path: Path) -> None:
+    with (
+        pytest.raises(RuntimeError),
+        ResultBag(tmp_path / "results", recording.body, "camera"),
+    ):
+        raise RuntimeError("half way")
+    assert os.listdir(tmp_path) == []
+
+
+def test_without_a_path_there_is_no_bag(
+    recording: Any, source: SilhouetteSource, tmp_path: Path
+) -> None:
+    with ResultBag(None, recording.body, source.frame_id) as results:
+        track(recording, source, tmp_path / "person.csv", observers=(results.add,))
+    assert os.listdir(tmp_path) == ["person.csv"]

@@ -1,0 +1,142 @@
+"""Messages and the core agree on pictures, calibrations and results."""
+
+from __future__ import annotations
+
+import array
+
+import cv2
+import numpy as np
+import pytest
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.errors import CameraError, EncodingError
+from cardbox_tracker.ros.messages import conversions, results
+from cardbox_tracker.vision.camera import Calibration, Camera
+from cardbox_tracker.vision.camera_info import calibration_from_info
+
+HEADER = Header(frame_id="optical")
+CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
+
+
+def info(**changes: object) -> CameraInfo:
+    message = conversions.camera_info_message(HEADER, CAMERA)
+    for name, value in changes.items():
+        setattr(message, name, value)
+    return message
+
+
+def test_silhouette_goes_and_comes_back_without_a_copy() -> None:
+    silhouette = np.zeros((240, 320), np.uint8)
+    silhouette[50:200, 100:150] = 255
+    message = conversions.image_message(HEADER, silhouette, "mono8")
+    assert isinstance(message.data, array.array) and message.step == 320
+    received = conversions.silhouette_of(message)
+    np.testing.assert_array_equal(received, silhouette)
+    assert np.shares_memory(received, np.frombuffer(message.data, np.uint8))
+
+
+def test_padded_rows_are_read() -> None:
+    message = Image(height=2, width=3, step=4, encoding="mono8", data=bytes(range(8)))
+    expected = [[0, 1, 2], [4, 5, 6]]
+    np.testing.assert_array_equal(conversions.silhouette_of(message), expected)
+    np.testing.assert_array_equal(conversions.brightness_of(message), expected)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"encoding": "rgb8"}, ("rgb8", "mono8")),
+        ({"height": 480}, ("480", "bytes")),
+        ({"width": 0}, ("0x240",)),
+    ],
+)
+def test_a_malformed_silhouette_is_refused(
+    changes: dict[str, object], words: tuple[str, ...]
+) -> None:
+    message = conversions.image_message(HEADER, np.zeros((240, 320), np.uint8), "mono8")
+    for name, value in changes.items():
+        setattr(message, name, value)
+    with pytest.raises(EncodingError) as caught:
+        conversions.silhouette_of(message)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_compressed_picture_becomes_brightness() -> None:
+    picture = np.full((24, 32), 120, np.uint8)
+    data = cv2.imencode(".jpg", picture)[1].tobytes()
+    got = conversions.brightness_of(CompressedImage(format="jpeg", data=data))
+    np.testing.assert_allclose(got, picture, atol=2)
+
+
+def test_camera_survives_its_camera_info() -> None:
+    assert conversions.camera_of(info()) == CAMERA
+    calibration = calibration_from_info(info(), "/image_raw", "/camera_info")
+    assert calibration.camera(320, 240) == CAMERA
+    assert calibration.frame_id == "optical"
+
+
+def test_uncalibrated_camera_names_both_topics() -> None:
+    with pytest.raises(CameraError, match=r"(?s)/eye/image_raw.*/eye/camera_info"):
+        calibration_from_info(info(k=np.zeros(9)), "/eye/image_raw", "/eye/camera_info")
+
+
+def test_binning_and_region_of_interest_are_taken_into_the_camera() -> None:
+    roi = RegionOfInterest(x_offset=40, y_offset=20, width=160, height=120)
+    message = info(roi=roi, binning_x=2, binning_y=2)
+    got = calibration_from_info(message, "a", "b").camera(80, 60)
+    # A point at pixel (u, v) of the full picture is at ((u - 40 + 0.5) / 2 - 0.5, ...) of this one.
+    point = np.array([0.1, -0.05, 2.0])
+    u, v = CAMERA.project(point)
+    np.testing.assert_allclose(
+        got.project(point), ((u - 40 + 0.5) / 2 - 0.5, (v - 20 + 0.5) / 2 - 0.5)
+    )
+
+
+def test_a_calibration_of_another_shape_is_refused() -> None:
+    calibration = Calibration(640, 360, np.diag([300.0, 300.0, 1.0]), np.zeros(5))
+    with pytest.raises(CameraError, match="640x360"):
+        conversions.check_shape(np.zeros((480, 640), np.uint8), calibration, "a", "b")
+    conversions.check_shape(np.zeros((180, 320), np.uint8), calibration, "a", "b")
+
+
+def test_distorted_silhouette_is_refused() -> None:
+    with pytest.raises(CameraError, match="distortion"):
+        conversions.camera_of(info(d=[0.1, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_joint_state_has_names_positions_and_header() -> None:
+    posture = reference_posture("arms")
+    message = results.joint_state_message(HEADER, posture)
+    assert tuple(message.name) == JOINT_NAMES
+    np.testing.assert_array_equal(message.position, posture)
+    assert message.header.frame_id == "optical"
+    assert len(message.velocity) == len(message.effort) == 0
+
+
+def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
+    body, posture = BodyModel(), reference_posture("front")
+    patches, skeleton = results.markers_message(HEADER, body, CAMERA, posture).markers
+    corners = CAMERA.reference_to_optical(cardbox_patches(body, posture))
+    assert (patches.type, len(patches.points), len(patches.colors)) == (
+        Marker.TRIANGLE_LIST,
+        15 * 6,
+        15 * 6,
+    )
+    first = patches.points[0]
+    np.testing.assert_allclose((first.x, first.y, first.z), corners[0, 0])
+    assert (skeleton.type, len(skeleton.points)) == (Marker.LINE_LIST, 2 * 8)
+    assert all(point.z > 0 for point in patches.points + skeleton.points)
+
+
+def test_keypoints_are_poses_of_the_optical_frame() -> None:
+    points = np.arange(18.0).reshape(6, 3)
+    message = results.keypoints_message(HEADER, points)
+    got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
+    np.testing.assert_array_equal(got, points)
+    assert all(pose.orientation.w == 1.0 for pose in message.poses)

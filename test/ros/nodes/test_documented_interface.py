@@ -1,0 +1,266 @@
+"""The tables of docs/topics.md are what the nodes have; the layouts show what is published."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
+
+from cardbox_tracker.body.posture import JOINT_NAMES  # noqa: E402
+from cardbox_tracker.description.urdf import ROOT_LINK  # noqa: E402
+from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
+from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.simulation.session import session_camera  # noqa: E402
+
+ROOT = Path(__file__).parents[2]
+NODES = ("camera", "play_bag", "background", "initializer", "tracker")
+# What rclpy adds to every node.
+OF_EVERY_NODE = ("/rosout", "/parameter_events")
+BAG_TOPIC = "/of_the_bag/camera_info"
+
+
+class Topic(NamedTuple):
+    name: str
+    direction: str
+    kind: str
+    qos: str
+
+
+def table(node: str) -> tuple[set[Topic], set[str]]:
+    """Topics and services that the document gives to a node; full names in the root namespace."""
+    text = (ROOT / "docs" / "topics.md").read_text(encoding="utf-8")
+    section = text.split(f"\n## {node}\n")[1].split("\n## ")[0]
+    rows = re.findall(r"(?m)^\| `(\S+)` \| (in|out) \| (\S+) \| ([^|]+) \|", section)
+    services = re.findall(r"(?m)^\| `(\S+)` \| std_srvs/Trigger \|", section)
+    return (
+        {Topic(full(name), direction, kind, qos.strip()) for name, direction, kind, qos in rows},
+        {full(name) for name in services},
+    )
+
+
+def full(name: str) -> str:
+    return name if name.startswith("/") else f"/{name}"
+
+
+def qos_text(profile: QoSProfile) -> str:
+    if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+        return f"latched, {profile.depth}"
+    is_reliable = profile.reliability == ReliabilityPolicy.RELIABLE
+    return f"{'reliable' if is_reliable else 'best effort'}, {profile.depth}"
+
+
+def kind_text(message: Any) -> str:
+    return f"{message.__module__.split('.')[0]}/{message.__name__}"
+
+
+def interface_of(node: Any) -> tuple[set[Topic], set[str]]:
+    topics = {
+        Topic(end.topic_name, direction, kind_text(end.msg_type), qos_text(end.qos_profile))
+        for direction, ends in (("in", node.subscriptions), ("out", node.publishers))
+        for end in ends
+        if not end.topic_name.startswith((*OF_EVERY_NODE, BAG_TOPIC))
+    }
+    services = {
+        service.srv_name
+        for service in node.services
+        if kind_text(service.srv_type) == "std_srvs/Trigger"
+    }
+    return topics, {
+        name if name.startswith("/") else node.resolve_service_name(name) for name in services
+    }
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Create a node of a class with parameters; all are closed at the end."""
+    rclpy.init(args=[])
+    made = []
+
+    def create(kind: type, **parameters: Any) -> Any:
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        node = kind(parameter_overrides=overrides, enable_rosout=False)
+        made.append(node)
+        return node
+
+    yield create
+    for node in made:
+        node.close()
+        node.destroy_node()
+    rclpy.shutdown()
+
+
+def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]:
+    if name == "background":
+        return [make(BackgroundNode, image_transport=kind) for kind in ("raw", "compressed")]
+    if name == "camera":
+        video = folder / "video.avi"
+        writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (64, 48))
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+        writer.release()
+        return [make(CameraNode, file=str(video))]
+    if name == "play_bag":
+        with BagWriter(folder / "bag") as bag:
+            bag.write_camera_info(BAG_TOPIC, 1, "camera", session_camera())
+        return [make(PlayBagNode, bag=str(folder / "bag"))]
+    if name == "tracker":
+        return [make(TrackerNode, rep155_id="ID")]
+    return [make(InitializerNode)]
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_the_document_has_every_topic_and_service(
+    name: str, make: Callable[..., Any], tmp_path: Path
+) -> None:
+    topics: set[Topic] = set()
+    services: set[str] = set()
+    for node in nodes_called(name, make, tmp_path):
+        found = interface_of(node)
+        topics |= found[0]
+        services |= found[1]
+    assert topics, name
+    written_topics, written_services = table(name)
+    assert sorted(written_topics) == sorted(topics)
+    assert written_services == services
+
+
+def published() -> dict[str, Topic]:
+    return {
+        topic.name: topic for node in NODES for topic in table(node)[0] if topic.direction == "out"
+    }
+
+
+def displays() -> list[dict[str, Any]]:
+    text = (ROOT / "config" / "cardbox.rviz").read_text(encoding="utf-8")
+    found: list[dict[str, Any]] = yaml.safe_load(text)["Visualization Manager"]["Displays"]
+    return found
+
+
+KINDS = {
+    "RobotModel": "std_msgs/String",
+    "MarkerArray": "visualization_msgs/MarkerArray",
+    "PoseArray": "geometry_msgs/PoseArray",
+    "Image": "sensor_msgs/Image",
+}
+
+
+def test_rviz_subscribes_to_what_is_published_with_a_qos_that_fits() -> None:
+    shown = [d for d in displays() if "Topic" in d or "Description Topic" in d]
+    assert {d["Class"].split("/")[1] for d in shown} == set(KINDS)
+    for display in shown:
+        topic = display.get("Topic") or display["Description Topic"]
+        source = published()[topic["Value"]]
+        assert KINDS[display["Class"].split("/")[1]] == source.kind
+        if source.qos.startswith("best effort"):
+            assert topic["Reliability Policy"] == "Best Effort"
+        latched = topic["Durability Policy"] == "Transient Local"
+        assert latched == source.qos.startswith("latched")
+
+
+def test_the_launch_file_moves_every_topic_of_the_layout_into_the_namespace() -> None:
+    text = (ROOT / "launch" / "nodes.launch.py").read_text(encoding="utf-8")
+    (names,) = re.findall(r"(?m)^LAYOUT_TOPICS = \((.*)\)$", text)
+    shown = [d.get("Topic") or d.get("Description Topic") for d in displays()]
+    assert set(re.findall(r'"(\w+)"', names)) == {t["Value"].lstrip("/") for t in shown if t}
+
+
+def test_rviz_stands_on_the_root_of_the_person() -> None:
+    text = (ROOT / "config" / "cardbox.rviz").read_text(encoding="utf-8")
+    manager = yaml.safe_load(text)["Visualization Manager"]
+    assert manager["Global Options"]["Fixed Frame"] == ROOT_LINK
+
+
+def panels(layout: Any) -> set[str]:
+    if isinstance(layout, str):
+        return {layout}
+    return panels(layout["first"]) | panels(layout["second"])
+
+
+def test_foxglove_shows_what_is_published() -> None:
+    layout = json.loads((ROOT / "config" / "cardbox_foxglove.json").read_text(encoding="utf-8"))
+    assert panels(layout["layout"]) == set(layout["configById"])
+    text = json.dumps(layout["configById"])
+    named = set(re.findall(r'"(/[a-z_/]+)(?:[.\[][^"]*)?"', text))
+    assert {"/overlay", "/markers", "/robot_description", "/diagnostics"} <= named
+    assert "/joint_states" in named
+    assert named <= set(published())
+    plotted = re.findall(r'"/joint_states\.position\[(\d+)\]", "label": "(\w+)"', text)
+    assert len(plotted) == 11
+    for index, label in plotted:
+        assert JOINT_NAMES[int(index)] == label
+
+
+PARAMETER = re.compile(r"-p (\w+):=")
+REMAPPED = re.compile(r"-r ([\w/]+):=")
+
+
+def lines_that_start(node: str) -> list[str]:
+    """Command lines of that node in the documents, ``ros2 run`` or not."""
+    text = "\n".join(
+        path.read_text(encoding="utf-8").replace("\\\n", " ")
+        for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    )
+    return re.findall(rf"(?m)^    (?:ros2 run cardbox_tracker )?{node}(?: .*)?$", text)
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_commands_give_nodes_what_they_have(
+    name: str, make: Callable[..., Any], tmp_path: Path
+) -> None:
+    lines = lines_that_start(name)
+    assert lines, f"no document starts {name}"
+    node = nodes_called(name, make, tmp_path)[0]
+    topics = {topic.name for topic in table(name)[0]}
+    for line in lines:
+        for parameter in PARAMETER.findall(line):
+            assert node.has_parameter(parameter), line
+        for topic in REMAPPED.findall(line):
+            assert topic == "__ns" or full(topic) in topics, line
+
+
+def test_commands_give_nodes_in_one_process_what_they_have(
+    make: Callable[..., Any], tmp_path: Path
+) -> None:
+    lines = lines_that_start("cardbox_nodes")
+    assert lines
+    for line in lines:
+        given = re.findall(r"-p (\w+):(\w+):=", line)
+        assert len(given) == line.count(":="), line
+        for node, parameter in given:
+            assert nodes_called(node, make, tmp_path)[0].has_parameter(parameter), line
+
+
+def test_command_lines_of_play_bag_parse() -> None:
+    from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
+
+    for line in lines_that_start("play_bag"):
+        assert overrides_from(line.split()[1:])
+
+
+def test_services_and_topics_in_commands_are_documented() -> None:
+    text = "\n".join(
+        path.read_text(encoding="utf-8")
+        for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    )
+    services = {service for node in NODES for service in table(node)[1]}
+    called = re.findall(r"(?:ros2 service|cardbox) call ([\w/]+)", text)
+    assert len(called) > 5
+    assert {full(name) for name in called} <= services
+    echoed = re.findall(r"ros2 topic echo ([\w/]+)", text)
+    assert len(echoed) > 3
+    assert set(echoed) <= set(published())

@@ -1,0 +1,101 @@
+"""Losses are seen by the stamps, and what a node says of itself changes with its state."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics, StreamStatistics
+
+PERIOD_NS = 66_666_667
+
+
+def fed(frames: list[int]) -> StreamStatistics:
+    statistics = StreamStatistics()
+    for frame in frames:
+        statistics.add(1_000_000_000 + frame * PERIOD_NS)
+    return statistics
+
+
+def test_nothing_lost_in_an_even_stream() -> None:
+    statistics = fed(list(range(100)))
+    assert (statistics.received, statistics.dropped, statistics.loss) == (100, 0, 0.0)
+    assert statistics.period_ns == pytest.approx(PERIOD_NS)
+
+
+def test_jitter_is_no_loss() -> None:
+    statistics = StreamStatistics()
+    for frame in range(100):
+        statistics.add(frame * PERIOD_NS + (frame % 3) * 8_000_000)
+    assert statistics.dropped == 0
+
+
+def test_missing_stamps_are_counted() -> None:
+    statistics = fed([frame for frame in range(100) if frame not in (40, 41, 60)])
+    assert statistics.dropped == 3
+    assert statistics.loss == pytest.approx(0.03, abs=0.005)
+
+
+def test_heavy_loss_is_seen() -> None:
+    kept = [0, 1, 9, 10, 21, 30, 31, 44, 45, 60, 61, 75]
+    assert fed(kept).loss > 0.5
+
+
+def test_a_pause_of_the_source_is_no_loss() -> None:
+    statistics = fed([*range(20), *range(200, 220)])
+    assert statistics.dropped == 0
+
+
+def test_the_period_is_that_of_the_latest_stamps() -> None:
+    frames = [*range(200), *range(201, 601, 2)]
+    assert fed(frames).period_ns == pytest.approx(2 * PERIOD_NS)
+
+
+def test_stamps_that_go_back_are_noticed() -> None:
+    statistics = fed(list(range(20)))
+    assert not statistics.add(0)
+    assert statistics.went_back == 1
+    assert statistics.add(PERIOD_NS)
+
+
+def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callable) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    diagnostics.wait_for("pictures on /image_raw")
+    status = diagnostics._status()
+    assert (status.level, status.message) == (
+        DiagnosticStatus.WARN,
+        "waiting for pictures on /image_raw",
+    )
+    diagnostics.problem("the picture has encoding '16UC3'")
+    assert diagnostics._status().level == DiagnosticStatus.ERROR
+    diagnostics.working(sent_ns=1)
+    status = diagnostics._status()
+    assert (status.level, status.message) == (DiagnosticStatus.OK, "working")
+    assert {value.key for value in status.values} >= {
+        "rate in (Hz)",
+        "rate out (Hz)",
+        "latency p95 (ms)",
+        "dropped (by stamps)",
+    }
+
+
+def test_a_warning_stays_until_the_end(make_node: Callable) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    diagnostics.warn("incompatible QoS on /silhouette")
+    diagnostics.working()
+    status = diagnostics._status()
+    assert status.level == DiagnosticStatus.WARN
+    assert "incompatible QoS on /silhouette" in [value.value for value in status.values]
+
+
+def test_a_result_that_takes_longer_than_a_period_is_late(make_node: Callable) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    for frame in range(10):
+        diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
+    diagnostics.working(sent_ns=time.time_ns() - 60 * PERIOD_NS)
+    diagnostics.working(sent_ns=time.time_ns() + 60 * PERIOD_NS)
+    values = {value.key: value.value for value in diagnostics._status().values}
+    assert (values["late"], values["published"], values["received"]) == ("1", "2", "10")

@@ -1,0 +1,110 @@
+"""Nodes of one process are handed the message itself; everybody else gets it by DDS."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.runtime.handover import Handover  # noqa: E402
+from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+
+
+@pytest.fixture
+def make(make_node: Callable[..., Any]) -> Iterator[Callable[..., CardboxNode]]:
+    """Return a function that makes nodes of one process."""
+    context = make_node(name="outside").context
+    nodes: list[CardboxNode] = []
+
+    def create(name: str, handover: Handover | None) -> CardboxNode:
+        node = CardboxNode(name, handover, context=context, enable_rosout=False)
+        nodes.append(node)
+        return node
+
+    yield create
+    for node in nodes:
+        node.destroy_node()
+
+
+def test_takers_get_the_message_itself_at_once_and_in_order(make: Callable[..., Any]) -> None:
+    handover, taken = Handover(), []
+    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
+    for name in ("first", "second"):
+        make(name, handover).subscribe(
+            String, "words", lambda word, _, name=name: taken.append((name, word)), qos.RESULT
+        )
+    word = String(data="hello")
+    publisher.publish(word)
+    assert [name for name, _ in taken] == ["first", "second"]
+    assert all(item is word for _, item in taken)
+
+
+def test_a_taker_learns_when_it_was_handed_over(make: Callable[..., Any]) -> None:
+    handover, sent_ns = Handover(), []
+    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
+    make("taker", handover).subscribe(
+        String, "words", lambda _, sent: sent_ns.append(sent), qos.RESULT
+    )
+    before = time.time_ns()
+    publisher.publish(String())
+    assert before <= sent_ns[0] <= time.time_ns()
+
+
+def test_an_error_of_one_taker_is_its_own(make: Callable[..., Any]) -> None:
+    handover, taken = Handover(), []
+    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
+    failing = make("failing", handover)
+
+    def fail(_: String, __: int) -> None:
+        raise CardboxError("as told")
+
+    failing.subscribe(String, "words", fail, qos.RESULT)
+    make("taker", handover).subscribe(String, "words", lambda w, _: taken.append(w), qos.RESULT)
+    publisher.publish(String(data="hello"))
+    assert taken[0].data == "hello"
+    assert failing.diagnostics._problem == "as told"
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_what_is_not_handed_over_goes_by_dds(make: Callable[..., Any], shared: bool) -> None:
+    """A topic that is only advertised, or nodes that share nothing."""
+    handover = Handover() if shared else None
+    giver, taker = make("giver", handover), make("taker", handover)
+    offer = giver.advertise if shared else giver.hand_over
+    publisher = offer(String, "words", qos.RESULT)
+    taken: list[str] = []
+    taker.subscribe(String, "words", lambda word, _: taken.append(word.data), qos.RESULT)
+    hear(taker, publisher, taken)
+
+
+def test_other_processes_get_it_too(make: Callable[..., Any]) -> None:
+    handover, inside, outside = Handover(), [], []
+    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
+    make("taker", handover).subscribe(String, "words", lambda w, _: inside.append(w), qos.RESULT)
+    other = make("other", None)
+    other.subscribe(String, "words", lambda word, _: outside.append(word.data), qos.RESULT)
+    hear(other, publisher, outside)
+    assert inside[-1].data == "hello"
+
+
+def hear(node: Any, publisher: Any, taken: list[str]) -> None:
+    """Publish until ``node`` took it by DDS, never within the call."""
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    end = time.monotonic() + 30
+    while not taken:
+        assert time.monotonic() < end
+        publisher.publish(String(data="hello"))
+        assert not taken
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    assert taken[0] == "hello"

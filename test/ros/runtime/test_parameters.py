@@ -1,0 +1,230 @@
+"""Parameters come from one dataclass, are checked together, and change while the node runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rcl_interfaces.msg import ParameterType
+from rclpy.parameter import Parameter
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
+from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.ros import parameter_docs
+from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
+from cardbox_tracker.ros.nodes.node_parameters import (
+    NODES,
+    BackgroundParameters,
+    InitializerParameters,
+    TrackerParameters,
+)
+from cardbox_tracker.ros.runtime.parameters import LiveParameters, NodeParameters, parameter
+from cardbox_tracker.vision.background import BackgroundConfig
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Sample(NodeParameters):
+    """Parameters of a test."""
+
+    low: float = parameter(1.0, "lower end", unit="m", limits=(0.0, 10.0))
+    high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
+    count: int = parameter(3, "a count", limits=(1, 5))
+    kind: str = parameter("a", "a kind", choices=("a", "b"))
+    fixed: bool = parameter(False, "only at the start", read_only=True)
+    names: list[str] = parameter([], "some names")
+
+    def check(self) -> None:
+        """The ends have an order."""
+        if self.low > self.high:
+            raise ValueError(f"low is {self.low:g}, above high {self.high:g}; lower it")
+
+
+def set_values(node: Any, **values: Any) -> tuple[bool, str]:
+    result = node.set_parameters_atomically([Parameter(k, value=v) for k, v in values.items()])
+    return result.successful, result.reason
+
+
+def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:
+    node = make_node()
+    assert LiveParameters(node, Sample).value == Sample()
+    low = node.describe_parameter("low")
+    assert low.description == "lower end [m]"
+    assert (low.floating_point_range[0].from_value, low.floating_point_range[0].to_value) == (0, 10)
+    assert node.describe_parameter("count").integer_range[0].to_value == 5
+    assert node.describe_parameter("fixed").read_only
+    assert node.describe_parameter("names").type == ParameterType.PARAMETER_STRING_ARRAY
+    assert node.describe_parameter("kind").additional_constraints == "one of: a | b"
+
+
+def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
+    node = make_node()
+    seen: list[Sample] = []
+    live = LiveParameters(node, Sample, seen.append)
+    assert set_values(node, low=1.5, names=["x", "y"]) == (True, "")
+    assert live.value == Sample(low=1.5, names=["x", "y"])
+    assert seen == [live.value]
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"low": 11.0}, "out of range"),
+        ({"low": float("nan")}, "out of range"),
+        ({"count": 6}, "out of range"),
+        ({"low": "much"}, "Wrong parameter type"),
+        ({"kind": "c"}, "kind is 'c'; expected one of a, b"),
+        ({"fixed": True}, "read-only"),
+        ({"low": 3.0}, "low is 3, above high 2; lower it"),
+    ],
+)
+def test_wrong_value_is_refused_with_the_reason_and_the_old_one_stays(
+    make_node: Callable, values: dict[str, Any], reason: str
+) -> None:
+    node = make_node()
+    seen: list[Sample] = []
+    live = LiveParameters(node, Sample, seen.append)
+    accepted, text = set_values(node, **values)
+    assert not accepted
+    assert reason in text
+    assert live.value == Sample()
+    assert {name: node.get_parameter(name).value for name in ("low", "kind", "fixed")} == {
+        "low": 1.0,
+        "kind": "a",
+        "fixed": False,
+    }
+    assert seen == []
+
+
+def test_values_are_checked_together(make_node: Callable) -> None:
+    node = make_node()
+    live = LiveParameters(node, Sample)
+    assert set_values(node, low=5.0, high=6.0)[0]
+    assert (live.value.low, live.value.high) == (5.0, 6.0)
+
+
+def test_values_of_the_start_are_taken(make_node: Callable) -> None:
+    node = make_node("-p", "low:=0.5", "-p", "names:=[a, b]")
+    assert LiveParameters(node, Sample).value == Sample(low=0.5, names=["a", "b"])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("low:=-1.0", ("low", "range", "lower end")),
+        ("low:=3.0", ("low is 3", "lower it")),
+        ("kind:=c", ("kind is 'c'", "a, b")),
+        ("count:=many", ("count", "a count")),
+    ],
+)
+def test_wrong_value_at_the_start_says_which_and_why(
+    make_node: Callable, given: str, words: tuple[str, ...]
+) -> None:
+    node = make_node("-p", given)
+    with pytest.raises(CardboxError) as caught:
+        LiveParameters(node, Sample)
+    for word in ("tested", *words):
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", NODES.values(), ids=NODES.keys())
+def test_every_parameter_has_a_description_and_a_default_in_its_range(
+    kind: type[NodeParameters],
+) -> None:
+    for name, spec in kind.specs().items():
+        assert spec.description and not spec.description.endswith(".")
+        default = parameter_docs.default_of(kind, name)
+        if spec.choices:
+            assert default in spec.choices
+        if spec.minimum is not None and spec.maximum is not None:
+            assert spec.minimum <= default <= spec.maximum
+
+
+@pytest.mark.parametrize("node_name", NODES)
+def test_every_node_can_declare_its_parameters(make_node: Callable, node_name: str) -> None:
+    arguments = ("-p", "bag:=some") if node_name == "play_bag" else ()
+    LiveParameters(make_node(*arguments, name=node_name), NODES[node_name])
+
+
+@pytest.mark.parametrize("name", parameter_docs.files())
+def test_committed_files_are_the_generated_ones(name: str) -> None:
+    path = ROOT / name
+    assert path.exists(), f"{name} is missing: run python -m tools.parameter_docs"
+    assert path.read_text(encoding="utf-8") == parameter_docs.files()[name], (
+        f"{name} is stale: run python -m tools.parameter_docs"
+    )
+
+
+@pytest.mark.parametrize("node_name", NODES)
+def test_ros_reads_the_generated_file_as_the_defaults(make_node: Callable, node_name: str) -> None:
+    path = ROOT / "config" / f"{node_name}.yaml"
+    extra = ("-p", "bag:=some") if node_name == "play_bag" else ()
+    node = make_node("--params-file", str(path), *extra, name=node_name)
+    expected = PlayBagParameters(bag="some") if extra else NODES[node_name]()
+    assert LiveParameters(node, NODES[node_name]).value == expected
+
+
+@pytest.mark.parametrize("node_name", NODES)
+def test_one_file_has_the_parameters_of_all_nodes_in_any_namespace(
+    make_node: Callable, node_name: str, tmp_path: Path
+) -> None:
+    changed = tmp_path / "nodes.yaml"
+    text = (ROOT / "config" / "cardbox_nodes.yaml").read_text()
+    changed.write_text(text.replace('model_file: ""', f'model_file: "{node_name}"'))
+    extra = ("-p", "bag:=some") if node_name == "play_bag" else ()
+    arguments = ("--params-file", str(changed), "-r", "__ns:=/left", *extra)
+    value = LiveParameters(make_node(*arguments, name=node_name), NODES[node_name]).value
+    if hasattr(value, "model_file"):
+        assert value == NODES[node_name](model_file=node_name)  # type: ignore[call-arg]
+    else:
+        assert value == (PlayBagParameters(bag="some") if extra else NODES[node_name]())
+
+
+def test_defaults_of_the_core_are_not_written_twice() -> None:
+    assert BackgroundParameters().config() == BackgroundConfig()
+    assert InitializerParameters().config() == InitializationConfig()
+    for preset, make in PRESETS.items():
+        assert TrackerParameters(preset=preset).config() == make()
+
+
+def test_every_background_setting_is_a_parameter() -> None:
+    names = {entry.name for entry in fields(BackgroundParameters)}
+    assert {entry.name for entry in fields(BackgroundConfig)} <= names
+
+
+def test_tracker_settings_override_the_preset() -> None:
+    config = TrackerParameters(
+        preset="paper",
+        strategy="srs",
+        particles=50,
+        arm_survival_rate=0.3,
+        torso_translation_noise_m=0.05,
+        recover="always",
+    ).config()
+    assert isinstance(config, TrackerConfig)
+    assert config.strategy == "srs" and config.recover
+    assert config.torso.particles == config.arm.particles == 50
+    assert config.arm.survival_rate == 0.3
+    assert config.torso.survival_rate == TrackerConfig().torso.survival_rate
+    assert config.torso.translation_noise_m == 0.05
+
+
+def test_settings_that_do_not_go_together_are_refused(make_node: Callable) -> None:
+    node = make_node()
+    live = LiveParameters(node, TrackerParameters)
+    accepted, reason = set_values(node, particles=10, average=50)
+    assert not accepted and "average is 50" in reason
+    assert live.value == TrackerParameters()
+
+
+@pytest.mark.parametrize("value", [1e-5, 0.1, 2.0, 0.00012])
+def test_yaml_floats_stay_floats(value: float) -> None:
+    import yaml
+
+    assert yaml.safe_load(parameter_docs.yaml_value(value)) == pytest.approx(value)
+    assert isinstance(yaml.safe_load(parameter_docs.yaml_value(value)), float)

@@ -1,0 +1,122 @@
+"""The layers of the package: a module imports only what stands below it, never in a circle."""
+
+from __future__ import annotations
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = "cardbox_tracker"
+SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
+
+# From the bottom to the top: a module imports from its own folder and from the layers before.
+# Folders named together do not import each other.
+LAYERS: tuple[tuple[str, ...], ...] = (
+    ("errors", "files", "progress"),
+    ("body",),
+    ("vision", "description"),
+    ("estimation",),
+    ("drawing",),
+    ("recordings",),
+    ("simulation",),
+    ("evaluation",),
+    ("ros",),
+    ("demo",),
+    ("benchmarks",),
+    ("commands",),
+)
+# The layers inside a folder; what is not named may use all of them.
+INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {
+    "estimation": (("cost",), ("config", "filtering"), ("initialization",)),
+    "ros": (("runtime", "messages"), ("nodes",)),
+}
+
+
+def modules(root: Path) -> dict[str, Path]:
+    """Return every module below ``root`` by its name within the package; "" is the package."""
+    found = {}
+    for path in sorted(root.rglob("*.py")):
+        parts = path.relative_to(root).with_suffix("").parts
+        found[".".join(part for part in parts if part != "__init__")] = path
+    return found
+
+
+def imports(path: Path, known: dict[str, Path]) -> set[str]:
+    """Return the modules of the package that a file imports, wherever in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.removeprefix(f"{PACKAGE}.") for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            module = node.module.removeprefix(PACKAGE).removeprefix(".")
+            for alias in node.names:
+                below = f"{module}.{alias.name}".removeprefix(".")
+                found.add(below if below in known else module)
+    return found & set(known) - {""}
+
+
+def rank(module: str, layers: tuple[tuple[str, ...], ...], depth: int) -> int:
+    """Return the number of the layer that holds ``module``, or that above all if none does."""
+    name = ".".join(module.split(".")[depth : depth + 1])
+    return next((i for i, layer in enumerate(layers) if name in layer), len(layers))
+
+
+def is_upward(module: str, other: str) -> bool:
+    """Return whether ``module`` must not import ``other``."""
+    (top, *inner), (other_top, *other_inner) = module.split("."), other.split(".")
+    if top != other_top:
+        return rank(module, LAYERS, 0) <= rank(other, LAYERS, 0) and rank(module, LAYERS, 0) > 0
+    if inner[:1] == other_inner[:1] or top not in INSIDE:
+        return False
+    return rank(other, INSIDE[top], 1) > rank(module, INSIDE[top], 1)
+
+
+def upward(root: Path) -> list[str]:
+    """Return every import that points to a higher layer, or beside it in the same one."""
+    known = modules(root)
+    return [
+        f"{module} -> {other}"
+        for module, path in known.items()
+        if module  # the public API is a list of what stands anywhere below
+        for other in sorted(imports(path, known))
+        if is_upward(module, other)
+    ]
+
+
+def test_every_folder_has_its_layer() -> None:
+    names = {module.split(".")[0] for module in modules(SOURCES) if module}
+    assert names == {name for layer in LAYERS for name in layer}
+
+
+def test_nothing_imports_upwards() -> None:
+    assert upward(SOURCES) == []
+
+
+def test_there_is_no_circle() -> None:
+    known = modules(SOURCES)
+    graph = {module: imports(path, known) - {module} for module, path in known.items() if module}
+    TopologicalSorter(graph).prepare()
+
+
+def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
+    for name, text in (
+        ("body/low.py", "def late():\n    from cardbox_tracker.ros import high\n"),
+        ("ros/high.py", "import cardbox_tracker.body.low\n"),
+        ("vision/a.py", "from cardbox_tracker.description import b\n"),
+        ("description/b.py", ""),
+        ("estimation/cost/c.py", "from cardbox_tracker.estimation.filtering.d import x\n"),
+        ("estimation/filtering/d.py", "x = 1\n"),
+    ):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    assert upward(tmp_path) == [
+        "body.low -> ros.high",
+        "estimation.cost.c -> estimation.filtering.d",
+        "vision.a -> description.b",
+    ]
+    known = modules(tmp_path)
+    with pytest.raises(CycleError):
+        TopologicalSorter({m: imports(p, known) for m, p in known.items()}).prepare()

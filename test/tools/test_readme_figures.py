@@ -1,0 +1,90 @@
+"""Every number of the README that an evaluation gave is that of the committed results."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cardbox_tracker.evaluation.paper.report import recorded_results
+from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from tools.readme_figures import BEGIN, END, current, main, readme_section, replaced
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "docs" / "evaluation"
+
+
+def readme() -> str:
+    return (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def section() -> str:
+    return readme().split(BEGIN)[1].split(END)[0]
+
+
+def test_the_readme_is_up_to_date() -> None:
+    """If not: python -m tools.readme_figures."""
+    assert current(ROOT) == readme()
+    assert main(["--check", "--root", str(ROOT)]) == 0
+
+
+def test_each_number_of_the_table_is_in_the_results() -> None:
+    """The table read back, apart from the code that wrote it."""
+    sources = {"": read_json(RESULTS / "results.json")} | recorded_results(RESULTS)
+    rows = [line.strip("|").split("|") for line in section().splitlines() if " px |" in line]
+    seen = []
+    for name, *cells in rows:
+        motion, _, session = name.strip().rstrip(")").partition(" (")
+        figures = sources[session][motion]
+        drs, srs = figures["drs"], figures["srs"]
+        expected = [
+            100 * drs["mpjpe_m"],
+            100 * srs["mpjpe_m"],
+            50 * (drs["error_m"]["left_hand"] + drs["error_m"]["right_hand"]),
+            50 * (srs["error_m"]["left_hand"] + srs["error_m"]["right_hand"]),
+        ]
+        assert [float(cell.split()[0]) for cell in cells[:4]] == pytest.approx(expected, abs=0.051)
+        costs = [drs["mean_cost_px"], srs["mean_cost_px"]]
+        assert [float(cell.split()[0]) for cell in cells[4:]] == pytest.approx(costs, abs=0.51)
+        seen.append((session, motion))
+    assert seen == [(name, m) for name, results in sources.items() for m in motions_in(results)]
+
+
+def test_no_error_or_cost_stands_outside_the_marks() -> None:
+    outside = readme().split(BEGIN)[0] + readme().split(END)[1]
+    assert re.findall(r"\d[\d.]*\s*(?:cm|px)\b", outside) == []
+
+
+def hand_made() -> dict[str, Any]:
+    strategy = {
+        "mpjpe_m": 0.1234,
+        "error_m": {"left_hand": 0.2, "right_hand": 0.3},
+        "mean_cost_px": 987.6,
+    }
+    mean = {"mean": {"mpjpe_m": 0.05}}
+    return {
+        "runs": 7,
+        "quick": True,
+        "wave": {"drs": strategy, "srs": strategy},
+        "experiments": {"variants": {"paper": mean, "default": mean}},
+    }
+
+
+def test_section_by_hand() -> None:
+    results = hand_made()
+    text = readme_section(results, {"person": {"reach": results["wave"]}})
+    row = "12.3 cm | 12.3 cm | 25.0 cm | 25.0 cm | 988 px | 988 px |"
+    assert f"| wave | {row}" in text
+    assert f"| reach (person) | {row}" in text
+    assert "7 runs (a quick run)" in text
+    assert "5.0 cm instead of 5.0 cm" in " ".join(text.split())
+    assert max(len(line) for line in text.splitlines()) <= 100
+
+
+def test_marks_are_needed_once() -> None:
+    assert replaced(f"a {BEGIN}old{END} b", "new") == f"a {BEGIN}\nnew\n{END} b"
+    for text in ("", BEGIN, f"{BEGIN}{END}{BEGIN}{END}"):
+        with pytest.raises(ValueError, match="needs the marks"):
+            replaced(text, "new")

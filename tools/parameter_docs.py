@@ -1,0 +1,123 @@
+"""Write ``config/<node>.yaml`` and ``docs/parameters.md`` from the parameter dataclasses.
+
+python -m tools.parameter_docs [ROOT] [--check]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.runtime.parameters import NodeParameters, ParameterSpec
+
+_GENERATED = "made by 'python -m tools.parameter_docs'; edit ros/nodes/node_parameters.py"
+_TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}
+
+
+def yaml_value(value: Any) -> str:
+    """Return a parameter's value as YAML that the ROS parser reads as the right type."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        text = repr(value)
+        # YAML 1.1 takes 1e-05 for a text.
+        return f"{value:.10f}".rstrip("0") if "e" in text else text
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value)
+
+
+def default_of(kind: type[NodeParameters], name: str) -> Any:
+    """Return the default of the parameter ``name``; lists are empty."""
+    return getattr(kind, name, [])
+
+
+def _details(spec: ParameterSpec) -> str:
+    parts = [spec.unit, spec.range_text, "read-only" if spec.read_only else "live"]
+    return "; ".join(part for part in parts if part)
+
+
+def config_text(kind: type[NodeParameters]) -> str:
+    """Return the YAML file of one node, with every parameter at its default."""
+    lines = [f"# {kind.__doc__}", f"# {_GENERATED}", "/**:", *_section(kind)]
+    return "\n".join(lines) + "\n"
+
+
+def all_config_text() -> str:
+    """Return the YAML file of ``cardbox_nodes``: all nodes, each in any namespace."""
+    lines = ["# All nodes in one process (cardbox_nodes).", f"# {_GENERATED}"]
+    for node, kind in NODES.items():
+        lines += [f"/**/{node}:", *_section(kind)]
+    return "\n".join(lines) + "\n"
+
+
+def _section(kind: type[NodeParameters]) -> list[str]:
+    lines = ["  ros__parameters:"]
+    for name, spec in kind.specs().items():
+        value = default_of(kind, name)
+        lines.append(f"    # {spec.description} ({_details(spec)})")
+        # The ROS parser does not take an empty list, so it is shown as a comment.
+        lines.append(f"    # {name}: []" if value == [] else f"    {name}: {yaml_value(value)}")
+    return lines
+
+
+def markdown_text() -> str:
+    """Return the page that describes the parameters of all nodes."""
+    lines = [
+        "# Parameters",
+        "",
+        f"<!-- {_GENERATED} -->",
+        "",
+        "Set them in `config/<node>.yaml`, with `--ros-args -p name:=value`, or, where live, with",
+        "`ros2 param set`; a live change takes effect at the next picture. A wrong value is",
+        "refused with the reason, and the old one stays. Every topic's QoS can be overridden at",
+        "the start with",
+        "`qos_overrides.<topic>.<publisher|subscription>.<reliability|depth|history|durability>`.",
+    ]
+    for node, kind in NODES.items():
+        lines += ["", f"## {node}", "", f"{kind.__doc__}", ""]
+        lines += ["| name | type | default | unit | allowed | live | what it does |"]
+        lines += ["|---|---|---|---|---|---|---|"]
+        types = kind.types()
+        for name, spec in kind.specs().items():
+            type_name = _TYPE_NAMES.get(types[name]) or types[name].__name__
+            live = "no" if spec.read_only else "yes"
+            allowed = spec.range_text.replace("|", "\\|")
+            lines.append(
+                f"| `{name}` | {type_name} | `{yaml_value(default_of(kind, name))}` | {spec.unit} "
+                f"| {allowed} | {live} | {spec.description} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def files() -> dict[str, str]:
+    """Return every generated file: path below the repository to its text."""
+    texts = {f"config/{node}.yaml": config_text(kind) for node, kind in NODES.items()}
+    texts["config/cardbox_nodes.yaml"] = all_config_text()
+    return {**texts, "docs/parameters.md": markdown_text()}
+
+
+def main(args: list[str] | None = None) -> int:
+    """Write the files, or with ``--check`` only compare; 1 if they differ."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("root", nargs="?", type=Path, default=Path("."))
+    parser.add_argument("--check", action="store_true", help="only compare")
+    given = parser.parse_args(args)
+    stale = []
+    for name, text in files().items():
+        path = given.root / name
+        if path.exists() and path.read_text(encoding="utf-8") == text:
+            continue
+        stale.append(name)
+        if not given.check:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+    print("\n".join(f"{'differs' if given.check else 'written'}: {name}" for name in stale))
+    return 1 if stale and given.check else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+"""The README's numbers, made from the committed results of evaluation and benchmarks.
+
+``python -m tools.readme_figures`` writes them between their marks in ``README.md``;
+with ``--check`` it only says whether they differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cardbox_tracker.benchmarks import report as benchmark_report
+from cardbox_tracker.evaluation.paper.report import recorded_results
+from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from cardbox_tracker.files import atomic_path
+
+BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
+RESULTS = Path("docs/evaluation")
+BENCHMARKS = Path("docs/benchmarks.json")
+
+
+def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the text between the marks, from ``results.json`` of all and of each session."""
+    quick = " (a quick run)" if results["quick"] else ""
+    lines = [
+        *_wrapped(
+            f"Mean over {results['runs']} runs{quick} with the paper's parameters on a synthetic "
+            "person, exact truth; DRS is the paper's resampling, SRS what it is compared with:"
+        ),
+        "",
+        "| motion | 3D error DRS | SRS | hands DRS | SRS | cost DRS | SRS |",
+        "|---|---|---|---|---|---|---|",
+        *(_row(m, results[m]) for m in motions_in(results)),
+    ]
+    for name, session in recorded.items():
+        lines += [_row(f"{m} ({name})", session[m]) for m in motions_in(session)]
+    variants = results["experiments"]["variants"]
+    error = {name: _cm(variants[name]["mean"]["mpjpe_m"]) for name in ("paper", "default")}
+    text = "3D error: mean distance of shoulders, elbows and hands. "
+    if recorded:
+        text += "Rows with a session's name are recordings of a realistic body. "
+    text += (
+        "With the preset `default` instead of the paper's the error on the synthetic motions is "
+        f"{error['default']} instead of {error['paper']}."
+    )
+    lines += ["", *_wrapped(text)]
+    return "\n".join(lines)
+
+
+def replaced(text: str, section: str, begin: str = BEGIN, end: str = END) -> str:
+    """Return the README ``text`` with ``section`` between the marks.
+
+    Raises:
+        ValueError: the marks are not there, each once.
+    """
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise ValueError(f"the README needs the marks {begin} and {end}, each once")
+    before, rest = text.split(begin)
+    return f"{before}{begin}\n{section}\n{end}{rest.split(end)[1]}"
+
+
+def current(root: Path) -> str:
+    """Return what the README in ``root`` should read."""
+    folder = root / RESULTS
+    section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
+    text = replaced((root / "README.md").read_text(encoding="utf-8"), section)
+    speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))
+    return replaced(text, speed, benchmark_report.BEGIN, benchmark_report.END)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or check; return 1 if a check found a difference."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--root", type=Path, default=Path(), help="folder of the repository")
+    given = parser.parse_args(arguments)
+    path = given.root / "README.md"
+    text = current(given.root)
+    if text == path.read_text(encoding="utf-8"):
+        return 0
+    print(f"{'differs' if given.check else 'written'}: {path}")
+    if not given.check:
+        with atomic_path(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return 1 if given.check else 0
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False)
+
+
+def _row(name: str, motion: Mapping[str, Any]) -> str:
+    cells = [name]
+    cells += [_cm(motion[s]["mpjpe_m"]) for s in ("drs", "srs")]
+    for strategy in ("drs", "srs"):
+        errors = motion[strategy]["error_m"]
+        cells.append(_cm((errors["left_hand"] + errors["right_hand"]) / 2))
+    cells += [f"{motion[s]['mean_cost_px']:.0f} px" for s in ("drs", "srs")]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _cm(value_m: float) -> str:
+    return f"{100 * value_m:.1f} cm"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,166 @@
+"""The images of the documents, made by the code that they show.
+
+``python -m tools.screenshots --output docs/images`` writes them.
+
+A synthetic session is recorded, its person measured and tracked, all without ROS; the same seed
+gives the same pictures. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` a picture, its
+silhouette and the model over it, ``guidance.jpg`` what a person sees who is to be measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.drawing.guidance import draw_guidance
+from cardbox_tracker.drawing.overlay import Picture, draw_overlay
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.initialization.guidance import instruction
+from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.progress import progress_bar
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.initialize import initialize_from_recording
+from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.simulation.motions import Segment, timeline
+from cardbox_tracker.simulation.session import synthesize_session
+
+_SCALE = 2
+_QUALITY = 82
+_WIDTH_PX = 1200
+# Moments that show most, as fractions of each motion.
+_MOMENTS = {"wave": 0.53, "bend": 0.63, "bow": 0.45}
+# Not yet quite in the posture, so that the picture shows what the outline is for.
+_BEFORE_ARMS_S = 0.45
+_SETTLED_S = 0.3
+
+
+def write_screenshots(
+    output: Path, seed: int, progress: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Write the pictures into the folder ``output`` and return their paths.
+
+    Raises:
+        CardboxError: the folder cannot be written.
+    """
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    segments = {segment.name: segment for segment in reversed(timeline("all"))}
+    with tempfile.TemporaryDirectory() as folder:
+        session = Path(folder) / "session"
+        synthesize_session(
+            session, seed=seed, progress=progress and (lambda part: progress(part / 2))
+        )
+        with BagReader(session) as bag:
+            source = SilhouetteSource(bag, _inside(segments["empty"]))
+            shots = _shots(source, segments, seed)
+    if progress is not None:
+        progress(1.0)
+    return [_write(output / f"{name}.jpg", picture) for name, picture in shots.items()]
+
+
+def _shots(
+    source: SilhouetteSource, segments: Mapping[str, Segment], seed: int
+) -> dict[str, Picture]:
+    spans = {name: _inside(segments[name]) for name in REFERENCE_NAMES}
+    result = initialize_from_recording(source, spans, InitializationConfig(2.0, seed=seed))
+    moments = {
+        motion: segments[motion].start_s
+        + part * (segments[motion].end_s - segments[motion].start_s)
+        for motion, part in _MOMENTS.items()
+    }
+    overlays: dict[str, Picture] = {}
+    frames: dict[str, Frame] = {}
+    rng = np.random.default_rng(seed)
+    tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
+    for frame in source.frames(segments["neutral"].start_s, max(moments.values()) + 1.0):
+        estimate = tracker.track(frame.silhouette)
+        for motion, time_s in moments.items():
+            if motion not in overlays and frame.time_s >= time_s - 1e-6:
+                frames[motion] = frame
+                overlays[motion] = draw_overlay(
+                    frame.brightness, result.body, tracker.camera, estimate, _SCALE
+                )
+    steps = [frames["wave"].brightness, frames["wave"].silhouette]
+    return {
+        "tracking": _row([overlays[motion] for motion in _MOMENTS]),
+        "steps": _row([*map(_large, steps), overlays["wave"]]),
+        "guidance": _guidance(source, segments),
+    }
+
+
+def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Picture:
+    """What is shown before the references ``front`` and ``arms`` are captured."""
+    shown = []
+    for name, before_s, left_s in (("front", -_SETTLED_S, 1), ("arms", _BEFORE_ARMS_S, 3)):
+        frame = next(source.frames(segments[name].start_s - before_s))
+        shown.append(
+            draw_guidance(
+                frame.silhouette,
+                BodyModel(),
+                source.camera,
+                reference_posture(name),
+                instruction(name, "left"),
+                left_s,
+                _SCALE,
+            )
+        )
+    return _row(shown)
+
+
+def _inside(segment: Segment) -> TimeSpan:
+    """The segment without its ends, where the person still moves."""
+    return TimeSpan(segment.start_s + _SETTLED_S, segment.end_s - _SETTLED_S)
+
+
+def _large(picture: Picture) -> Picture:
+    large = cv2.resize(picture, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.cvtColor(large, cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def _row(pictures: list[Picture]) -> Picture:
+    """Pictures side by side with a white gap, ``_WIDTH_PX`` wide at most."""
+    gap = np.full((pictures[0].shape[0], 8, 3), 255, np.uint8)
+    row = np.hstack([part for picture in pictures for part in (gap, picture)][1:])
+    factor = min(1.0, _WIDTH_PX / row.shape[1])
+    size = (round(factor * row.shape[1]), round(factor * row.shape[0]))
+    return np.asarray(cv2.resize(row, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _write(path: Path, picture: Picture) -> Path:
+    data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data.tobytes())
+    return path
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the images; the exit code is 1 after an error told in words."""
+    parser = argparse.ArgumentParser(prog="python -m tools.screenshots", description=__doc__)
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder to fill")
+    parser.add_argument("--seed", type=int, default=0, help="of recording and filters")
+    options = parser.parse_args(arguments)
+    try:
+        with progress_bar("screenshots") as show:
+            written = write_screenshots(options.output, options.seed, show)
+    except CardboxError as error:
+        print(f"screenshots: {error}", file=sys.stderr)
+        return 1
+    print("\n".join(f"wrote {path}" for path in written))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
