@@ -3,7 +3,7 @@
 CardboxError
     BodyModelError       a body model file or a size
     CameraError          a calibration or a CameraInfo
-    EncodingError        a picture's encoding or its bytes
+    EncodingError        an image's encoding or its bytes
     InitializationError  the reference silhouettes cannot give a body
     BagError             a recording that cannot be read or written
 """
@@ -24,7 +24,7 @@ class CameraError(CardboxError):
 
 
 class EncodingError(CardboxError):
-    """A picture's encoding is unsupported, or its bytes do not match it."""
+    """An image's encoding is unsupported, or its bytes do not match it."""
 
 
 class InitializationError(CardboxError):

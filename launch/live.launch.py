@@ -1,4 +1,4 @@
-"""A camera, live: from its pictures to joint states, TF and markers.
+"""A camera, live: from its images to joint states, TF and markers.
 
     ros2 launch cardbox_tracker live.launch.py device:=/dev/video0 \
         calibration_file:=$HOME/camera.yaml person_distance_m:=2.0 camera_pitch_deg:=5.0
@@ -37,7 +37,7 @@ ARGUMENTS = {
     "horizontal_fov_deg": ("0.0", float, "field of view to assume without a calibration file"),
     "width": ("640", int, "width to ask the device for, px"),
     "height": ("480", int, "height to ask the device for, px"),
-    "rate_hz": ("15.0", float, "pictures a second"),
+    "rate_hz": ("15.0", float, "images a second"),
     "loop": ("false", _is_true, "play the file again and again"),
     "frame_id": ("camera_optical_frame", str, "name of the camera's optical frame"),
 }

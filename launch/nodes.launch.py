@@ -1,4 +1,4 @@
-"""The nodes behind a source of pictures: background, initializer, tracker, and TF and RViz.
+"""The nodes behind a source of images: background, initializer, tracker, and TF and RViz.
 
 Included by live.launch.py and replay.launch.py; start it alone beside a camera driver of your own:
 
@@ -36,7 +36,7 @@ PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 ARGUMENTS = {
     "namespace": ("", "namespace of all nodes, one per camera"),
     "config_dir": (str(SHARE / "config"), "folder of the nodes' YAML files"),
-    "image": ("image_raw", "topic of the pictures (without /compressed)"),
+    "image": ("image_raw", "topic of the images (without /compressed)"),
     "camera_info": ("camera_info", "topic of their CameraInfo"),
     "image_transport": ("raw", "raw, or compressed for the topic IMAGE/compressed"),
     "person_distance_m": ("2.0", "level distance from the camera to the person"),
@@ -76,7 +76,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *declared,
-            # Without it Fast DDS loses most large pictures; a profile of the user's own stays.
+            # Without it Fast DDS loses most large images; a profile of the user's own stays.
             SetEnvironmentVariable(PROFILES, profiles),
             OpaqueFunction(function=_nodes),
             OpaqueFunction(function=_robot_state_publisher),

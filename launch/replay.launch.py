@@ -2,7 +2,7 @@
 
     ros2 launch cardbox_tracker replay.launch.py bag:=BAG person_distance_m:=2.0
 
-The bag's picture and CameraInfo topics are found by themselves where it has one of each. With
+The bag's image and CameraInfo topics are found by themselves where it has one of each. With
 pause_at:="[6.5, 9.5, 12.5]" the recording stands still at those times, so that a reference posture
 can be captured (initializer/capture_front) before play_bag/resume.
 """

@@ -19,7 +19,7 @@ DOCUMENTS = sorted(
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
 )
 WRITTEN = [path for path in DOCUMENTS if "evaluation" not in path.parts]
-LARGEST_PICTURE_BYTES = 200_000
+LARGEST_IMAGE_BYTES = 200_000
 IMAGE_SUFFIXES = (".png", ".jpg")
 
 INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
@@ -70,7 +70,7 @@ def anchors(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=str)
-def test_links_and_pictures_are_there(document: Path) -> None:
+def test_links_and_images_are_there(document: Path) -> None:
     for target in LINK.findall(prose(text_of(document))):
         if re.match(r"https?://", target):
             continue
@@ -80,7 +80,7 @@ def test_links_and_pictures_are_there(document: Path) -> None:
         if anchor:
             assert anchor in anchors(path), f"{document}: {target}"
         if path.suffix in IMAGE_SUFFIXES and "evaluation" not in path.parts:
-            assert path.stat().st_size < LARGEST_PICTURE_BYTES, path
+            assert path.stat().st_size < LARGEST_IMAGE_BYTES, path
 
 
 @pytest.mark.parametrize("document", WRITTEN, ids=str)

@@ -72,7 +72,7 @@ def markdown_text() -> str:
         f"<!-- {_GENERATED} -->",
         "",
         "Set them in `config/<node>.yaml`, with `--ros-args -p name:=value`, or, where live, with",
-        "`ros2 param set`; a live change takes effect at the next picture. A wrong value is",
+        "`ros2 param set`; a live change takes effect at the next image. A wrong value is",
         "refused with the reason, and the old one stays. Every topic's QoS can be overridden at",
         "the start with",
         "`qos_overrides.<topic>.<publisher|subscription>.<reliability|depth|history|durability>`.",

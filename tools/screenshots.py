@@ -3,7 +3,7 @@
 ``python -m tools.screenshots --output docs/images`` writes them.
 
 A synthetic session is recorded, its person measured and tracked, all without ROS; the same seed
-gives the same pictures. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` a picture, its
+gives the same images. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` an image, its
 silhouette and the model over it, ``guidance.jpg`` what a person sees who is to be measured.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.drawing.guidance import draw_guidance
-from cardbox_tracker.drawing.overlay import Picture, draw_overlay
+from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.initialization.guidance import instruction
@@ -40,7 +40,7 @@ _QUALITY = 82
 _WIDTH_PX = 1200
 # Moments that show most, as fractions of each motion.
 _MOMENTS = {"wave": 0.53, "bend": 0.63, "bow": 0.45}
-# Not yet quite in the posture, so that the picture shows what the outline is for.
+# Not yet quite in the posture, so that the image shows what the outline is for.
 _BEFORE_ARMS_S = 0.45
 _SETTLED_S = 0.3
 
@@ -48,7 +48,7 @@ _SETTLED_S = 0.3
 def write_screenshots(
     output: Path, seed: int, progress: Callable[[float], None] | None = None
 ) -> list[Path]:
-    """Write the pictures into the folder ``output`` and return their paths.
+    """Write the images into the folder ``output`` and return their paths.
 
     Raises:
         CardboxError: the folder cannot be written.
@@ -68,12 +68,12 @@ def write_screenshots(
             shots = _shots(source, segments, seed)
     if progress is not None:
         progress(1.0)
-    return [_write(output / f"{name}.jpg", picture) for name, picture in shots.items()]
+    return [_write(output / f"{name}.jpg", image) for name, image in shots.items()]
 
 
 def _shots(
     source: SilhouetteSource, segments: Mapping[str, Segment], seed: int
-) -> dict[str, Picture]:
+) -> dict[str, ImageArray]:
     spans = {name: _inside(segments[name]) for name in REFERENCE_NAMES}
     result = initialize_from_recording(source, spans, InitializationConfig(2.0, seed=seed))
     moments = {
@@ -81,7 +81,7 @@ def _shots(
         + part * (segments[motion].end_s - segments[motion].start_s)
         for motion, part in _MOMENTS.items()
     }
-    overlays: dict[str, Picture] = {}
+    overlays: dict[str, ImageArray] = {}
     frames: dict[str, Frame] = {}
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
@@ -101,7 +101,7 @@ def _shots(
     }
 
 
-def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Picture:
+def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> ImageArray:
     """What is shown before the references ``front`` and ``arms`` are captured."""
     shown = []
     for name, before_s, left_s in (("front", -_SETTLED_S, 1), ("arms", _BEFORE_ARMS_S, 3)):
@@ -125,22 +125,22 @@ def _inside(segment: Segment) -> TimeSpan:
     return TimeSpan(segment.start_s + _SETTLED_S, segment.end_s - _SETTLED_S)
 
 
-def _large(picture: Picture) -> Picture:
-    large = cv2.resize(picture, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_LINEAR)
+def _large(image: ImageArray) -> ImageArray:
+    large = cv2.resize(image, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_LINEAR)
     return np.asarray(cv2.cvtColor(large, cv2.COLOR_GRAY2BGR), np.uint8)
 
 
-def _row(pictures: list[Picture]) -> Picture:
-    """Pictures side by side with a white gap, ``_WIDTH_PX`` wide at most."""
-    gap = np.full((pictures[0].shape[0], 8, 3), 255, np.uint8)
-    row = np.hstack([part for picture in pictures for part in (gap, picture)][1:])
+def _row(images: list[ImageArray]) -> ImageArray:
+    """Images side by side with a white gap, ``_WIDTH_PX`` wide at most."""
+    gap = np.full((images[0].shape[0], 8, 3), 255, np.uint8)
+    row = np.hstack([part for image in images for part in (gap, image)][1:])
     factor = min(1.0, _WIDTH_PX / row.shape[1])
     size = (round(factor * row.shape[1]), round(factor * row.shape[0]))
     return np.asarray(cv2.resize(row, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _write(path: Path, picture: Picture) -> Path:
-    data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+def _write(path: Path, image: ImageArray) -> Path:
+    data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
     with atomic_path(path) as temporary:
         temporary.write_bytes(data.tobytes())
     return path

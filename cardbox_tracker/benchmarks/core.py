@@ -1,7 +1,7 @@
 """How long the estimation takes: whole frames, their stages, and ratios taken in the same run.
 
 All of it runs in one process that is pinned to one core, but for what says otherwise. Whatever is
-compared takes turns, a few pictures each, so that a busy machine is unfair to nobody.
+compared takes turns, a few images each, so that a busy machine is unfair to nobody.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ def _track(tracker: Tracker, scene: BenchmarkScene, i: int) -> object:
 def frame_times_ms(
     scene: BenchmarkScene, trackers: dict[str, Callable[[int], object]]
 ) -> dict[str, Times]:
-    """Let each of ``trackers`` do all pictures, in turns; milliseconds of each picture, (n,).
+    """Let each of ``trackers`` do all images, in turns; milliseconds of each image, (n,).
 
-    The first pictures of a turn find the caches full of what others left there, as in no live
+    The first images of a turn find the caches full of what others left there, as in no live
     node; they count like all others, but for those before anything was compiled or allocated.
     """
     times: dict[str, list[float]] = {name: [] for name in trackers}
@@ -76,7 +76,7 @@ def frame_times_ms(
 def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
     """Measure a whole frame: with the paper's settings, with OpenCV's cost, with the default ones.
 
-    ``picture_to_posture`` also cuts the silhouette out of the picture.
+    ``image_to_posture`` also cuts the silhouette out of the image.
     """
     extractor = extractor_of(scene)
     whole = Tracker(scene.body, scene.camera, one_core(paper_preset()))
@@ -86,7 +86,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
             "paper": follow(scene, paper_preset()),
             "opencv": follow(scene, paper_preset(), "cardbox"),
             "default": follow(scene, default_preset()),
-            "picture_to_posture": lambda i: whole.track(extractor(scene.pictures[i])),
+            "image_to_posture": lambda i: whole.track(extractor(scene.images[i])),
         },
     )
     return {
@@ -96,7 +96,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
 
 
 def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
-    """Measure a frame, picture to posture with the default preset, a 30th of a second apart.
+    """Measure a frame, image to posture with the default preset, a 30th of a second apart.
 
     So it is in a live node: while it waits, the processor slows down and its caches are given away.
     """
@@ -104,10 +104,10 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
     tracker = Tracker(scene.body, scene.camera, one_core(default_preset()))
     times: dict[bool, list[float]] = {True: [], False: []}
     for paused in (False, True):
-        for picture in scene.pictures:
+        for image in scene.images:
             time.sleep(FRAME_30HZ_MS / 1e3 if paused else 0.0)
             start = time.perf_counter()
-            tracker.track(extractor(picture))
+            tracker.track(extractor(image))
             times[paused].append(1e3 * (time.perf_counter() - start))
     return {
         "without_ms": float(np.median(times[False][WARM_UP:])),
@@ -163,7 +163,7 @@ def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30
 
 
 def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, float]]:
-    """Measure a whole frame at several resolutions, by turns; all with as many pictures."""
+    """Measure a whole frame at several resolutions, by turns; all with as many images."""
     trackers = {f"{s.camera.width}x{s.camera.height}": follow(s, paper_preset()) for s in scenes}
     times = frame_times_ms(scenes[0], trackers)
     return {name: summary(values) for name, values in times.items()}

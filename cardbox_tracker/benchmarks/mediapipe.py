@@ -1,7 +1,7 @@
-"""MediaPipe Pose on the same pictures, where the extra ``mediapipe`` is installed.
+"""MediaPipe Pose on the same images, where the extra ``mediapipe`` is installed.
 
-It finds 33 points of an average person in colour pictures with a neural network, its "full" model;
-here it sees the same grey pictures, on the same single core.
+It finds 33 points of an average person in colour images with a neural network, its "full" model;
+here it sees the same grey images, on the same single core.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ _FULL = 1
 _WARM_UP = 5
 
 
-def measure_mediapipe(pictures: NDArray[np.uint8]) -> dict[str, float] | None:
-    """Measure MediaPipe on pictures (n, H, W); None if it is not installed.
+def measure_mediapipe(images: NDArray[np.uint8]) -> dict[str, float] | None:
+    """Measure MediaPipe on images (n, H, W); None if it is not installed.
 
     Returns:
-        ``median_ms`` and ``p95_ms`` of a picture, and ``found``, the fraction with a person found.
+        ``median_ms`` and ``p95_ms`` of an image, and ``found``, the fraction with a person found.
     """
     if importlib.util.find_spec("mediapipe") is None:
         return None
@@ -29,8 +29,8 @@ def measure_mediapipe(pictures: NDArray[np.uint8]) -> dict[str, float] | None:
     times = []
     found = 0
     with solutions.Pose(static_image_mode=False, model_complexity=_FULL) as pose:
-        for picture in pictures:
-            colour = np.repeat(picture[..., None], 3, axis=2)
+        for image in images:
+            colour = np.repeat(image[..., None], 3, axis=2)
             start = time.perf_counter()
             result = pose.process(colour)
             times.append(1e3 * (time.perf_counter() - start))
@@ -38,5 +38,5 @@ def measure_mediapipe(pictures: NDArray[np.uint8]) -> dict[str, float] | None:
     return {
         "median_ms": float(np.median(times[_WARM_UP:])),
         "p95_ms": float(np.percentile(times[_WARM_UP:], 95)),
-        "found": found / len(pictures),
+        "found": found / len(images),
     }

@@ -1,7 +1,7 @@
 """How long the nodes take from an image's stamp to the joint states, over real DDS.
 
 A publisher in this process plays a camera: the empty scene, then a person who waves to and fro,
-each picture stamped with the time it is sent. The nodes are started as a user would, each a process
+each image stamped with the time it is sent. The nodes are started as a user would, each a process
 of its own or all in one. What counts is when a subscriber's callback has the JointState with that
 stamp; how long before that it had arrived in the subscriber's process is noted, too.
 """
@@ -78,7 +78,7 @@ def _measure(
 
 
 class _CameraAndListener:
-    """Publishes pictures and takes note of when their joint states arrive."""
+    """Publishes images and takes note of when their joint states arrive."""
 
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         import rclpy
@@ -131,7 +131,7 @@ class _CameraAndListener:
         while self._info.get_subscription_count() == 0 or self._image.get_subscription_count() == 0:
             time.sleep(0.05)
             if time.monotonic() > end:
-                raise CardboxError("the background node did not subscribe to the pictures")
+                raise CardboxError("the background node did not subscribe to the images")
         for i in range(3 * len(scene.empty)):
             self._publish(scene, scene.empty[i % len(scene.empty)], encoding)
             time.sleep(0.03)
@@ -140,7 +140,7 @@ class _CameraAndListener:
         self, scene: BenchmarkScene, encoding: str, rate_hz: float, seconds: float
     ) -> dict[str, Any]:
         """Publish for ``seconds``; return latencies, losses and the nodes' processor time."""
-        there_and_back = [*scene.pictures, *scene.pictures[::-1]]
+        there_and_back = [*scene.images, *scene.images[::-1]]
         self._arrivals_ns.clear()
         count = max(2, int(seconds * rate_hz))
         sent = []
@@ -170,16 +170,16 @@ class _CameraAndListener:
             "cpu_percent_sum": sum(cpu.values()),
         }
 
-    def _publish(self, scene: BenchmarkScene, picture: NDArray[np.uint8], encoding: str) -> int:
-        """Publish a picture, then its calibration, as drivers do, stamped now; the stamp in ns."""
+    def _publish(self, scene: BenchmarkScene, pixels: NDArray[np.uint8], encoding: str) -> int:
+        """Publish an image, then its calibration, as drivers do, stamped now; the stamp in ns."""
         from builtin_interfaces.msg import Time
         from std_msgs.msg import Header
 
         from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 
         if encoding == "bgr8":
-            picture = np.repeat(picture[..., None], 3, axis=2)
-        image = image_message(Header(frame_id="camera"), picture, encoding)
+            pixels = np.repeat(pixels[..., None], 3, axis=2)
+        image = image_message(Header(frame_id="camera"), pixels, encoding)
         info = camera_info_message(image.header, scene.camera)
         now_ns = time.time_ns()
         image.header.stamp = Time(sec=now_ns // 10**9, nanosec=now_ns % 10**9)

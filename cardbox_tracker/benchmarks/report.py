@@ -19,7 +19,7 @@ _FRAMES = {
     "paper": "silhouette to posture, the paper's settings",
     "opencv": "the same with OpenCV drawing the patches",
     "default": "silhouette to posture, preset `default`",
-    "picture_to_posture": "picture to posture, the paper's settings",
+    "image_to_posture": "image to posture, the paper's settings",
 }
 
 
@@ -37,7 +37,7 @@ def report(results: Mapping[str, Any]) -> str:
         f"Made by `{COMMAND}` on {results['cpu']} with {results['cores']} cores; {versions}; "
         f"commit {results['commit']}. Numbers: [benchmarks.json](benchmarks.json).",
         "Everything in the first four tables is pinned to one core unless it says otherwise, and "
-        f"what is compared takes turns of ten pictures, {results['measured_frames']} in all: a "
+        f"what is compared takes turns of ten images, {results['measured_frames']} in all: a "
         "synthetic person who waves, 320x240. p95 is the 95th percentile.",
         "## A frame",
         _table(
@@ -57,7 +57,7 @@ def report(results: Mapping[str, Any]) -> str:
         "A particle costs the rows of its outline, not its area: twice the width and height cost "
         f"{results['ratio_double_resolution']:.2f} times as much.",
         _table(
-            ("picture", "median", "p95"),
+            ("image", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
         "## Particles",
@@ -72,8 +72,8 @@ def report(results: Mapping[str, Any]) -> str:
         ),
         _parallel(results["parallel_arms"]),
         *_nodes(results["nodes"]),
-        "A live node waits between pictures, and meanwhile the processor slows down and its caches "
-        "are given away: from picture to posture, preset `default`, one frame takes "
+        "A live node waits between images, and meanwhile the processor slows down and its caches "
+        "are given away: from image to posture, preset `default`, one frame takes "
         f"{results['after_pauses']['without_ms']:.1f} ms right after the other and "
         f"{results['after_pauses']['with_ms']:.1f} ms after a pause of a thirtieth of a second, on "
         "the same core. The rest of a latency is DDS and the waking of processes.",
@@ -99,7 +99,7 @@ def readme_section(results: Mapping[str, Any]) -> str:
             ("faster than MediaPipe Pose (full), one core", f"{measured['ratio']:.0f} times"),
             (
                 "the same with our silhouette's time counted too",
-                f"{measured['ratio_from_picture']:.1f} times",
+                f"{measured['ratio_from_image']:.1f} times",
             ),
         ]
     rows.append(("particles a frame at 30 Hz, two cores", f"{results['particles_at_30hz']:,}"))
@@ -122,7 +122,7 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
         "## Nodes",
         "From the image's stamp until a subscriber's callback, in Python, has the JointState, over "
         "DDS, preset `default`; in brackets until it had arrived in the subscriber's process. The "
-        "publisher shares the machine. Large pictures use `config/fastdds_large_images.xml`. "
+        "publisher shares the machine. Large images use `config/fastdds_large_images.xml`. "
         "Processor time is in percent of one core.",
         "### Each node a process of its own",
         *_streams(nodes),
@@ -175,10 +175,10 @@ def _mediapipe(results: Mapping[str, Any]) -> str:
     if measured is None:
         return "MediaPipe was not installed."
     return (
-        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms for the same pictures "
+        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms for the same images "
         f"(it finds somebody in {100 * measured['found']:.0f} % of them): "
         f"{measured['ratio']:.0f} times as long as a frame from silhouette to posture, "
-        f"{measured['ratio_from_picture']:.1f} times as long as one from the picture."
+        f"{measured['ratio_from_image']:.1f} times as long as one from the image."
     )
 
 

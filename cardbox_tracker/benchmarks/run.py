@@ -28,7 +28,7 @@ def run_benchmark(
     Args:
         json_path: file to write.
         report_path: Markdown file to write.
-        frames: pictures that the estimation is measured on.
+        frames: images that the estimation is measured on.
         seconds: how long the nodes are measured with each stream and rate.
 
     Raises:
@@ -59,16 +59,16 @@ def run_benchmark(
 
 
 def _mediapipe(frames: int, core: dict[str, Any]) -> dict[str, float] | None:
-    """Compare with MediaPipe on the same pictures, by the estimation alone and from the picture."""
+    """Compare with MediaPipe on the same images, by the estimation alone and from the image."""
     with pinned(1):
-        measured = measure_mediapipe(make_scene(320, 240, frames, 2).pictures)
+        measured = measure_mediapipe(make_scene(320, 240, frames, 2).images)
     if measured is None:
         return None
     median = measured["median_ms"]
     return {
         **measured,
         "ratio": median / core["frame_ms_median"],
-        "ratio_from_picture": median / core["frames"]["picture_to_posture"]["median_ms"],
+        "ratio_from_image": median / core["frames"]["image_to_posture"]["median_ms"],
     }
 
 

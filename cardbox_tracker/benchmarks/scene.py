@@ -13,39 +13,39 @@ from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.simulation.session import session_camera
 from cardbox_tracker.vision.camera import Camera
 
-Pictures = NDArray[np.uint8]
+Images = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
 class BenchmarkScene:
-    """Pictures of one person in motion, 15 a second.
+    """Images of one person in motion, 15 a second.
 
     Attributes:
         body: the person.
         camera: who sees them.
         empty: the scene without them, (m, H, W), brightness.
-        pictures: with them, (n, H, W), brightness.
+        images: with them, (n, H, W), brightness.
         silhouettes: exact, (n, H, W), 0 or 255.
     """
 
     body: BodyModel
     camera: Camera
-    empty: Pictures
-    pictures: Pictures
-    silhouettes: Pictures
+    empty: Images
+    images: Images
+    silhouettes: Images
 
 
 def make_scene(width: int, height: int, count: int, empty: int = 30) -> BenchmarkScene:
-    """Draw ``count`` pictures of the motion ``wave``, from its beginning on."""
+    """Draw ``count`` images of the motion ``wave``, from its beginning on."""
     body = BodyModel(hip_height_m=-0.51)
     camera = session_camera(width, height)
     renderer = Renderer(camera, Scene(), np.random.default_rng(0))
-    background = np.array([renderer.picture()[0] for _ in range(empty)])
-    drawn = [renderer.picture(body, wave(i / 15.0 % WAVE_S)) for i in range(count)]
+    background = np.array([renderer.image()[0] for _ in range(empty)])
+    drawn = [renderer.image(body, wave(i / 15.0 % WAVE_S)) for i in range(count)]
     return BenchmarkScene(
         body,
         camera,
         background,
-        np.array([picture for picture, _ in drawn]),
+        np.array([image for image, _ in drawn]),
         np.array([silhouette for _, silhouette in drawn]),
     )

@@ -32,10 +32,10 @@ def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
         work(*arguments)
         times.setdefault(name, []).append(1e3 * (time.perf_counter() - start))
 
-    for picture, silhouette in zip(scene.pictures, scene.silhouettes, strict=True):
+    for image, silhouette in zip(scene.images, scene.silhouettes, strict=True):
         posture = filters.track(silhouette)
         torso, left, right = filters.all
-        timed("silhouette from the picture", extractor, picture)
+        timed("silhouette from the image", extractor, image)
         timed("running sums of the silhouette", probe.observe, silhouette)
         timed("arms of the last frame taken out", probe.fix_arms, posture)
         timed("cost of all torsos", probe.torso, torso.particles)

@@ -16,7 +16,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 
 WARM_UP = 5
-"""So many first pictures do not count: they wait for memory and, once, for the compiler."""
+"""So many first images do not count: they wait for memory and, once, for the compiler."""
 
 Times = NDArray[np.float64]
 
@@ -49,8 +49,8 @@ def one_core(config: TrackerConfig) -> TrackerConfig:
 def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
     """Return what cuts the person out, with the scene's background learned."""
     learner = BackgroundLearner()
-    for picture in scene.empty:
-        learner.add(picture)
+    for image in scene.empty:
+        learner.add(image)
     return SilhouetteExtractor(learner.model())
 
 

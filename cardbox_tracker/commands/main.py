@@ -104,7 +104,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--storage", choices=("mcap", "sqlite3"), default="mcap", help="format of the recording"
     )
     synthesize.add_argument(
-        "--compressed", action="store_true", help="write JPEG pictures instead of raw ones"
+        "--compressed", action="store_true", help="write JPEG images instead of raw ones"
     )
 
     initialize = command("initialize", _initialize, "measure the person in a recording")
@@ -164,7 +164,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="second at which the person stands as for --front; tracking starts there",
     )
     track.add_argument(
-        "--csv", type=Path, required=True, metavar="OUT.csv", help="table to write, a row a picture"
+        "--csv", type=Path, required=True, metavar="OUT.csv", help="table to write, a row an image"
     )
     _add_preset(track, "default")
     track.add_argument(
@@ -246,7 +246,7 @@ def _add_recording(parser: argparse.ArgumentParser) -> None:
         type=_span,
         required=True,
         metavar="T0:T1",
-        help="seconds while nobody is in the picture",
+        help="seconds while nobody is in the image",
     )
 
 
@@ -377,7 +377,7 @@ def _track(options: argparse.Namespace) -> None:
                 ),
             )
     print(
-        f"tracked {summary.frames_tracked} of {summary.frames} pictures, "
+        f"tracked {summary.frames_tracked} of {summary.frames} images, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
     for path in (options.csv, options.video, options.bag):

@@ -117,7 +117,7 @@ class Client:
         )
 
     def wait_for_pause(self, time_s: float) -> None:
-        """Wait until the player stands still at ``time_s``, and its pictures have been served."""
+        """Wait until the player stands still at ``time_s``, and its images have been served."""
         self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
         self.rest(0.5)
 

@@ -115,26 +115,26 @@ def write_overlay(
     session: Path,
     path: Path,
 ) -> None:
-    """Draw the published postures over the session's pictures."""
+    """Draw the published postures over the session's images."""
     size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
     nothing = Estimate("not_tracked")
     with BagReader(session) as bag, video_file(path, size, 15.0) as write:
-        for picture in bag.pictures():
-            if picture.stamp_ns >= result.start_ns:
-                small = _resize(picture.grey, camera)
-                estimate = estimates.get(picture.stamp_ns, nothing)
+        for image in bag.images():
+            if image.stamp_ns >= result.start_ns:
+                small = _resize(image.grey, camera)
+                estimate = estimates.get(image.stamp_ns, nothing)
                 write(draw_overlay(small, result.body, camera, estimate, _VIDEO_SCALE))
 
 
-def _resize(picture: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+def _resize(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
     size = (camera.width, camera.height)
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def print_table(report: dict[str, object], output: Path) -> None:
     """Print the main figures and where the rest is."""
     rows = [
-        ("pictures after initialization", f"{report['frames']}"),
+        ("images after initialization", f"{report['frames']}"),
         ("of them tracked", f"{report['frames_tracked']}"),
         ("mean 3D error", f"{100 * _number(report, 'mean_3d_error_m'):.1f} cm"),
         ("  of it in depth", f"{100 * _number(report, 'depth_error_m'):.1f} cm"),

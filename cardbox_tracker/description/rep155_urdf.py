@@ -130,7 +130,7 @@ def _seen_from_camera(
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Where the middle of the hips is in the optical frame when d1 is 0, as URDF has it."""
     down = body.camera_pitch_rad
-    # Columns: the body's X (to the camera), Y (to the right of the picture) and Z (up).
+    # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
     rotation = np.array(
         [
             (0.0, 1.0, 0.0),

@@ -11,7 +11,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.overlay import (
     TEXT_BGR,
-    Picture,
+    ImageArray,
     draw_outline,
     enlarged,
 )
@@ -20,7 +20,7 @@ from cardbox_tracker.vision.camera import Camera
 WANTED_BGR = (0, 220, 255)
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-# As fractions of the picture: a person two metres away reads it, and it leaves the head free.
+# As fractions of the image: a person two metres away reads it, and it leaves the head free.
 _LINE_HEIGHT = 0.075
 _NUMBER_HEIGHT = 0.22
 _WIDTH = 0.95
@@ -28,18 +28,18 @@ _LINES = 2
 
 
 def draw_guidance(
-    picture: Picture,
+    image: ImageArray,
     body: BodyModel,
     camera: Camera,
     posture: FloatArray,
     words: str,
     number: int | None = None,
     scale: int = 1,
-) -> Picture:
-    """Return a colour picture with an outline to stand in, what to do, and a big number.
+) -> ImageArray:
+    """Return a colour image with an outline to stand in, what to do, and a big number.
 
     Args:
-        picture: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
+        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
         body: somebody of about the person's size, at their distance.
         camera: working camera.
         posture: the wanted posture (12,).
@@ -50,7 +50,7 @@ def draw_guidance(
     Returns:
         (scale H, scale W, 3) bgr.
     """
-    canvas = enlarged(picture, scale)
+    canvas = enlarged(image, scale)
     view = camera.scaled(*canvas.shape[1::-1])
     patches = cardbox_patches(body, posture)
     width = max(2, round(canvas.shape[1] / 160))
@@ -63,7 +63,7 @@ def draw_guidance(
     return canvas
 
 
-def _draw_words(canvas: Picture, words: str) -> int:
+def _draw_words(canvas: ImageArray, words: str) -> int:
     """Write along the top, on a darkened ground; return the row where it ends."""
     lines = textwrap.wrap(words, max(len(words) // _LINES + 8, 12))
     if not lines:
@@ -79,7 +79,7 @@ def _draw_words(canvas: Picture, words: str) -> int:
     return end
 
 
-def _draw_number(canvas: Picture, text: str, top: int) -> None:
+def _draw_number(canvas: ImageArray, text: str, top: int) -> None:
     """Write at the left edge, below ``top``: beside the head of somebody in the middle."""
     height, width = canvas.shape[:2]
     size = _size_of_height(_NUMBER_HEIGHT * height)
@@ -89,7 +89,7 @@ def _draw_number(canvas: Picture, text: str, top: int) -> None:
     cv2.putText(canvas, text, corner, _FONT, size, WANTED_BGR, thickness, cv2.LINE_AA)
 
 
-def _put(canvas: Picture, text: str, size: float, bottom: int) -> None:
+def _put(canvas: ImageArray, text: str, size: float, bottom: int) -> None:
     thickness = _thickness(size)
     (width, _), _ = cv2.getTextSize(text, _FONT, size, thickness)
     left = (canvas.shape[1] - width) // 2

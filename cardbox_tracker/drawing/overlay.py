@@ -1,4 +1,4 @@
-"""Draw the model over a picture: parts, outline, skeleton, and how well it fits."""
+"""Draw the model over an image: parts, outline, skeleton, and how well it fits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 OUTLINE_BGR = (60, 220, 60)
 SKELETON_BGR = (0, 140, 255)
@@ -53,12 +53,12 @@ class Drawable(Protocol):
 
 
 def draw_overlay(
-    picture: Picture, body: BodyModel, camera: Camera, estimate: Drawable, scale: int = 1
-) -> Picture:
-    """Return a colour picture with the model of ``estimate`` drawn over it.
+    image: ImageArray, body: BodyModel, camera: Camera, estimate: Drawable, scale: int = 1
+) -> ImageArray:
+    """Return a colour image with the model of ``estimate`` drawn over it.
 
     Args:
-        picture: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
+        image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
         body: the measured person.
         camera: working camera, pitched as the body model says.
         estimate: what to draw; without a posture only its state is written.
@@ -67,7 +67,7 @@ def draw_overlay(
     Returns:
         (scale H, scale W, 3) bgr.
     """
-    canvas = enlarged(picture, scale)
+    canvas = enlarged(image, scale)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
         draw_model(canvas, body, camera.scaled(*canvas.shape[1::-1]), estimate.posture)
@@ -76,14 +76,14 @@ def draw_overlay(
     return canvas
 
 
-def draw_message(picture: Picture, text: str) -> Picture:
-    """Return a colour picture (H, W, 3) bgr of ``picture`` with ``text`` written over it."""
-    canvas = _bgr(picture).copy()
+def draw_message(image: ImageArray, text: str) -> ImageArray:
+    """Return a colour image (H, W, 3) bgr of ``image`` with ``text`` written over it."""
+    canvas = _bgr(image).copy()
     draw_text(canvas, text)
     return canvas
 
 
-def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
+def draw_model(canvas: ImageArray, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
     Tinted patches by side, the outline of them all, and the skeleton.
@@ -103,7 +103,7 @@ def draw_model(canvas: Picture, body: BodyModel, camera: Camera, posture: FloatA
 
 
 def draw_outline(
-    canvas: Picture,
+    canvas: ImageArray,
     camera: Camera,
     patches: FloatArray,
     colour: tuple[int, int, int],
@@ -119,7 +119,7 @@ def draw_outline(
 
 
 def _draw_skeleton(
-    canvas: Picture, body: BodyModel, camera: Camera, posture: FloatArray, thickness: int
+    canvas: ImageArray, body: BodyModel, camera: Camera, posture: FloatArray, thickness: int
 ) -> None:
     frames = forward_kinematics(body, posture)
     chains = [
@@ -142,7 +142,7 @@ def _draw_skeleton(
 
 
 def draw_text(
-    canvas: Picture, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
+    canvas: ImageArray, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
 ) -> None:
     """Write ``text`` into the upper left corner of ``canvas``, in place; ``line`` counts down."""
     scale = canvas.shape[1] / 700
@@ -180,11 +180,11 @@ def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
     return [np.asarray(cv2.approxPolyDP(outline, 1.0, True), np.int32) for outline in found]
 
 
-def enlarged(picture: Picture, scale: int) -> Picture:
+def enlarged(image: ImageArray, scale: int) -> ImageArray:
     """Return a copy of (H, W) or (H, W, 3) as (scale H, scale W, 3), bgr."""
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     size = (scale * width, scale * height)
-    return np.array(cv2.resize(_bgr(picture), size, interpolation=cv2.INTER_LINEAR), np.uint8)
+    return np.array(cv2.resize(_bgr(image), size, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
@@ -193,7 +193,7 @@ def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
     return np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
 
 
-def _bgr(picture: Picture) -> Picture:
-    if picture.ndim == 3:
-        return picture
-    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+def _bgr(image: ImageArray) -> ImageArray:
+    if image.ndim == 3:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)

@@ -18,11 +18,11 @@ from cardbox_tracker.files import atomic_path
 def video_file(
     path: str | os.PathLike[str], size: tuple[int, int], fps: float
 ) -> Iterator[Callable[[NDArray[np.uint8]], object]]:
-    """Yield a function that takes the pictures (H, W, 3), bgr, of a video.
+    """Yield a function that takes the images (H, W, 3), bgr, of a video.
 
     Args:
         path: file to write, .mp4 or .avi.
-        size: (width, height) of the pictures, px.
+        size: (width, height) of the images, px.
         fps: frames a second.
 
     Raises:

@@ -23,7 +23,7 @@ class FilterConfig:
         rotation_noise_rad: sigma_beta of the rotations.
         translation_noise_m: sigma_beta of the translation; the arms have none.
         sigma_gamma_px: sigma_gamma, the width of the Gaussian that turns costs into the weights of
-            SRS, pixels at 320x240; it grows with the picture's area.
+            SRS, pixels at 320x240; it grows with the image's area.
         elite: the first particle of a cycle is the best of the one before, unchanged.
     """
 
@@ -62,12 +62,12 @@ class TrackerConfig:
         average: output the weighted mean of this many best particles; 1 outputs the best.
         explore: fraction of the arms' particles that each frame draws from anywhere within the
             joint limits, so that an arm that was lost is found again.
-        torso_beside_arms: rate a torso beside the arms found last, where they are in the picture,
+        torso_beside_arms: rate a torso beside the arms found last, where they are in the image,
             so that the whole model is drawn as equation (2) has it; rated alone, it leans forward
             to cover the upper arms.
         parallel_from: arms of so many particles or more are estimated at the same time, in two
             threads; with fewer, waking the other thread costs more than it saves. None: never.
-        recover: search anew when the person was lost, or came back into the picture.
+        recover: search anew when the person was lost, or came back into the image.
         lost_iou: an IoU below this counts as lost.
         lost_frames: after so many lost frames in a row the state is ``lost``.
     """

@@ -23,7 +23,7 @@ from cardbox_tracker.vision.rasterisation import render
 
 TRACKING, NO_PERSON, LOST = "tracking", "no_person", "lost"
 
-# Somebody sideways shows about half the area of the front view, at the picture's border less.
+# Somebody sideways shows about half the area of the front view, at the image's border less.
 _PERSON_FRACTION = 0.25
 _RECOVERY_CYCLES = 4
 _RECOVERY_NOISE = 2.0

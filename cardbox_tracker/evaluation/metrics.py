@@ -2,7 +2,7 @@
 
 ``MPJPE`` is the mean distance between estimated and true joints. ``PA-MPJPE`` is the same after the
 best similarity transform (Procrustes): what is left of the error when place, size and heading of
-the person do not count. Everything takes leading dimensions, such as runs and pictures.
+the person do not count. Everything takes leading dimensions, such as runs and images.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrueFrame:
-    """One picture with a person.
+    """One image with a person.
 
     Attributes:
         segment: what the person does.
@@ -42,8 +42,8 @@ class GroundTruth:
 
     Attributes:
         frames: by stamp in nanoseconds, those with a person in the scene.
-        spans: start and end of the first segment of each name, seconds from the first picture.
-        start_ns: stamp of the first picture.
+        spans: start and end of the first segment of each name, seconds from the first image.
+        start_ns: stamp of the first image.
         distance_m: level distance to the person.
         pitch_deg: how far the camera looks down.
         side_turn: the way the person turned for the side reference.
@@ -107,7 +107,7 @@ class TrackingError:
         lateral_m: mean error along x of the optical frame.
         vertical_m: mean error along y.
         depth_m: mean error along z.
-        frames: pictures compared.
+        frames: images compared.
     """
 
     mean_m: float

@@ -23,7 +23,7 @@ _LINE_LIST, _TRIANGLE_LIST, _DELETE_ALL = 5, 11, 3
 def write_markers(
     writer: BagWriter, topic: str, stamp_ns: int, frame_id: str, shapes: MarkerShapes | None
 ) -> None:
-    """Write the markers of a posture; None removes those of the picture before."""
+    """Write the markers of a posture; None removes those of the image before."""
     header = writer.header(stamp_ns, frame_id)
     if shapes is None:
         markers = [_marker(writer, header, "", 0, 0.0, action=_DELETE_ALL)]

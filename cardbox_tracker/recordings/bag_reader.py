@@ -36,8 +36,8 @@ class BagMessage(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BagPicture:
-    """One picture of a recording, decoded when asked for.
+class BagImage:
+    """One image of a recording, decoded when asked for.
 
     Attributes:
         stamp_ns: the stamp in its header.
@@ -148,11 +148,11 @@ class BagReader:
         )
 
     def image_topic(self) -> str:
-        """Return the one topic of pictures."""
-        return self._only(IMAGE_TYPES, "picture")
+        """Return the one topic of images."""
+        return self._only(IMAGE_TYPES, "image")
 
     def camera_info_topic(self) -> str:
-        """Return the camera_info topic that belongs to the pictures."""
+        """Return the camera_info topic that belongs to the images."""
         found = [name for name, kind in self.topics.items() if kind == CAMERA_INFO_TYPE]
         folder = self.image_topic().removesuffix("/compressed").rpartition("/")[0]
         beside = [name for name in found if name.rpartition("/")[0] == folder]
@@ -200,12 +200,12 @@ class BagReader:
     def _list(self) -> str:
         return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
 
-    def pictures(self, topic: str | None = None) -> Iterator[BagPicture]:
-        """Yield the pictures of ``topic``, or of the only picture topic, in order."""
+    def images(self, topic: str | None = None) -> Iterator[BagImage]:
+        """Yield the images of ``topic``, or of the only image topic, in order."""
         for message in self.messages([topic or self.image_topic()]):
             image = self.deserialize(message)
             stamp = image.header.stamp
-            yield BagPicture(
+            yield BagImage(
                 stamp.sec * 10**9 + stamp.nanosec, image.header.frame_id, _decoder(image)
             )
 
@@ -219,7 +219,7 @@ class BagReader:
         topic = self.camera_info_topic()
         for message in self.messages([topic]):
             return calibration_from_info(self.deserialize(message), self.image_topic(), topic)
-        raise BagError(f"{self.path} has no message on {topic}; record it with the pictures")
+        raise BagError(f"{self.path} has no message on {topic}; record it with the images")
 
 
 def _reason(error: Exception) -> str:

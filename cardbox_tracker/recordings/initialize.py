@@ -22,7 +22,7 @@ def initialize_from_recording(
     """Measure the person who holds the reference postures in ``spans`` (by reference name).
 
     Raises:
-        CardboxError: a span has no picture.
+        CardboxError: a span has no image.
         InitializationError: the references are unusable, or the model does not fit them.
     """
     references = {

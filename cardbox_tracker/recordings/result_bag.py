@@ -47,7 +47,7 @@ class ResultBag:
             self._writer.__exit__(kind, error, trace)
 
     def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
-        """Write what is known of one picture."""
+        """Write what is known of one image."""
         if self._writer is None:
             return
         self._write(self._writer, frame, estimate, tracker)
@@ -68,7 +68,7 @@ class ResultBag:
                 write_markers(bag, "/markers", stamp, optical, None)
             self._is_shown = False
             return
-        # The header is that of the picture, as the node has it.
+        # The header is that of the image, as the node has it.
         bag.write_joint_state("/joint_states", stamp, optical, JOINT_NAMES, estimate.posture)
         if estimate.posture_stddev is not None:
             bag.write_joint_state(

@@ -1,4 +1,4 @@
-"""Silhouettes of a recording: its pictures, cut out before its own empty scene."""
+"""Silhouettes of a recording: its images, cut out before its own empty scene."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class TimeSpan(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """One picture of a recording and the silhouette in it.
+    """One image of a recording and the silhouette in it.
 
     Attributes:
         stamp_ns: the image's stamp.
@@ -69,7 +69,7 @@ class Frame(NamedTuple):
 
 
 class SilhouetteSource:
-    """The pictures of one bag at the working resolution, after learning its background."""
+    """The images of one bag at the working resolution, after learning its background."""
 
     def __init__(
         self,
@@ -78,16 +78,16 @@ class SilhouetteSource:
         config: BackgroundConfig | None = None,
         size: tuple[int, int] = WORKING_SIZE,
     ) -> None:
-        """Learn the empty scene from the pictures of the span ``background``.
+        """Learn the empty scene from the images of the span ``background``.
 
         Args:
             bag: an open recording.
-            background: when nobody is in the picture.
+            background: when nobody is in the image.
             config: settings of the background model.
             size: working resolution (width, height), px.
 
         Raises:
-            BagError: the span has too few pictures.
+            BagError: the span has too few images.
             CameraError: the recording's camera is not calibrated.
         """
         self._bag = bag
@@ -97,21 +97,21 @@ class SilhouetteSource:
         self.camera: Camera = calibration.camera(*size)
         self._rectifier = calibration.rectifier(*size)
         learner = BackgroundLearner(config)
-        for _, time_s, brightness in self._pictures():
+        for _, time_s, brightness in self._images():
             if time_s > background.end_s:
                 break
             if background.contains(time_s):
                 learner.add(brightness)
         if learner.count < 2:
             raise BagError(
-                f"{learner.count} pictures lie in the background span {background} s of a bag of "
+                f"{learner.count} images lie in the background span {background} s of a bag of "
                 f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
             )
         self._extractor = SilhouetteExtractor(learner.model(), config)
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
-        """Yield every picture from ``start_s`` to ``end_s``, in order, none left out."""
-        for stamp_ns, time_s, brightness in self._pictures():
+        """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
+        for stamp_ns, time_s, brightness in self._images():
             if time_s > end_s:
                 break
             if time_s >= start_s:
@@ -121,19 +121,19 @@ class SilhouetteSource:
         """Return the silhouettes of a span.
 
         Raises:
-            CardboxError: no picture lies in it; the text says what it was meant for.
+            CardboxError: no image lies in it; the text says what it was meant for.
         """
         found = [frame.silhouette for frame in self.frames(*span)]
         if not found:
             raise CardboxError(
-                f"no picture lies in the {what} span {span} s of a bag of "
+                f"no image lies in the {what} span {span} s of a bag of "
                 f"{self._bag.duration_s:.1f} s; give seconds from the bag's start"
             )
         return found
 
-    def _pictures(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
-        for picture in self._bag.pictures():
-            brightness = to_working_size(picture.grey, *self._size)
+    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
+        for image in self._bag.images():
+            brightness = to_working_size(image.grey, *self._size)
             if self._rectifier is not None:
                 brightness = self._rectifier(brightness)
-            yield picture.stamp_ns, (picture.stamp_ns - self._bag.start_ns) / 1e9, brightness
+            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness

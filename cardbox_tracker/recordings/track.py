@@ -1,4 +1,4 @@
-"""``cardbox track``: follow the posture through a recording; no picture is dropped."""
+"""``cardbox track``: follow the posture through a recording; no image is dropped."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _VIDEO_SCALE = 2
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """What a run did: pictures seen and tracked, and means over the tracked ones."""
+    """What a run did: images seen and tracked, and means over the tracked ones."""
 
     frames: int
     frames_tracked: int
@@ -54,7 +54,7 @@ def track_recording(
     fps: float = 15.0,
     observers: tuple[Callable[[Frame, Estimate, Tracker], None], ...] = (),
 ) -> TrackSummary:
-    """Track every picture from ``start_s`` on and write one CSV row for each.
+    """Track every image from ``start_s`` on and write one CSV row for each.
 
     Args:
         source: the recording.
@@ -65,10 +65,10 @@ def track_recording(
         csv_path: written atomically.
         video_path: where to write the overlay, if at all.
         fps: frames a second of the video.
-        observers: called after each picture, such as a progress bar or a bag writer.
+        observers: called after each image, such as a progress bar or a bag writer.
 
     Raises:
-        CardboxError: no picture lies after ``start_s``, or a file cannot be written.
+        CardboxError: no image lies after ``start_s``, or a file cannot be written.
     """
     tracker = Tracker(body, source.camera, config, np.random.default_rng(seed))
     costs: list[int] = []
@@ -96,7 +96,7 @@ def track_recording(
                 observe(frame, estimate, tracker)
         if frames == 0:
             raise CardboxError(
-                f"no picture lies after --start {start_s:g} s; give seconds from the bag's start"
+                f"no image lies after --start {start_s:g} s; give seconds from the bag's start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     return TrackSummary(frames, len(costs), *mean)
@@ -110,7 +110,7 @@ def _estimates(
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
-    """Return the row of one picture; what is not known is left empty."""
+    """Return the row of one image; what is not known is left empty."""
     stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
     if estimate.state != TRACKING or estimate.posture is None or estimate.keypoints_m is None:
         return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]

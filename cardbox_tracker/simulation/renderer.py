@@ -1,4 +1,4 @@
-"""Pictures of a synthetic person before a wall, as a camera with noise would take them."""
+"""Images of a synthetic person before a wall, as a camera with noise would take them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.simulation.person import person_parts
 from cardbox_tracker.vision.camera import Camera
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 # fillConvexPoly paints every pixel that an edge touches: at 4 an outline is 0.1 px too wide.
 _SUPERSAMPLING = 4
@@ -51,14 +51,14 @@ class Renderer:
         blotches = cv2.resize(coarse, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
         self.wall = np.clip(scene.wall + scene.texture * blotches, 0, 255).astype(np.float32)
 
-    def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> Picture:
+    def silhouette(self, body: BodyModel, posture: NDArray[np.float64]) -> ImageArray:
         """Return the exact silhouette (H, W), 0 or 255, legs included."""
         return np.where(self._draw(body, posture)[1] >= 0.5, 255, 0).astype(np.uint8)
 
-    def picture(
+    def image(
         self, body: BodyModel | None = None, posture: NDArray[np.float64] | None = None
-    ) -> tuple[Picture, Picture]:
-        """Return a noisy picture (H, W) and its silhouette; without a body the empty scene."""
+    ) -> tuple[ImageArray, ImageArray]:
+        """Return a noisy image (H, W) and its silhouette; without a body the empty scene."""
         scene = self._scene
         clean = self.wall
         mask = np.zeros(clean.shape, np.uint8)

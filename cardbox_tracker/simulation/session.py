@@ -1,7 +1,7 @@
 """Record a synthetic session: a rosbag with ground truth, as a camera driver would record it.
 
 The folder is a rosbag2 recording; beside its metadata lie ``ground_truth.json`` and ``masks.npz``.
-Same seed, same pictures, byte for byte.
+Same seed, same images, byte for byte.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def random_camera(rng: np.random.Generator, width: int = 320, height: int = 240)
     """Return a camera with another lens: f = 290 to 370 px at a width of 320, up to 5 degrees down.
 
     At 2 m it keeps a person of :func:`~cardbox_tracker.simulation.person.random_body` with hanging
-    arms in the picture.
+    arms in the image.
     """
     focal = rng.uniform(290.0, 370.0) / 320.0 * width
     pitch_rad = np.radians(rng.uniform(0.0, 5.0))
@@ -74,13 +74,13 @@ def synthesize_session(
         output: folder of the recording; it appears when it is complete.
         motion: ``wave``, ``bend``, ``bow`` or ``all``.
         seed: of noise and sway.
-        fps: pictures a second.
-        width: picture width, px.
-        height: picture height, px.
+        fps: images a second.
+        width: image width, px.
+        height: image height, px.
         body: the person; a default one without it. Their camera pitch is the camera's.
         storage: ``mcap`` or ``sqlite3``.
-        compressed: JPEG pictures on ``/camera/image_raw/compressed`` instead of raw ones.
-        encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw pictures.
+        compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
+        encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw images.
         scene: wall and sensor.
         overwrite: replace a recording of that name.
         progress: called with the finished fraction.
@@ -113,19 +113,19 @@ def synthesize_session(
                 "segment_index": index,
             }
             if segment.pose is None:
-                picture, mask = renderer.picture()
+                image, mask = renderer.image()
             else:
                 # Nobody stands quite still: a slow random walk that is pulled back.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
                 posture[0] += body.lateral_m + sway
-                picture, mask = renderer.picture(body, posture)
+                image, mask = renderer.image(body, posture)
                 entry |= _truth(body, camera, posture, mask)
                 bag.write_joint_state(TRUTH_TOPIC, stamp_ns, FRAME_ID, JOINT_NAMES, posture)
             truth.append(entry)
             masks[number] = (mask > 0).ravel()
             bag.write_camera_info(CAMERA_INFO_TOPIC, stamp_ns, FRAME_ID, camera)
-            _write_picture(bag, stamp_ns, picture, compressed, encoding)
+            _write_image(bag, stamp_ns, image, compressed, encoding)
             if progress is not None:
                 progress((number + 1) / count)
         session = _session(body, camera, fps, segments, truth, seed)
@@ -138,16 +138,16 @@ def synthesize_session(
     return session
 
 
-def _write_picture(
-    bag: BagWriter, stamp_ns: int, picture: NDArray[np.uint8], compressed: bool, encoding: str
+def _write_image(
+    bag: BagWriter, stamp_ns: int, image: NDArray[np.uint8], compressed: bool, encoding: str
 ) -> None:
     if compressed:
-        jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
+        jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
         bag.write_compressed(f"{IMAGE_TOPIC}/compressed", stamp_ns, FRAME_ID, jpeg)
         return
     if encoding != "mono8":
-        picture = np.repeat(picture[..., None], 3, axis=2)
-    bag.write_image(IMAGE_TOPIC, stamp_ns, FRAME_ID, picture, encoding)
+        image = np.repeat(image[..., None], 3, axis=2)
+    bag.write_image(IMAGE_TOPIC, stamp_ns, FRAME_ID, image, encoding)
 
 
 def _truth(

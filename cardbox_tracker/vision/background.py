@@ -1,7 +1,7 @@
 """Averaging background model and foreground segmentation (paper, section II-B, equation (1)).
 
-The mean I_B and the standard deviation sigma_B of each pixel's brightness are learned from pictures
-of the empty scene. A pixel of a later picture I_t is foreground where
+The mean I_B and the standard deviation sigma_B of each pixel's brightness are learned from images
+of the empty scene. A pixel of a later image I_t is foreground where
 
     |I_B - I_t| >= threshold * sigma_B
 
@@ -19,11 +19,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.vision.foreground import foreground_of
-from cardbox_tracker.vision.regions import recolour_small
+from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.regions import remove_small_regions
 
-FloatPicture = NDArray[np.float32]
-Picture = NDArray[np.uint8]
+FloatImage = NDArray[np.float32]
+ImageArray = NDArray[np.uint8]
 
 _KERNEL = np.ones((3, 3), np.uint8)
 _GRID_PX = 1000
@@ -34,7 +34,7 @@ class BackgroundConfig:
     """How the scene is learned and how a silhouette is cut out of it.
 
     Attributes:
-        learn_images: pictures of the empty scene to average.
+        learn_images: images of the empty scene to average.
         threshold: foreground from this many standard deviations on, equation (1).
         min_stddev: floor of the standard deviation, grey levels.
         clean_up: False leaves the plain rule of equation (1), without all that follows.
@@ -45,8 +45,8 @@ class BackgroundConfig:
         edge: a pixel next to one that differs much more is foreground only if it differs by this
             fraction of it, since smoothing spreads a strong contrast beyond the outline; 0 is off.
         flicker: follow brightness changes of the whole scene by this fraction at most; 0 is off.
-        min_area: specks smaller than this fraction of the picture are dropped.
-        max_hole: holes smaller than this fraction of the picture are filled.
+        min_area: specks smaller than this fraction of the image are dropped.
+        max_hole: holes smaller than this fraction of the image are filled.
     """
 
     learn_images: int = 30
@@ -66,58 +66,56 @@ class BackgroundConfig:
 class BackgroundModel:
     """Mean and standard deviation of the empty scene's brightness, each (H, W) float32."""
 
-    mean: FloatPicture
-    stddev: FloatPicture
+    mean: FloatImage
+    stddev: FloatImage
 
 
 class BackgroundLearner:
-    """Averages pictures of the empty scene, one at a time (Welford's algorithm)."""
+    """Averages images of the empty scene, one at a time (Welford's algorithm)."""
 
     def __init__(self, config: BackgroundConfig | None = None) -> None:
         """Start with nothing learned."""
         self.config = config or BackgroundConfig()
         self.count = 0
-        self._mean: FloatPicture | None = None
-        self._squares: FloatPicture | None = None
+        self._mean: FloatImage | None = None
+        self._squares: FloatImage | None = None
 
     @property
     def is_ready(self) -> bool:
-        """True once ``config.learn_images`` pictures were added."""
+        """True once ``config.learn_images`` images were added."""
         return self.count >= self.config.learn_images
 
-    def add(self, brightness: NDArray[np.uint8] | FloatPicture) -> None:
-        """Learn from one picture (H, W).
+    def add(self, brightness: NDArray[np.uint8] | FloatImage) -> None:
+        """Learn from one image (H, W).
 
         Raises:
-            ValueError: its size differs from that of the pictures before it.
+            ValueError: its size differs from that of the images before it.
         """
-        picture = np.asarray(brightness, dtype=np.float32)
+        image = np.asarray(brightness, dtype=np.float32)
         if self._mean is None or self._squares is None:
-            self._mean = np.zeros_like(picture)
-            self._squares = np.zeros_like(picture)
-        if picture.shape != self._mean.shape:
-            raise ValueError(
-                f"picture has shape {picture.shape}, those before it {self._mean.shape}"
-            )
+            self._mean = np.zeros_like(image)
+            self._squares = np.zeros_like(image)
+        if image.shape != self._mean.shape:
+            raise ValueError(f"image has shape {image.shape}, those before it {self._mean.shape}")
         self.count += 1
-        delta = picture - self._mean
+        delta = image - self._mean
         self._mean += delta / self.count
-        self._squares += delta * (picture - self._mean)
+        self._squares += delta * (image - self._mean)
 
     def model(self) -> BackgroundModel:
         """Return what was learned.
 
         Raises:
-            ValueError: fewer than two pictures were added.
+            ValueError: fewer than two images were added.
         """
         if self._mean is None or self._squares is None or self.count < 2:
-            raise ValueError(f"{self.count} pictures learned; a deviation needs two or more")
+            raise ValueError(f"{self.count} images learned; a deviation needs two or more")
         stddev = np.sqrt(self._squares / (self.count - 1))
         return BackgroundModel(self._mean.copy(), stddev.astype(np.float32))
 
 
 class SilhouetteExtractor:
-    """Cuts the person out of pictures before one learned background."""
+    """Cuts the person out of images before one learned background."""
 
     def __init__(self, model: BackgroundModel, config: BackgroundConfig | None = None) -> None:
         """Prepare the thresholds of every pixel."""
@@ -137,15 +135,15 @@ class SilhouetteExtractor:
         # Fresh memory costs more than the arithmetic on it.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
-    def __call__(self, brightness: Picture) -> Picture:
+    def __call__(self, brightness: ImageArray) -> ImageArray:
         """Return the silhouette (H, W) of ``brightness`` (H, W): 255 for the person, else 0.
 
         Raises:
-            ValueError: the picture's size is not the background's.
+            ValueError: the image's size is not the background's.
         """
         if brightness.shape != self.model.mean.shape:
             raise ValueError(
-                f"picture has shape {brightness.shape}, the background {self.model.mean.shape}"
+                f"image has shape {brightness.shape}, the background {self.model.mean.shape}"
             )
         config = self.config
         if not config.clean_up:
@@ -158,10 +156,10 @@ class SilhouetteExtractor:
         )
         if config.smoothing_px > 0:
             cv2.GaussianBlur(signed, (0, 0), config.smoothing_px, dst=signed)
-        foreground = foreground_of(signed, self._brighter, self._darker, config.edge, score)
+        foreground = segment_foreground(signed, self._brighter, self._darker, config.edge, score)
         return clean_silhouette(foreground, config.min_area, config.max_hole)
 
-    def _scene_gain(self, brightness: Picture) -> float:
+    def _scene_gain(self, brightness: ImageArray) -> float:
         """How much brighter the whole scene is now: the person covers less than half of it."""
         if self.config.flicker <= 0:
             return 1.0
@@ -174,24 +172,24 @@ class SilhouetteExtractor:
 
 
 def warm_up() -> None:
-    """Cut one silhouette, so that no live picture waits for the compiler."""
+    """Cut one silhouette, so that no live image waits for the compiler."""
     model = BackgroundModel(np.zeros((8, 8), np.float32), np.ones((8, 8), np.float32))
     SilhouetteExtractor(model)(np.zeros((8, 8), np.uint8))
 
 
-def clean_silhouette(foreground: Picture, min_area: float, max_hole: float) -> Picture:
-    """Drop small specks and fill small holes of a binary picture.
+def clean_silhouette(foreground: ImageArray, min_area: float, max_hole: float) -> ImageArray:
+    """Drop small specks and fill small holes of a binary image.
 
     Args:
         foreground: (H, W), 0 or 255.
-        min_area: smallest speck to keep, as a fraction of the picture.
-        max_hole: largest hole to fill, as a fraction of the picture.
+        min_area: smallest speck to keep, as a fraction of the image.
+        max_hole: largest hole to fill, as a fraction of the image.
 
     Returns:
-        A new (H, W) picture, 0 or 255.
+        A new (H, W) image, 0 or 255.
     """
     # Closing, not opening: it joins what noise cut, and thin fingers survive it.
     closed = np.ascontiguousarray(cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _KERNEL), np.uint8)
-    recolour_small(closed, 255, min_area * foreground.size)
-    recolour_small(closed, 0, max_hole * foreground.size)
+    remove_small_regions(closed, 255, min_area * foreground.size)
+    remove_small_regions(closed, 0, max_hole * foreground.size)
     return closed

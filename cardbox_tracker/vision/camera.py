@@ -24,8 +24,8 @@ class Camera:
     """An ideal pinhole camera at a working resolution.
 
     Attributes:
-        width: picture width, px.
-        height: picture height, px.
+        width: image width, px.
+        height: image height, px.
         fx: horizontal focal length, px.
         fy: vertical focal length, px.
         cx: principal point, px; (0, 0) is the centre of the first pixel.
@@ -42,14 +42,14 @@ class Camera:
     pitch_rad: float = 0.0
 
     def scaled(self, width: int, height: int) -> Camera:
-        """Return the same camera with its picture resized to ``width`` x ``height`` px."""
+        """Return the same camera with its image resized to ``width`` x ``height`` px."""
         sx, sy = width / self.width, height / self.height
         return Camera(
             width,
             height,
             self.fx * sx,
             self.fy * sy,
-            # The centre of the first pixel is half a pixel inside the picture.
+            # The centre of the first pixel is half a pixel inside the image.
             (self.cx + 0.5) * sx - 0.5,
             (self.cy + 0.5) * sy - 0.5,
             self.pitch_rad,
@@ -92,8 +92,8 @@ class Calibration:
     """What a CameraInfo message or a camera_calibration file says of a real camera.
 
     Attributes:
-        width: calibrated picture width, px.
-        height: calibrated picture height, px.
+        width: calibrated image width, px.
+        height: calibrated image height, px.
         k: intrinsic matrix (3, 3).
         distortion: coefficients (n,) of ``distortion_model``; empty or all zero without distortion.
         distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
@@ -129,7 +129,7 @@ class Calibration:
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:
-        """Return what undistorts a picture of that working resolution; None without distortion.
+        """Return what undistorts an image of that working resolution; None without distortion.
 
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
@@ -151,7 +151,7 @@ class Calibration:
     def _check(self) -> None:
         if self.width <= 0 or self.height <= 0:
             raise CameraError(
-                f"the calibration is for a picture of {self.width}x{self.height}; expected the "
+                f"the calibration is for an image of {self.width}x{self.height}; expected the "
                 "camera's size in pixels: calibrate the camera, or fill in width and height"
             )
         if not self.is_calibrated:
@@ -163,7 +163,7 @@ class Calibration:
             raise CameraError(
                 f"distortion model '{self.distortion_model}' is unknown; supported are "
                 f"{', '.join(DISTORTION_MODELS)}: calibrate with one of those, or feed "
-                "rectified pictures with all-zero distortion"
+                "rectified images with all-zero distortion"
             )
         allowed = {"equidistant": (4,), "plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14)}
         counts = allowed.get(self.distortion_model, ())
@@ -175,20 +175,18 @@ class Calibration:
 
 
 class Rectifier:
-    """Undistorts pictures of one size with maps computed once."""
+    """Undistorts images of one size with maps computed once."""
 
     def __init__(self, map_1: NDArray[Any], map_2: NDArray[Any]) -> None:
         """Keep the fixed-point maps of ``cv2.remap``."""
         self._maps = (map_1, map_2)
 
-    def __call__(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return ``picture`` (H, W) or (H, W, 3) undistorted.
+    def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return ``image`` (H, W) or (H, W, 3) undistorted.
 
         Pixels that the lens never saw repeat the border, so that they stay background.
         """
-        rectified = cv2.remap(
-            picture, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
+        rectified = cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(rectified, dtype=np.uint8)
 
 

@@ -92,8 +92,8 @@ def _offer(path: Path) -> str:
     try:
         capture = open_device(str(path))
     except CameraError:
-        # A camera has further devices beside the one that delivers pictures.
-        return "delivers no pictures, or is in use"
+        # A camera has further devices beside the one that delivers images.
+        return "delivers no images, or is in use"
     try:
         return describe_capture(capture)
     finally:

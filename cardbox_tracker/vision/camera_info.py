@@ -11,7 +11,7 @@ from cardbox_tracker.vision.camera import Calibration
 
 
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
-    """Return the calibration of the pictures that go with a sensor_msgs/CameraInfo.
+    """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 
     A region of interest and binning are taken into the matrix.
 
@@ -32,7 +32,7 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         k[1, 2] -= roi.y_offset
         width, height = int(roi.width), int(roi.height)
     binning_x, binning_y = max(int(message.binning_x), 1), max(int(message.binning_y), 1)
-    # The centre of the first pixel is half a pixel inside the picture.
+    # The centre of the first pixel is half a pixel inside the image.
     k[0] = (k[0] + (0.0, 0.0, 0.5)) / binning_x - (0.0, 0.0, 0.5)
     k[1] = (k[1] + (0.0, 0.0, 0.5)) / binning_y - (0.0, 0.0, 0.5)
     return Calibration(

@@ -1,4 +1,4 @@
-"""Pictures as cameras send them, turned into brightness or colour.
+"""Images as cameras send them, turned into brightness or colour.
 
 The names are those of ``sensor_msgs/image_encodings``. A Bayer pattern is named after the colours
 of the first row's first two pixels and the second row's first two; OpenCV names the same pattern
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import EncodingError
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 
 class _Encoding(NamedTuple):
@@ -50,8 +50,8 @@ SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 def decode_grey(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
-) -> Picture:
-    """Return the brightness (H, W) uint8 of a picture; of mono8 without a copy.
+) -> ImageArray:
+    """Return the brightness (H, W) uint8 of an image; of mono8 without a copy.
 
     Args:
         data: the bytes, as bytes, array.array or uint8 array.
@@ -70,8 +70,8 @@ def decode_grey(
 
 def decode_bgr(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
-) -> Picture:
-    """Return the colours (H, W, 3) uint8, bgr, of a picture; see :func:`decode_grey`.
+) -> ImageArray:
+    """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`.
 
     Raises:
         EncodingError: the encoding is not supported, or the bytes do not fit it.
@@ -80,27 +80,27 @@ def decode_bgr(
     return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
 
 
-def decode_compressed(data: Any, grey: bool = True) -> Picture:
-    """Return a JPEG or PNG picture as (H, W) grey or (H, W, 3) bgr, uint8.
+def decode_compressed(data: Any, grey: bool = True) -> ImageArray:
+    """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
 
     Raises:
-        EncodingError: the bytes are no picture.
+        EncodingError: the bytes are no image.
     """
     raw = np.frombuffer(data, np.uint8)
     flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     try:
-        picture = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
+        image = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
     except cv2.error:
-        picture = None
-    if picture is None:
+        image = None
+    if image is None:
         raise EncodingError(
-            f"the compressed picture ({len(raw)} bytes) cannot be decoded; expected whole JPEG or "
+            f"the compressed image ({len(raw)} bytes) cannot be decoded; expected whole JPEG or "
             "PNG data: check the camera's transport"
         )
-    return np.asarray(picture, np.uint8)
+    return np.asarray(image, np.uint8)
 
 
-def _is_cut_off(raw: Picture) -> bool:
+def _is_cut_off(raw: ImageArray) -> bool:
     """Whether data is empty or a JPEG without its end, which older OpenCV fills with grey."""
     data = raw.tobytes()
     # The marker cannot occur within a scan; a thumbnail, which has one too, lies before it.
@@ -110,8 +110,8 @@ def _is_cut_off(raw: Picture) -> bool:
 
 def _pixels(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
-) -> tuple[Picture, _Encoding]:
-    """The picture as an array in its own layout, and what its encoding is."""
+) -> tuple[ImageArray, _Encoding]:
+    """The image as an array in its own layout, and what its encoding is."""
     kind = _ENCODINGS.get(encoding)
     if kind is None:
         raise EncodingError(
@@ -121,20 +121,20 @@ def _pixels(
     row_bytes = width * kind.bytes_per_pixel
     if height <= 0 or width <= 0 or step < row_bytes:
         raise EncodingError(
-            f"a {encoding} picture of {width}x{height} has rows of {step} bytes; expected "
+            f"a {encoding} image of {width}x{height} has rows of {step} bytes; expected "
             f"{row_bytes} or more"
         )
     if kind.channels == 2 and width % 2:
-        raise EncodingError(f"a {encoding} picture is {width} wide; expected an even width")
+        raise EncodingError(f"a {encoding} image is {width} wide; expected an even width")
     if encoding.startswith("bayer") and min(width, height) < 3:
         raise EncodingError(
-            f"a {encoding} picture of {width}x{height} is too small to interpolate its colours; "
+            f"a {encoding} image of {width}x{height} is too small to interpolate its colours; "
             "expected 3x3 or more"
         )
     raw = np.frombuffer(data, np.uint8)
     if len(raw) < height * step:
         raise EncodingError(
-            f"a {encoding} picture of {width}x{height} has {len(raw)} bytes; expected "
+            f"a {encoding} image of {width}x{height} has {len(raw)} bytes; expected "
             f"{height * step}: the message is incomplete"
         )
     rows = raw[: height * step].reshape(height, step)[:, :row_bytes]

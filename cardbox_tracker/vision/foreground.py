@@ -1,6 +1,6 @@
 """Which pixels differ enough from the background, and from their neighbours, to be foreground.
 
-Half a dozen passes of OpenCV over float pictures, in one: what a row needs stays in the cache.
+Half a dozen passes of OpenCV over float images, in one: what a row needs stays in the cache.
 """
 
 from __future__ import annotations
@@ -11,21 +11,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatPicture = NDArray[np.float32]
-Picture = NDArray[np.uint8]
+FloatImage = NDArray[np.float32]
+ImageArray = NDArray[np.uint8]
 
 
-def foreground_of(
-    difference: FloatPicture,
-    brighter: FloatPicture,
-    darker: FloatPicture,
+def segment_foreground(
+    difference: FloatImage,
+    brighter: FloatImage,
+    darker: FloatImage,
     edge: float,
-    score: FloatPicture,
-) -> Picture:
+    score: FloatImage,
+) -> ImageArray:
     """Return where the score of a difference reaches 1, and ``edge`` times that around it.
 
     Args:
-        difference: picture minus background, (H, W), grey levels.
+        difference: image minus background, (H, W), grey levels.
         brighter: score of one grey level more than the background, (H, W).
         darker: negative score of one grey level less, (H, W).
         edge: fraction of the highest score among a pixel and its 8 neighbours.

@@ -2,7 +2,7 @@
 
 A pixel is covered where its centre lies inside the projected patch. To make that the same on every
 computer and in every program, coordinates are whole numbers: corners are moved to a grid of 1/256
-px, and an edge is a line that starts at the first row v0 of the picture below its upper end
+px, and an edge is a line that starts at the first row v0 of the image below its upper end
 (x0, y0), and moves by the same whole number of 1/65536 px from row to row on to its lower end
 (x1, y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
 

@@ -1,4 +1,4 @@
-"""Small regions of a binary picture: specks dropped, holes filled.
+"""Small regions of a binary image: specks dropped, holes filled.
 
 Connected by sides (4 neighbours). OpenCV labels every pixel, and what is wanted of the labels, the
 area of each region and another colour for the small ones, goes over all pixels twice more. Here a
@@ -15,25 +15,25 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _EIGHT = np.uint64(0x0101010101010101)
 _inline = njit(cache=True, nogil=True, inline="always")
 
 
-def recolour_small(picture: Picture, colour: int, area_px: float) -> None:
+def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
     """Turn regions of ``colour`` with fewer than ``area_px`` pixels to the other one, in place.
 
     Args:
-        picture: (H, W), contiguous, 0 or 255.
+        image: (H, W), contiguous, 0 or 255.
         colour: 0 or 255.
         area_px: the smallest area that stays.
     """
-    height, width = picture.shape
-    words = picture.view(np.uint64) if width % 8 == 0 else _NO_WORDS
+    height, width = image.shape
+    words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
     runs = np.empty((4, height * (width // 2 + 1)), np.int32)
-    _recolour(picture, words, np.uint8(colour), float(area_px), runs)
+    _recolour(image, words, np.uint8(colour), float(area_px), runs)
 
 
 @_inline
@@ -46,11 +46,11 @@ def _root(parents: Any, run: Any) -> Any:
 
 
 @_inline
-def _end_of(picture: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
+def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
     """The first column of row ``v`` from ``u`` on that is not of ``colour``."""
-    width = picture.shape[1]
+    width = image.shape[1]
     word = np.uint64(colour) * _EIGHT
-    while u < width and picture[v, u] == colour:
+    while u < width and image[v, u] == colour:
         u += 1
         if u % 8 == 0:
             while u // 8 < words.shape[1] and words[v, u // 8] == word:
@@ -59,18 +59,18 @@ def _end_of(picture: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
-def _recolour(picture: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
+def _recolour(image: Any, words: Any, colour: Any, area_px: float, runs: Any) -> None:
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
-    height, width = picture.shape
+    height, width = image.shape
     other = np.uint8(255) - colour
     firsts = np.empty(height + 1, np.int32)
     count = 0
     above = 0
     for v in range(height):
         firsts[v] = count
-        u = _end_of(picture, words, v, 0, other)
+        u = _end_of(image, words, v, 0, other)
         while u < width:
-            end = _end_of(picture, words, v, u, colour)
+            end = _end_of(image, words, v, u, colour)
             starts[count], ends[count] = u, end
             parents[count], areas[count] = count, end - u
             # Runs above that ended before this one began touch none of those to come.
@@ -86,11 +86,11 @@ def _recolour(picture: Any, words: Any, colour: Any, area_px: float, runs: Any) 
                     areas[first] += areas[second]
                 touching += 1
             count += 1
-            u = _end_of(picture, words, v, end, other)
+            u = _end_of(image, words, v, end, other)
         above = firsts[v]
     firsts[height] = count
     for v in range(height):
         for run in range(firsts[v], firsts[v + 1]):
             if areas[_root(parents, run)] < area_px:
                 for u in range(starts[run], ends[run]):
-                    picture[v, u] = other
+                    image[v, u] = other

@@ -1,4 +1,4 @@
-"""Bring a picture's brightness to the working resolution."""
+"""Bring an image's brightness to the working resolution."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def to_working_size(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """Return ``picture`` (H, W) or (H, W, 3) at (height, width); the same array if it fits.
+def to_working_size(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Return ``image`` (H, W) or (H, W, 3) at (height, width); the same array if it fits.
 
     Shrinking averages over area, which also averages the sensor's noise.
     """
-    if picture.shape[:2] == (height, width):
-        return picture
-    shrinks = picture.shape[0] >= height and picture.shape[1] >= width
+    if image.shape[:2] == (height, width):
+        return image
+    shrinks = image.shape[0] >= height and image.shape[1] >= width
     method = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-    return np.asarray(cv2.resize(picture, (width, height), interpolation=method), dtype=np.uint8)
+    return np.asarray(cv2.resize(image, (width, height), interpolation=method), dtype=np.uint8)

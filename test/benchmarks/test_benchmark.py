@@ -100,7 +100,7 @@ def test_particles_at_30hz_by_hand() -> None:
     assert benchmark_core.particles_at_30hz({"600": {"cores_2_ms": 40.0}}) == 0
 
 
-def test_turns_give_every_tracker_every_picture_once() -> None:
+def test_turns_give_every_tracker_every_image_once() -> None:
     scene = make_scene(32, 24, 23, 2)
     seen: dict[str, list[int]] = {"a": [], "b": []}
     times = benchmark_core.frame_times_ms(scene, {n: seen[n].append for n in seen})
@@ -110,7 +110,7 @@ def test_turns_give_every_tracker_every_picture_once() -> None:
 
 def test_the_scene_moves_and_its_background_does_not() -> None:
     scene = make_scene(80, 60, 30, 3)
-    assert scene.pictures.shape == scene.silhouettes.shape == (30, 60, 80)
+    assert scene.images.shape == scene.silhouettes.shape == (30, 60, 80)
     assert np.any(scene.silhouettes[0] != scene.silhouettes[-1])
     assert np.abs(np.diff(scene.empty.astype(int), axis=0)).mean() < 6
     assert not np.any(make_scene(80, 60, 1, 3).empty != scene.empty)

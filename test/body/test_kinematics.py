@@ -98,7 +98,7 @@ def test_abduction_comes_before_flexion() -> None:
     )
 
 
-def test_a_left_turn_makes_the_chest_face_the_right_of_the_picture() -> None:
+def test_a_left_turn_makes_the_chest_face_the_right_of_the_image() -> None:
     frames = forward_kinematics(BODY, posture(torso_yaw=90))
     np.testing.assert_allclose(frames.torso_rotation @ (1, 0, 0), (0, 1, 0), **NEAR)
     # The right shoulder is then the near one.

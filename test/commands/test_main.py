@@ -63,7 +63,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
         "\n".join(line for line in text.splitlines() if "head_width" not in line)
     )
     (folder / "empty folder").mkdir()
-    with BagWriter(folder / "no pictures") as bag:
+    with BagWriter(folder / "no images") as bag:
         bag.write_string("chatter", 1, "hello")
     with BagWriter(folder / "no camera_info") as bag:
         bag.write_image("/image_raw", 1, "camera", np.zeros((12, 16), np.uint8), "mono8")
@@ -172,8 +172,8 @@ def test_a_span_that_is_none_is_refused(
         (("--start", "-1"), "--start: '-1' is no time; expected seconds from the start"),
         (("--start", "soon"), "'soon' is no time"),
         (("--start", "inf"), "'inf' is no time"),
-        (("--start", "99"), "no picture lies after --start 99 s"),
-        (("--background", "90:99"), "0 pictures lie in the background span 90:99 s of a bag of"),
+        (("--start", "99"), "no image lies after --start 99 s"),
+        (("--background", "90:99"), "0 images lie in the background span 90:99 s of a bag of"),
         (("--preset", "fast"), "invalid choice: 'fast' (choose from "),
         (("--strategy", "best"), "invalid choice: 'best' (choose from "),
         (("--particles", "1"), "'1' is no number of particles; expected a whole number from 2 on"),
@@ -224,7 +224,7 @@ def test_mistakes_of_track(
         ("empty folder", "no rosbag2 recording (it has no metadata.yaml)"),
         ("text.txt", "cannot read the recording"),
         ("person.yaml", "cannot read the recording"),
-        ("no pictures", "has 0 picture topics; expected one"),
+        ("no images", "has 0 image topics; expected one"),
         ("no camera_info", "has 0 CameraInfo topics; expected one"),
         ("cut.mcap", "cut.mcap"),
     ],
@@ -255,8 +255,8 @@ def test_recordings_that_are_none(
         (("--camera-pitch-deg", "95"), "camera_pitch_rad is 1.65806 rad; expected -1.4 to 1.4 rad"),
         (("--side-turn", "back"), "invalid choice: 'back' (choose from "),
         (("--seed", "-1"), "'-1' is no seed"),
-        (("--front", "90:99"), "no picture lies in the front span 90:99 s of a bag of"),
-        (("--front", "0:3"), "reference 'front': nobody is in the picture"),
+        (("--front", "90:99"), "no image lies in the front span 90:99 s of a bag of"),
+        (("--front", "0:3"), "reference 'front': nobody is in the image"),
         (("--side", "6.6:8"), "'front' and 'side' are too alike"),
         (("--output", "FOLDER/missing/new.yaml"), "No such file or directory; choose a folder"),
         (("--output", "FOLDER/text.txt/new.yaml"), "Not a directory; choose a folder"),
@@ -316,7 +316,7 @@ def test_the_course_of_the_readme(files: Files, capsys: pytest.CaptureFixture[st
     assert run(*words, "--csv", table, "--bag", bag, "--preset", "paper", "--particles", 50) == 0
     out = capsys.readouterr().out
     rows = table.read_text().count("\n") - 1
-    assert out.startswith(f"tracked {rows} of {rows} pictures, mean cost ")
+    assert out.startswith(f"tracked {rows} of {rows} images, mean cost ")
     assert f"wrote {table}\nwrote {bag}\n" in out
     assert run("urdf", model) == 0
     assert "<robot" in capsys.readouterr().out
@@ -344,7 +344,7 @@ sys.exit(main(sys.argv[1:]))
 
 def without_ros(*words: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", WITHOUT_ROS, *map(str, words)]
-    root = Path(__file__).resolve().parents[1]
+    root = Path(__file__).resolve().parents[2]
     return subprocess.run(command, capture_output=True, text=True, cwd=root, check=False)
 
 

@@ -19,7 +19,7 @@ from cardbox_tracker.simulation.session import synthesize_session
 
 BODY = BodyModel(hip_height_m=-0.51)
 LAST = 24
-"""So many pictures of the session's end were tracked."""
+"""So many images of the session's end were tracked."""
 
 
 @pytest.fixture(scope="module")
@@ -80,14 +80,14 @@ def test_everything_to_look_at_is_there(session: Path, result: DemoResult, tmp_p
     assert load_body_model(tmp_path / "body.yaml") == BODY
     assert cv2.imread(str(tmp_path / "joint_states.png")) is not None
     video = cv2.VideoCapture(str(tmp_path / "overlay.mp4"))
-    pictures = []
-    while (picture := video.read()[1]) is not None:
-        pictures.append(picture)
-    assert len(pictures) == LAST
-    assert {picture.shape for picture in pictures} == {(240, 320, 3)}
+    images = []
+    while (image := video.read()[1]) is not None:
+        images.append(image)
+    assert len(images) == LAST
+    assert {image.shape for image in images} == {(240, 320, 3)}
 
 
-def test_errors_and_lost_pictures_are_counted(
+def test_errors_and_lost_images_are_counted(
     session: Path, result: DemoResult, tmp_path: Path
 ) -> None:
     aside = np.array([0.03, 0.0, 0.04])
@@ -104,7 +104,7 @@ def test_errors_and_lost_pictures_are_counted(
     assert report["depth_error_m"] == pytest.approx(0.04)
 
 
-def test_a_picture_without_its_silhouette_has_no_cost(
+def test_an_image_without_its_silhouette_has_no_cost(
     session: Path, result: DemoResult, tmp_path: Path
 ) -> None:
     partial = replace(result, silhouettes=dict(list(result.silhouettes.items())[:3]))

@@ -17,17 +17,17 @@ CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
 EMPTY = np.zeros((240, 320), np.uint8)
 
 
-def wanted(picture: np.ndarray) -> np.ndarray:
-    return np.abs(picture.astype(int) - WANTED_BGR).max(axis=2) < 30
+def wanted(image: np.ndarray) -> np.ndarray:
+    return np.abs(image.astype(int) - WANTED_BGR).max(axis=2) < 30
 
 
 @pytest.mark.parametrize("scale", [1, 2])
 @pytest.mark.parametrize("name", REFERENCE_NAMES)
 def test_outline_surrounds_the_wanted_posture(name: str, scale: int) -> None:
     posture = reference_posture(name)
-    picture = draw_guidance(EMPTY, BODY, CAMERA, posture, instruction(name, "left"), scale=scale)
-    assert picture.shape == (240 * scale, 320 * scale, 3)
-    rows, columns = np.nonzero(wanted(picture))
+    image = draw_guidance(EMPTY, BODY, CAMERA, posture, instruction(name, "left"), scale=scale)
+    assert image.shape == (240 * scale, 320 * scale, 3)
+    rows, columns = np.nonzero(wanted(image))
     view = CAMERA.scaled(320 * scale, 240 * scale)
     pixels = view.project(view.reference_to_optical(keypoints_m(BODY, posture)))
     assert columns.min() < pixels[:, 0].min()
@@ -37,7 +37,7 @@ def test_outline_surrounds_the_wanted_posture(name: str, scale: int) -> None:
 
 @pytest.mark.parametrize("name", REFERENCE_NAMES)
 @pytest.mark.parametrize("number", [1, 60])
-def test_text_keeps_within_the_picture_and_off_the_person(name: str, number: int) -> None:
+def test_text_keeps_within_the_image_and_off_the_person(name: str, number: int) -> None:
     posture = reference_posture(name)
     words = instruction(name, "right")
     with_text = draw_guidance(EMPTY, BODY, CAMERA, posture, words, number)
@@ -54,12 +54,12 @@ def test_text_keeps_within_the_picture_and_off_the_person(name: str, number: int
 
 def test_the_number_can_be_left_out() -> None:
     posture = reference_posture("front")
-    pictures = [draw_guidance(EMPTY, BODY, CAMERA, posture, "go", n) for n in (None, 3, 4)]
-    assert np.any(pictures[0] != pictures[1])
-    assert np.any(pictures[1] != pictures[2])
+    images = [draw_guidance(EMPTY, BODY, CAMERA, posture, "go", n) for n in (None, 3, 4)]
+    assert np.any(images[0] != images[1])
+    assert np.any(images[1] != images[2])
 
 
-def test_words_are_written_over_a_white_picture_too() -> None:
+def test_words_are_written_over_a_white_image_too() -> None:
     white = np.full((240, 320), 255, np.uint8)
     posture = reference_posture("front")
     written = draw_guidance(white, BODY, CAMERA, posture, "face the camera")

@@ -32,16 +32,14 @@ def near(canvas: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
 
 @pytest.mark.parametrize("scale", [1, 2])
 @pytest.mark.parametrize("shape", [(240, 320), (240, 320, 3)])
-def test_an_overlay_is_a_colour_picture_of_the_asked_size(
-    shape: tuple[int, ...], scale: int
-) -> None:
-    picture = np.full(shape, 90, np.uint8)
-    overlay = draw_overlay(picture, BODY, CAMERA, FOUND, scale)
+def test_an_overlay_is_a_colour_image_of_the_asked_size(shape: tuple[int, ...], scale: int) -> None:
+    image = np.full(shape, 90, np.uint8)
+    overlay = draw_overlay(image, BODY, CAMERA, FOUND, scale)
     assert overlay.shape == (240 * scale, 320 * scale, 3)
     assert overlay.dtype == np.uint8
     assert near(overlay, OUTLINE_BGR).any()
     assert near(overlay, SKELETON_BGR).any()
-    assert np.all(picture == 90)
+    assert np.all(image == 90)
 
 
 @pytest.mark.parametrize("scale", [1, 3])

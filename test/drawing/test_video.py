@@ -21,16 +21,16 @@ def write(path: Path | str, count: int = len(LEVELS)) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.avi"])
-def test_every_picture_is_in_the_video(tmp_path: Path, name: str) -> None:
+def test_every_image_is_in_the_video(tmp_path: Path, name: str) -> None:
     write(tmp_path / name)
     assert [entry.name for entry in tmp_path.iterdir()] == [name]
     video = cv2.VideoCapture(str(tmp_path / name))
     assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(10)
     for level in LEVELS:
-        found, picture = video.read()
+        found, image = video.read()
         assert found
-        assert picture.shape == (48, 64, 3)
-        assert picture.mean() == pytest.approx(level, abs=4)
+        assert image.shape == (48, 64, 3)
+        assert image.mean() == pytest.approx(level, abs=4)
     assert not video.read()[0]
     video.release()
 

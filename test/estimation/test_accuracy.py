@@ -95,7 +95,7 @@ def mean_cost_px(runs: list[Run]) -> float:
 
 
 @pytest.mark.parametrize("name", CONFIGS)
-def test_every_picture_is_tracked(runs: dict[str, list[Run]], name: str) -> None:
+def test_every_image_is_tracked(runs: dict[str, list[Run]], name: str) -> None:
     for run in runs[name]:
         assert run.frames > 400
         assert run.frames_tracked == run.frames

@@ -37,7 +37,7 @@ def compiled() -> dict[str, int]:
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_no_picture_waits_for_the_compiler(preset: str) -> None:
+def test_no_image_waits_for_the_compiler(preset: str) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
@@ -47,8 +47,8 @@ def test_no_picture_waits_for_the_compiler(preset: str) -> None:
     extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
     tracker = Tracker(body, CAMERA, PRESETS[preset]())
     received = np.frombuffer(np.where(person > 0, 200, 90).astype(np.uint8).tobytes(), np.uint8)
-    for picture in (received.reshape(240, 320), received.reshape(240, 320).copy()):
-        silhouette = extractor(picture)
+    for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
+        silhouette = extractor(image)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
             state = tracker.track(pixels).state

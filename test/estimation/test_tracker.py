@@ -143,7 +143,7 @@ def test_what_is_below_the_hips_is_nobody() -> None:
     assert tracker.track(legs).state == NO_PERSON
 
 
-def test_whom_nothing_fits_is_lost_after_as_many_pictures() -> None:
+def test_whom_nothing_fits_is_lost_after_as_many_images() -> None:
     tracker = make(replace(paper_preset(), lost_frames=3))
     tracker.track(seen(front()))
     states = [tracker.track(stripes()).state for _ in range(5)]
@@ -151,7 +151,7 @@ def test_whom_nothing_fits_is_lost_after_as_many_pictures() -> None:
     assert tracker.track(stripes()) == Estimate(LOST, None, None, None, None, None)
 
 
-def test_one_good_picture_begins_the_count_anew() -> None:
+def test_one_good_image_begins_the_count_anew() -> None:
     tracker = make(replace(STILL, lost_frames=2))
     states = [
         tracker.track(silhouette).state
@@ -194,7 +194,7 @@ def test_whoever_was_lost_is_found(seed: int) -> None:
 
 
 def test_the_papers_tracker_goes_on_from_where_the_person_was() -> None:
-    """It knows no new search: one picture moves it by its noise of 2 cm and no further."""
+    """It knows no new search: one image moves it by its noise of 2 cm and no further."""
     tracker = make(paper_preset())
     tracker.track(seen(front()))
     tracker.track(NOBODY)
@@ -217,7 +217,7 @@ def test_reset_begins_from_the_front_reference() -> None:
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
 
 
-def test_reset_forgets_the_pictures_that_did_not_fit() -> None:
+def test_reset_forgets_the_images_that_did_not_fit() -> None:
     tracker = make(replace(STILL, lost_frames=2))
     states = [tracker.track(stripes()).state]
     tracker.reset()
@@ -261,7 +261,7 @@ class CountingCost(CompiledCost):
 
 
 @pytest.mark.parametrize("cycles", [1, 3])
-def test_a_picture_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
+def test_an_image_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
     config = replace(paper_preset(), cycles=cycles, noise_decay=0.1).with_particles(2000)
     # One survivor, so that particles lie around it by the noise of one cycle.
     config = replace(config, torso=replace(config.torso, survival_rate=1e-9))

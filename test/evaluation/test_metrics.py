@@ -74,7 +74,7 @@ def test_alignment_by_hand_scales_about_the_middle() -> None:
     np.testing.assert_allclose(align(2.0 * truth + 5.0, truth), truth, atol=1e-12)
 
 
-def test_alignment_takes_each_picture_for_itself() -> None:
+def test_alignment_takes_each_image_for_itself() -> None:
     truth = np.stack([joints(1), joints(2)])
     estimates = np.stack([2.0 * truth[0], truth[1] + 1.0])
     assert pa_mpjpe_m(estimates, truth) < 1e-9

@@ -24,7 +24,7 @@ FPS = 5.0
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording of one bow, 5 pictures a second, and its person as measured."""
+    """A recording of one bow, 5 images a second, and its person as measured."""
 
     folder: Path
     truth: GroundTruth

@@ -25,7 +25,7 @@ IMAGE, INFO = "/camera/image_raw", "/camera/camera_info"
 COUNT = 20
 
 
-def picture(number: int) -> Any:
+def image(number: int) -> Any:
     return np.random.default_rng(number).integers(0, 256, (24, 32), dtype=np.uint8)
 
 
@@ -37,7 +37,7 @@ def record(path: Path, storage: str = "mcap", count: int = COUNT) -> Path:
     with BagWriter(path, storage) as bag:
         for number in range(count):
             bag.write_camera_info(INFO, stamp(number), "optical", CAMERA)
-            bag.write_image(IMAGE, stamp(number), "optical", picture(number), "mono8")
+            bag.write_image(IMAGE, stamp(number), "optical", image(number), "mono8")
             bag.write_joint_state(
                 "/truth", stamp(number), "optical", JOINT_NAMES, np.full(12, number)
             )
@@ -68,9 +68,9 @@ def test_what_is_written_is_read_back(tmp_path: Path, storage: str) -> None:
         calibration = bag.calibration()
         assert calibration.camera(32, 24) == CAMERA
         assert calibration.frame_id == "optical"
-        for number, got in itertools.zip_longest(range(COUNT), bag.pictures()):
+        for number, got in itertools.zip_longest(range(COUNT), bag.images()):
             assert (got.stamp_ns, got.frame_id) == (stamp(number), "optical")
-            np.testing.assert_array_equal(got.grey, picture(number))
+            np.testing.assert_array_equal(got.grey, image(number))
             assert got.color.shape == (24, 32, 3)
         last = [bag.deserialize(message) for message in bag.messages(["/truth"])][-1]
         assert tuple(last.name) == JOINT_NAMES
@@ -101,7 +101,7 @@ def test_raw_bytes_of_one_recording_go_into_another_unchanged(tmp_path: Path, st
     assert first[0].raw[:4] == b"\x00\x01\x00\x00"
 
 
-def test_compressed_pictures_are_found_and_decoded(tmp_path: Path, storage: str) -> None:
+def test_compressed_images_are_found_and_decoded(tmp_path: Path, storage: str) -> None:
     smooth = np.broadcast_to(np.arange(0, 240, 10, dtype=np.uint8)[:, None], (24, 32))
     jpeg = cv2.imencode(".jpg", smooth, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
     with BagWriter(tmp_path / "bag", storage) as bag:
@@ -109,30 +109,30 @@ def test_compressed_pictures_are_found_and_decoded(tmp_path: Path, storage: str)
         bag.write_compressed(f"{IMAGE}/compressed", START_NS, "optical", jpeg)
     with BagReader(tmp_path / "bag") as bag:
         assert bag.camera_info_topic() == INFO
-        (got,) = bag.pictures()
+        (got,) = bag.images()
         np.testing.assert_allclose(got.grey, smooth, atol=4)
         assert got.color.shape == (24, 32, 3)
 
 
 @pytest.mark.parametrize("encoding", ["rgb8", "bgr8"])
-def test_a_colour_picture_keeps_its_colours(tmp_path: Path, encoding: str) -> None:
+def test_a_colour_image_keeps_its_colours(tmp_path: Path, encoding: str) -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
     with BagWriter(tmp_path / "bag") as bag:
         bag.write_image(IMAGE, START_NS, "optical", pixels, encoding)
     with BagReader(tmp_path / "bag") as bag:
-        (got,) = bag.pictures()
+        (got,) = bag.images()
         np.testing.assert_array_equal(
             got.color, pixels if encoding == "bgr8" else pixels[:, :, ::-1]
         )
 
 
 def test_reading_is_lazy(tmp_path: Path, storage: str) -> None:
-    """The first picture comes although the last one's bytes are no picture."""
+    """The first image comes although the last one's bytes are no image."""
     with BagWriter(tmp_path / "bag", storage) as bag:
-        bag.write_image(IMAGE, stamp(0), "optical", picture(0), "mono8")
-        bag.write_image(IMAGE, stamp(1), "optical", picture(1), "32FC1")
+        bag.write_image(IMAGE, stamp(0), "optical", image(0), "mono8")
+        bag.write_image(IMAGE, stamp(1), "optical", image(1), "32FC1")
     with BagReader(tmp_path / "bag") as bag:
-        np.testing.assert_array_equal(next(bag.pictures()).grey, picture(0))
+        np.testing.assert_array_equal(next(bag.images()).grey, image(0))
 
 
 def test_a_single_file_and_a_session_folder_are_recordings_too(
@@ -155,7 +155,7 @@ def test_mcap_tools_read_the_schemas(tmp_path: Path) -> None:
         decoded = [(c.topic, m) for _, c, _, m in tools.iter_decoded_messages()]
     assert len(decoded) == 3 * COUNT
     images = [message for topic, message in decoded if topic == IMAGE]
-    assert bytes(images[3].data) == picture(3).tobytes()
+    assert bytes(images[3].data) == image(3).tobytes()
     assert images[3].header.frame_id == "optical"
 
 
@@ -180,9 +180,9 @@ def test_the_metadata_names_jazzys_type_hashes(tmp_path: Path, storage: str) -> 
 
 
 def refusal(path: Path) -> str:
-    """What is said of a recording when all its pictures are asked for."""
+    """What is said of a recording when all its images are asked for."""
     with pytest.raises(BagError) as error, BagReader(path) as bag:
-        for each in bag.pictures():
+        for each in bag.images():
             assert each.grey.size
     return str(error.value)
 
@@ -216,26 +216,26 @@ def test_a_recording_without_messages_is_refused(tmp_path: Path, storage: str) -
     assert "no messages" in refusal(tmp_path / "bag")
 
 
-def test_a_recording_without_pictures_lists_its_topics(tmp_path: Path) -> None:
+def test_a_recording_without_images_lists_its_topics(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         bag.write_string("/chatter", START_NS, "hello")
     text = refusal(tmp_path / "bag")
-    assert "0 picture topics" in text
+    assert "0 image topics" in text
     assert "/chatter (std_msgs/msg/String)" in text
 
 
-def test_several_picture_topics_are_listed(tmp_path: Path) -> None:
+def test_several_image_topics_are_listed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         for side in ("left", "right"):
-            bag.write_image(f"/{side}/image_raw", START_NS, "optical", picture(0), "mono8")
+            bag.write_image(f"/{side}/image_raw", START_NS, "optical", image(0), "mono8")
             bag.write_camera_info(f"/{side}/camera_info", START_NS, "optical", CAMERA)
     text = refusal(tmp_path / "bag")
-    assert "2 picture topics" in text
+    assert "2 image topics" in text
     assert "/left/image_raw" in text
     assert "/right/image_raw" in text
     with BagReader(tmp_path / "bag") as bag:
-        (got,) = bag.pictures("/left/image_raw")
-        np.testing.assert_array_equal(got.grey, picture(0))
+        (got,) = bag.images("/left/image_raw")
+        np.testing.assert_array_equal(got.grey, image(0))
 
 
 def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
@@ -243,19 +243,19 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) 
         with pytest.raises(BagError, match=rf"/nose.*{IMAGE}"):
             list(bag.messages(["/nose"]))
         with pytest.raises(BagError, match=rf"/nose.*{IMAGE}"):
-            list(bag.pictures("/nose"))
+            list(bag.images("/nose"))
 
 
 def test_a_recording_without_camera_info_says_so(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
-        bag.write_image(IMAGE, START_NS, "optical", picture(0), "mono8")
+        bag.write_image(IMAGE, START_NS, "optical", image(0), "mono8")
     with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="0 CameraInfo topics"):
         bag.calibration()
 
 
 def test_an_uncalibrated_camera_is_refused_with_both_topics(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
-        bag.write_image(IMAGE, START_NS, "optical", picture(0), "mono8")
+        bag.write_image(IMAGE, START_NS, "optical", image(0), "mono8")
         bag.write_camera_info(INFO, START_NS, "optical", Camera(32, 24, 0.0, 0.0, 0.0, 0.0))
     with BagReader(tmp_path / "bag") as bag, pytest.raises(CameraError, match=f"{IMAGE}.*{INFO}"):
         bag.calibration()
@@ -278,7 +278,7 @@ def test_a_message_that_is_damaged_is_refused_on_the_way(tmp_path: Path) -> None
     folder = record(tmp_path / "bag", count=300)
     file = storage_file(folder)
     data = bytearray(file.read_bytes())
-    place = data.index(picture(0).tobytes()[:40])
+    place = data.index(image(0).tobytes()[:40])
     # The lengths of the message's strings, so that it no longer deserializes.
     data[place - 60 : place] = b"\xff" * 60
     file.write_bytes(data)

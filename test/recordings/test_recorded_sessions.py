@@ -16,7 +16,7 @@ from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 MEAN_ERROR_M = 0.15
 INITIALIZATION_IOU = 0.80
-# Nobody takes a posture, or leaves the picture, to the frame.
+# Nobody takes a posture, or leaves the image, to the frame.
 MARGIN_S = 0.2
 
 
@@ -54,7 +54,7 @@ def test_a_recorded_session_is_measured_and_tracked_to_its_end(
         if row["state"] == "tracking":
             points = [float(row[f"{joint}_{axis}"]) for joint in KEYPOINT_NAMES for axis in "xyz"]
             estimates_m[stamp_ns] = np.array(points).reshape(6, 3)
-    # Every picture with somebody in it, to the last one.
+    # Every image with somebody in it, to the last one.
     expected = [s for s in truth.frames if s >= truth.start_ns + round(start_s * 1e9)]
     assert [s for s in expected if states.get(s) != "tracking"] == []
     error = tracking_error(estimates_m, truth)

@@ -55,7 +55,7 @@ def decoded(results: tuple[Path, TrackSummary]) -> dict[str, list[Any]]:
     return messages
 
 
-def test_every_topic_is_there_once_a_picture(
+def test_every_topic_is_there_once_an_image(
     decoded: dict[str, list[Any]], results: tuple[Path, TrackSummary]
 ) -> None:
     summary = results[1]
@@ -82,7 +82,7 @@ def test_markers_follow_the_person_and_go_with_them(
         np.testing.assert_allclose((last.x, last.y, last.z), hand, atol=1e-9)
 
 
-def test_pictures_are_those_of_the_tracker(
+def test_images_are_those_of_the_tracker(
     decoded: dict[str, list[Any]], source: SilhouetteSource
 ) -> None:
     for frame, silhouette in zip(source.frames(0.0, 8.0), decoded["/silhouette"], strict=False):

@@ -1,4 +1,4 @@
-"""Silhouettes of a recording: spans of time, the background, and every picture once."""
+"""Silhouettes of a recording: spans of time, the background, and every image once."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def test_the_ends_belong_to_a_span() -> None:
     assert [span.contains(t) for t in (0.99, 1.0, 1.5, 2.0, 2.01)] == [0, 1, 1, 1, 0]
 
 
-def test_every_picture_comes_once_and_in_order(recording: Any, source: SilhouetteSource) -> None:
+def test_every_image_comes_once_and_in_order(recording: Any, source: SilhouetteSource) -> None:
     with BagReader(recording.folder) as bag:
-        stamps = [picture.stamp_ns for picture in bag.pictures()]
+        stamps = [image.stamp_ns for image in bag.images()]
     frames = list(source.frames())
     assert [frame.stamp_ns for frame in frames] == stamps
     assert [frame.time_s for frame in frames] == pytest.approx(np.arange(len(stamps)) / 5.0)
@@ -61,7 +61,7 @@ def test_silhouettes_are_the_person_and_the_empty_scene_has_none(
     assert np.mean(fits) > 0.95
 
 
-def test_pictures_are_brought_to_the_working_size(recording: Any) -> None:
+def test_images_are_brought_to_the_working_size(recording: Any) -> None:
     with BagReader(recording.folder) as bag:
         small = SilhouetteSource(bag, TimeSpan(0, 3.9), size=(160, 120))
         frame = next(small.frames(7.0))
@@ -70,22 +70,20 @@ def test_pictures_are_brought_to_the_working_size(recording: Any) -> None:
 
 
 @pytest.mark.parametrize(("span", "count"), [(TimeSpan(50, 60), 0), (TimeSpan(0.0, 0.1), 1)])
-def test_a_background_without_pictures_is_refused(
-    recording: Any, span: TimeSpan, count: int
-) -> None:
+def test_a_background_without_images_is_refused(recording: Any, span: TimeSpan, count: int) -> None:
     with (
         BagReader(recording.folder) as bag,
         pytest.raises(
             BagError,
-            match=rf"{count} pictures lie in the background span {span} s of a bag of 24.2 s;",
+            match=rf"{count} images lie in the background span {span} s of a bag of 24.2 s;",
         ),
     ):
         SilhouetteSource(bag, span)
 
 
-def test_a_span_without_pictures_is_refused_by_name(source: SilhouetteSource) -> None:
+def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> None:
     with pytest.raises(
         CardboxError,
-        match=r"no picture lies in the arms span 90:91 s of a bag of 24.2 s; give",
+        match=r"no image lies in the arms span 90:91 s of a bag of 24.2 s; give",
     ):
         source.silhouettes(TimeSpan(90, 91), "arms")

@@ -65,7 +65,7 @@ def test_a_reference_outside_of_the_recording_is_refused(
     recording: Any, source: SilhouetteSource
 ) -> None:
     spans = {name: TimeSpan(7.0, 8.0) for name in ("front", "side")} | {"arms": TimeSpan(70, 80)}
-    with pytest.raises(CardboxError, match="no picture lies in the arms span 70:80 s of a bag of"):
+    with pytest.raises(CardboxError, match="no image lies in the arms span 70:80 s of a bag of"):
         initialize_from_recording(source, spans, InitializationConfig())
 
 
@@ -73,7 +73,7 @@ def test_the_header_is_that_of_the_design() -> None:
     assert ",".join(CSV_HEADER) == HEADER
 
 
-def test_there_is_one_row_a_picture_with_its_stamp(
+def test_there_is_one_row_an_image_with_its_stamp(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv")
@@ -166,13 +166,13 @@ def test_a_start_after_the_end_is_refused_and_leaves_nothing(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     with pytest.raises(
-        CardboxError, match="no picture lies after --start 99 s; give seconds from the bag's start"
+        CardboxError, match="no image lies after --start 99 s; give seconds from the bag's start"
     ):
         track(recording, source, tmp_path / "person.csv", start_s=99.0)
     assert os.listdir(tmp_path) == []
 
 
-def test_observers_see_every_picture(
+def test_observers_see_every_image(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     seen = []
@@ -188,16 +188,16 @@ def test_observers_see_every_picture(
     ]
 
 
-def test_the_video_has_every_picture(
+def test_the_video_has_every_image(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv", video_path=tmp_path / "person.mp4")
     video = cv2.VideoCapture(str(tmp_path / "person.mp4"))
     count = 0
-    while (picture := video.read()[1]) is not None:
-        assert picture.shape == (480, 640, 3)
+    while (image := video.read()[1]) is not None:
+        assert image.shape == (480, 640, 3)
         # The model is drawn in colour over grey.
-        assert np.ptp(picture.astype(int), axis=2).max() > 60
+        assert np.ptp(image.astype(int), axis=2).max() > 60
         count += 1
     assert count == summary.frames
     assert sorted(os.listdir(tmp_path)) == ["person.csv", "person.mp4"]
@@ -243,7 +243,7 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
         assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x"]), abs=1e-6)
 
 
-def test_pictures_without_a_person_have_no_results(
+def test_images_without_a_person_have_no_results(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     with ResultBag(tmp_path / "results", recording.body, source.frame_id) as results:

@@ -1,4 +1,4 @@
-"""Pictures and silhouettes of synthetic people."""
+"""Images and silhouettes of synthetic people."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_every_person_covers_their_skeleton(seed: int, name: str) -> None:
     assert np.all(silhouette[v[seen], u[seen]] == 255)
 
 
-def test_left_is_right_in_the_picture() -> None:
+def test_left_is_right_in_the_image() -> None:
     posture = reference_posture("front")
     posture[4] = np.radians(100)
     columns = np.flatnonzero(renderer().silhouette(BODY, posture).any(axis=0))
@@ -83,10 +83,10 @@ def test_a_silhouette_is_as_large_as_a_finer_one() -> None:
 
 def test_the_person_stands_out_of_the_wall() -> None:
     view = renderer(Scene(noise=0.0))
-    empty, none = view.picture()
-    picture, mask = view.picture(BODY, reference_posture("front"))
+    empty, none = view.image()
+    image, mask = view.image(BODY, reference_posture("front"))
     assert not none.any()
-    difference = cv2.absdiff(picture, empty)
+    difference = cv2.absdiff(image, empty)
     inside = cv2.erode(mask, np.ones((3, 3), np.uint8)) > 0
     outside = cv2.dilate(mask, np.ones((3, 3), np.uint8)) == 0
     assert difference[inside].min() > 15
@@ -103,21 +103,21 @@ def test_the_torso_hides_the_far_forearm(turn: str) -> None:
     frames = forward_kinematics(BODY, posture)
     arm = frames.left if turn == "left" else frames.right
     u, v = np.rint(CAMERA.project(CAMERA.reference_to_optical(arm.elbow))).astype(int)
-    picture, mask = renderer().picture(BODY, posture)
+    image, mask = renderer().image(BODY, posture)
     assert mask[v + 5, u] == 255
-    assert picture[v + 5, u] < 0.5 * (SHIRT + SKIN)
+    assert image[v + 5, u] < 0.5 * (SHIRT + SKIN)
 
 
 def test_noise_flicker_and_shadow_are_as_told() -> None:
     noisy = renderer(Scene(texture=0.0, noise=3.0))
-    stack = np.array([noisy.picture()[0] for _ in range(30)], np.float64)
+    stack = np.array([noisy.image()[0] for _ in range(30)], np.float64)
     assert stack.std(axis=0).mean() == pytest.approx(3.0, rel=0.05)
     flickering = renderer(Scene(texture=0.0, noise=0.0, flicker=0.02))
-    levels = [flickering.picture()[0].mean() for _ in range(200)]
+    levels = [flickering.image()[0].mean() for _ in range(200)]
     assert np.std(levels) == pytest.approx(0.02 * 180, rel=0.2)
     posture = reference_posture("front")
-    lit, mask = renderer().picture(BODY, posture)
-    shaded, same = renderer(Scene(texture=0.0, noise=0.0, shadow=0.12)).picture(BODY, posture)
+    lit, mask = renderer().image(BODY, posture)
+    shaded, same = renderer(Scene(texture=0.0, noise=0.0, shadow=0.12)).image(BODY, posture)
     np.testing.assert_array_equal(mask, same)
     ratio = shaded[mask == 0] / lit[mask == 0].astype(float)
     assert 0.87 < ratio.min() < 0.95
@@ -128,7 +128,7 @@ def test_noise_flicker_and_shadow_are_as_told() -> None:
 def test_the_same_generator_gives_the_same_bytes() -> None:
     scene = Scene(flicker=0.01, shadow=0.1)
     first, second, other = (
-        renderer(scene, seed).picture(BODY, reference_posture("arms"))[0] for seed in (1, 1, 2)
+        renderer(scene, seed).image(BODY, reference_posture("arms"))[0] for seed in (1, 1, 2)
     )
     assert first.tobytes() == second.tobytes()
     assert first.tobytes() != other.tobytes()

@@ -28,13 +28,13 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def pixels(folder: Path) -> bytes:
     with BagReader(folder) as bag:
-        return b"".join(picture.grey.tobytes() for picture in bag.pictures())
+        return b"".join(image.grey.tobytes() for image in bag.images())
 
 
 def test_the_truth_beside_the_bag_is_that_of_its_messages(session: Path) -> None:
     truth = json.loads((session / "ground_truth.json").read_text())
     with BagReader(session) as bag:
-        stamps = [picture.stamp_ns for picture in bag.pictures()]
+        stamps = [image.stamp_ns for image in bag.images()]
         states = {m.time_ns: bag.deserialize(m) for m in bag.messages([TRUTH_TOPIC])}
     frames = truth["frames"]
     assert stamps[0] == START_NS
@@ -105,7 +105,7 @@ def test_hips_stand_where_those_of_a_person_at_two_metres_do(tmp_path: Path) -> 
     assert front["joints_m"]["hips"][2] == pytest.approx(2.0)
 
 
-def test_the_seed_alone_decides_the_pictures(session: Path, tmp_path: Path) -> None:
+def test_the_seed_alone_decides_the_images(session: Path, tmp_path: Path) -> None:
     synthesize_session(tmp_path / "same", **SMALL, storage="sqlite3")
     synthesize_session(tmp_path / "other", **SMALL, seed=1)
     assert pixels(tmp_path / "same") == pixels(session)
@@ -118,7 +118,7 @@ def test_colour_recordings_show_the_same(
 ) -> None:
     synthesize_session(tmp_path / "bag", **SMALL, **options)
     with BagReader(tmp_path / "bag") as bag, BagReader(session) as grey:
-        for got, expected in zip(bag.pictures(), grey.pictures(), strict=True):
+        for got, expected in zip(bag.images(), grey.images(), strict=True):
             np.testing.assert_allclose(got.grey, expected.grey, atol=1)
 
 
@@ -126,7 +126,7 @@ def test_compressed_recordings_show_nearly_the_same(session: Path, tmp_path: Pat
     synthesize_session(tmp_path / "bag", **SMALL, compressed=True)
     with BagReader(tmp_path / "bag") as bag, BagReader(session) as grey:
         assert bag.image_topic() == "/camera/image_raw/compressed"
-        for got, expected in zip(bag.pictures(), grey.pictures(), strict=True):
+        for got, expected in zip(bag.images(), grey.images(), strict=True):
             assert np.abs(got.grey.astype(int) - expected.grey).mean() < 4
 
 

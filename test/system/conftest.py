@@ -60,8 +60,8 @@ class Scene:
             posture[0] = self.body.lateral_m
         return render(cardbox_patches(self.body, posture), self.camera)
 
-    def picture(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
-        """Return the noisy picture (H, W) of the same."""
+    def image(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
+        """Return the noisy image (H, W) of the same."""
         clean = np.where(self.silhouette(posture) > 0, 190.0, 90.0)
         return np.clip(clean + self._rng.normal(0, 2, clean.shape), 0, 255).astype(np.uint8)
 
@@ -193,7 +193,7 @@ class Graph:
         return self.wait(found, f"diagnostics of {node} with '{words}'")
 
     def next_stamp(self) -> Any:
-        """Return a stamp one picture (1/15 s) after the last."""
+        """Return a stamp one image (1/15 s) after the last."""
         from builtin_interfaces.msg import Time
 
         self._stamp_ns += 66_666_667

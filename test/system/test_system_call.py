@@ -14,7 +14,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
 def called(graph: Any, service: str) -> subprocess.CompletedProcess[str]:

@@ -13,8 +13,8 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 CALIBRATION = """\
 image_width: 64
@@ -47,11 +47,11 @@ def test_video_and_calibration_come_out_at_the_rate(
     process = graph.start(
         "camera", file=video, loop=True, rate_hz=20.0, calibration_file=calibration, frame_id="eye"
     )
-    graph.wait(lambda: len(images) >= 25 and len(infos) >= 25, "pictures beyond the file's end")
+    graph.wait(lambda: len(images) >= 25 and len(infos) >= 25, "images beyond the file's end")
     assert (images[0].width, images[0].height, images[0].encoding) == (64, 48, "mono8")
     assert images[0].header.frame_id == infos[0].header.frame_id == "eye"
     assert (infos[0].k[0], infos[0].d[0]) == (60.0, 0.1)
-    # Whichever topic was found first has pictures that the other lacks.
+    # Whichever topic was found first has images that the other lacks.
     stamps = [[stamp_ns(m.header.stamp) for m in messages] for messages in (images, infos)]
     first, last = max(s[0] for s in stamps), min(s[-1] for s in stamps)
     shared = [[at for at in each if first <= at <= last] for each in stamps]

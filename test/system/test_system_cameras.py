@@ -20,8 +20,8 @@ from geometry_msgs.msg import PoseArray  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
 LATERAL_M = {"left": -0.35, "right": 0.3}
@@ -75,7 +75,7 @@ class Eye:
         header = Header(frame_id=f"{self.name}_optical", stamp=self.graph.next_stamp())
         self.stamps.add((header.stamp.sec, header.stamp.nanosec))
         self.infos.publish(camera_info_message(header, self.scene.camera))
-        self.images.publish(image_message(header, self.scene.picture(posture), "mono8"))
+        self.images.publish(image_message(header, self.scene.image(posture), "mono8"))
 
 
 @pytest.fixture(scope="module")

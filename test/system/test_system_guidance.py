@@ -14,8 +14,8 @@ from std_msgs.msg import Header, String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.drawing.guidance import WANTED_BGR  # noqa: E402
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
 class Person:
@@ -56,7 +56,7 @@ def test_guidance_gives_up_with_the_reason_when_nobody_comes(person: Person) -> 
     person.obeys, person.posture = False, None
     person.graph.spin(0.5)
     response = person.graph.call("initializer/initialize")
-    assert not response.success and "nobody is in the picture" in response.message
+    assert not response.success and "nobody is in the image" in response.message
     lines = [status.data for status in person.statuses]
     assert any(line.startswith("front: not captured: ") for line in lines)
 

@@ -27,7 +27,7 @@ pytest.importorskip("ros2launch", reason="ros2launch is not installed (not on Py
 
 from sensor_msgs.msg import JointState  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.vision.background import BackgroundConfig  # noqa: E402
 
 EMPTY = BackgroundConfig().learn_images + 30
@@ -58,11 +58,11 @@ def recorded(scene: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     assert video.isOpened()
     with BagWriter(folder / "bag") as bag:
         for number in range(EMPTY + FRONT):
-            picture = scene.picture(None if number < EMPTY else "front")
+            image = scene.image(None if number < EMPTY else "front")
             stamp_ns = START_NS + int(number * 1e9 / FPS)
             bag.write_camera_info("/eye/camera_info", stamp_ns, "eye", scene.camera)
-            bag.write_image("/eye/image_raw", stamp_ns, "eye", picture, "mono8")
-            video.write(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
+            bag.write_image("/eye/image_raw", stamp_ns, "eye", image, "mono8")
+            video.write(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
     video.release()
     save_body_model(scene.body, folder / "model.yaml")
     return {name: folder / name for name in ("bag", "video.avi", "model.yaml")}

@@ -1,4 +1,4 @@
-"""Pictures in, joint states out: background, initializer and tracker as separate processes.
+"""Images in, joint states out: background, initializer and tracker as separate processes.
 
 The tests share one running graph and follow a user's session in order.
 """
@@ -28,8 +28,8 @@ from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
 
@@ -61,19 +61,19 @@ class Session:
         return Header(frame_id="test_optical", stamp=self.graph.next_stamp())
 
     def show(self, posture: NDArray[np.float64] | str | None, count: int = 1) -> list[Any]:
-        """Publish pictures and wait for the silhouette of each; return the stamps."""
+        """Publish images and wait for the silhouette of each; return the stamps."""
         stamps = []
         for _ in range(count):
             header = self.header()
             before = len(self.silhouettes)
             self.infos.publish(camera_info_message(header, self.scene.camera))
-            self.images.publish(image_message(header, self.scene.picture(posture), "mono8"))
+            self.images.publish(image_message(header, self.scene.image(posture), "mono8"))
             self.graph.wait(lambda before=before: len(self.silhouettes) > before, "a silhouette")
             stamps.append(header.stamp)
         return stamps
 
     def track(self, posture: NDArray[np.float64] | str, count: int) -> list[Any]:
-        """Show pictures and wait for the joint state of each; return the joint states."""
+        """Show images and wait for the joint state of each; return the joint states."""
         first = len(self.joint_states)
         for number in range(1, count + 1):
             self.show(posture)
@@ -95,14 +95,14 @@ def learned(session: Session) -> Session:
     for _ in range(LEARN_IMAGES - 1):
         header = session.header()
         session.infos.publish(camera_info_message(header, session.scene.camera))
-        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        session.images.publish(image_message(header, session.scene.image(None), "mono8"))
         graph.spin(0.03)
     for _ in range(100):
         if session.silhouettes:
             break
         header = session.header()
         session.infos.publish(camera_info_message(header, session.scene.camera))
-        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        session.images.publish(image_message(header, session.scene.image(None), "mono8"))
         graph.spin(0.05)
     assert session.silhouettes
     return session
@@ -127,7 +127,7 @@ def measured(learned: Session) -> tuple[Session, str, str]:
     [
         ("initializer/capture_front", ("no silhouette was received yet on /silhouette",)),
         ("initializer/initialize", ("no silhouette was received yet on /silhouette",)),
-        ("background/learn", ("no picture was received yet on /image_raw", "/camera_info")),
+        ("background/learn", ("no image was received yet on /image_raw", "/camera_info")),
         ("tracker/reset", ("nothing to reset", "/body_model")),
     ],
 )
@@ -142,15 +142,15 @@ def test_a_service_called_too_early_says_what_is_missing(
 
 def test_every_node_says_what_it_waits_for(session: Session) -> None:
     for node, words in (
-        ("background", "waiting for pictures on /image_raw"),
+        ("background", "waiting for images on /image_raw"),
         ("initializer", "waiting for silhouettes on /silhouette"),
         ("tracker", "waiting for a body model on /body_model"),
     ):
         session.graph.diagnosis(node, words)
 
 
-def test_pictures_without_camera_info_are_waited_for_in_words(session: Session) -> None:
-    session.images.publish(image_message(session.header(), session.scene.picture(None), "mono8"))
+def test_images_without_camera_info_are_waited_for_in_words(session: Session) -> None:
+    session.images.publish(image_message(session.header(), session.scene.image(None), "mono8"))
     session.graph.diagnosis("background", "waiting for the CameraInfo on /camera_info")
 
 
@@ -170,7 +170,7 @@ def test_background_is_learned_and_latched(learned: Session) -> None:
     assert np.frombuffer(deviations[0].data, np.float32).mean() == pytest.approx(2, abs=0.5)
 
 
-def test_silhouette_has_the_stamp_size_and_camera_info_of_its_picture(learned: Session) -> None:
+def test_silhouette_has_the_stamp_size_and_camera_info_of_its_image(learned: Session) -> None:
     infos = learned.graph.collect(CameraInfo, "silhouette/camera_info")
     learned.graph.wait(
         lambda: learned.graph.node.count_subscribers("silhouette/camera_info") == 3, "discovery"
@@ -190,7 +190,7 @@ def test_silhouette_has_the_stamp_size_and_camera_info_of_its_picture(learned: S
 
 
 def test_unsupported_encoding_is_refused_in_words_and_the_node_goes_on(learned: Session) -> None:
-    message = image_message(learned.header(), learned.scene.picture(None), "mono8")
+    message = image_message(learned.header(), learned.scene.image(None), "mono8")
     message.encoding = "16UC3"
     learned.images.publish(message)
     status = learned.graph.diagnosis("background", "16UC3")
@@ -199,16 +199,16 @@ def test_unsupported_encoding_is_refused_in_words_and_the_node_goes_on(learned: 
 
 
 def test_too_few_bytes_are_refused_and_the_node_goes_on(learned: Session) -> None:
-    message = image_message(learned.header(), learned.scene.picture(None), "mono8")
+    message = image_message(learned.header(), learned.scene.image(None), "mono8")
     message.height = 480
     learned.images.publish(message)
     learned.show(None)
 
 
-def test_capture_refuses_an_empty_picture(learned: Session) -> None:
+def test_capture_refuses_an_empty_image(learned: Session) -> None:
     learned.show(None, 5)
     response = learned.graph.call("initializer/capture_front")
-    assert not response.success and "nobody is in the picture" in response.message
+    assert not response.success and "nobody is in the image" in response.message
 
 
 def test_capture_refuses_a_person_cut_off(learned: Session) -> None:
@@ -257,7 +257,7 @@ def test_robot_description_is_latched_and_has_the_joints(
     assert "test_optical" in {link.get("name") for link in robot.findall("link")}
 
 
-def test_each_picture_gives_joint_states_of_its_stamp(measured: tuple[Session, str, str]) -> None:
+def test_each_image_gives_joint_states_of_its_stamp(measured: tuple[Session, str, str]) -> None:
     session, _, _ = measured
     first = len(session.joint_states)
     stamps = []
@@ -277,7 +277,7 @@ def test_each_picture_gives_joint_states_of_its_stamp(measured: tuple[Session, s
     assert camera.width == 320
 
 
-def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
+def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     measured: tuple[Session, str, str],
 ) -> None:
     session, _, _ = measured
@@ -295,7 +295,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
         latest = [m[-1].header.stamp for m in (keypoints, overlays, deviations) if m]
         return state if markers and latest == [state.header.stamp] * 3 else None
 
-    state = graph.wait(shown, "all outputs of one picture")
+    state = graph.wait(shown, "all outputs of one image")
     assert keypoints[-1].header.stamp == state.header.stamp
     assert keypoints[-1].header.frame_id == "test_optical"
     points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
@@ -316,7 +316,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_picture(
         "markers removed when nobody is there",
     )
     assert len(session.joint_states) == before
-    graph.diagnosis("tracker", "nobody is in the picture")
+    graph.diagnosis("tracker", "nobody is in the image")
 
 
 def test_joints_and_urdf_of_rep155_put_the_hands_at_the_keypoints(
@@ -388,7 +388,7 @@ def test_wrong_parameter_is_refused_and_a_right_one_is_live(
     before = len(session.joint_states)
     session.show("front")
     graph.diagnosis("tracker", "the person was lost")
-    assert len(session.joint_states) == before, "it takes effect at the very next picture"
+    assert len(session.joint_states) == before, "it takes effect at the very next image"
     assert set_parameter("lost_iou", 0.3).successful
     assert set_parameter("particles", 100).successful
     session.track("front", 2)
@@ -400,7 +400,7 @@ def test_a_brighter_scene_names_the_controls_of_the_camera(learned: Session) -> 
     for _ in range(3):
         header = learned.header()
         learned.infos.publish(camera_info_message(header, learned.scene.camera))
-        brighter = np.clip(learned.scene.picture(None).astype(int) + 40, 0, 255).astype(np.uint8)
+        brighter = np.clip(learned.scene.image(None).astype(int) + 40, 0, 255).astype(np.uint8)
         learned.images.publish(image_message(header, brighter, "mono8"))
         graph.spin(0.1)
     status = graph.diagnosis("background", "the whole scene changed its brightness")
@@ -448,7 +448,7 @@ def test_diagnostics_have_state_rates_latency_and_fit(measured: tuple[Session, s
     session.track("front", 3)
     common = {"rate in (Hz)", "rate out (Hz)", "latency p95 (ms)", "dropped (by stamps)", "late"}
     for node, keys in (
-        ("background", {"scene brightness drift (grey levels)", "foreground (% of the picture)"}),
+        ("background", {"scene brightness drift (grey levels)", "foreground (% of the image)"}),
         ("tracker", {"state", "iou", "cost (px)"}),
     ):
         status = session.graph.diagnosis(node, "working")
@@ -465,11 +465,11 @@ def test_learning_again_stops_silhouettes_until_it_is_done(
 ) -> None:
     session, _, _ = measured
     response = session.graph.call("background/learn")
-    assert response.success and f"{LEARN_IMAGES} pictures" in response.message
+    assert response.success and f"{LEARN_IMAGES} images" in response.message
     before = len(session.silhouettes)
     for _ in range(LEARN_IMAGES):
         header = session.header()
-        session.images.publish(image_message(header, session.scene.picture(None), "mono8"))
+        session.images.publish(image_message(header, session.scene.image(None), "mono8"))
         session.graph.spin(0.03)
     session.graph.wait(lambda: len(session.silhouettes) > before, "silhouettes again")
     assert len(session.silhouettes) <= before + 2

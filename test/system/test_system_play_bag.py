@@ -15,8 +15,8 @@ from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 50_000_000
@@ -30,8 +30,8 @@ def bag(request: pytest.FixtureRequest, scene: Any, tmp_path_factory: Any) -> Pa
         for number in range(COUNT):
             now_ns = START_NS + number * PERIOD_NS
             writer.write_camera_info("/camera_info", now_ns, "optical", scene.camera)
-            picture = np.full((24, 32), number, np.uint8)
-            writer.write_image("/image_raw", now_ns, "optical", picture, "mono8")
+            image = np.full((24, 32), number, np.uint8)
+            writer.write_image("/image_raw", now_ns, "optical", image, "mono8")
     return path
 
 
@@ -80,7 +80,7 @@ def test_it_pauses_where_told_and_resumes_on_call(graph: Any, bag: Path) -> None
     assert response.success and "paused at" in response.message
     assert graph.call("play_bag/resume").success
     assert ended(graph, process) == 0
-    graph.wait(lambda: len(images) == COUNT, "all pictures")
+    graph.wait(lambda: len(images) == COUNT, "all images")
     for subscription in list(graph.node.subscriptions):
         graph.node.destroy_subscription(subscription)
 
@@ -91,7 +91,7 @@ def test_part_and_topics_can_be_chosen(graph: Any, bag: Path) -> None:
     options = ("--start", "0.5", "--duration", "0.49", "--topics", "/image_raw", "--delay", "1")
     process = graph.start("play_bag", str(bag), *options)
     assert ended(graph, process) == 0
-    graph.wait(lambda: len(images) == 10, "ten pictures")
+    graph.wait(lambda: len(images) == 10, "ten images")
     assert [image.data[0] for image in images] == list(range(10, 20))
     assert not infos
     for subscription in list(graph.node.subscriptions):
@@ -106,7 +106,7 @@ def test_it_waits_until_a_topic_is_published(graph: Any, bag: Path) -> None:
     assert not images
     publisher = graph.node.create_publisher(String, "keypoints", 1)
     assert ended(graph, process) == 0
-    graph.wait(lambda: len(images) == COUNT, "all pictures")
+    graph.wait(lambda: len(images) == COUNT, "all images")
     graph.node.destroy_publisher(publisher)
     for subscription in list(graph.node.subscriptions):
         graph.node.destroy_subscription(subscription)
@@ -123,7 +123,7 @@ def test_it_plays_in_the_process_of_the_nodes_and_ends_on_a_signal(graph: Any, b
     images = graph.collect(Image, "image_raw", qos.REPLAY)
     given = ("-p", f"play_bag:bag:={bag}", "-p", "play_bag:loop:=true")
     process = graph.start("single_process", "--with", "play_bag", "--ros-args", *given)
-    graph.wait(lambda: len(images) > COUNT + 5, "pictures of the second round")
+    graph.wait(lambda: len(images) > COUNT + 5, "images of the second round")
     assert process.stop() == 0, process.text()
     graph.processes.remove(process)
     assert "Traceback" not in process.text()

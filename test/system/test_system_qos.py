@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
 def is_reported(graph: Any, words: str) -> bool:

@@ -15,8 +15,8 @@ from geometry_msgs.msg import PoseArray  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
-from cardbox_tracker.ros import qos  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.simulation.session import synthesize_session  # noqa: E402
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -27,7 +27,7 @@ MEAN_ERROR_M = 0.15
 
 
 def deep(topic: str, end: str) -> tuple[str, ...]:
-    """Return arguments that let ``topic`` queue up, so that no slow machine loses a picture."""
+    """Return arguments that let ``topic`` queue up, so that no slow machine loses an image."""
     name = f"qos_overrides.{topic}.{end}"
     return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:={qos.REPLAY.depth}")
 
@@ -113,8 +113,8 @@ def test_session_is_measured_and_tracked_to_its_end(
         lambda: states[-1:] and stamp_ns(states[-1].header.stamp) >= last_ns, "the last joint state"
     )
     graph.spin(0.5)
-    pictures = [f["stamp_ns"] for f in frames if f["stamp_ns"] >= stamp_ns(states[0].header.stamp)]
-    assert [stamp_ns(state.header.stamp) for state in states] == pictures
+    images = [f["stamp_ns"] for f in frames if f["stamp_ns"] >= stamp_ns(states[0].header.stamp)]
+    assert [stamp_ns(state.header.stamp) for state in states] == images
     where = {frame["stamp_ns"]: frame["joints_m"] for frame in frames}
     errors = [
         np.linalg.norm(np.array([(p.position.x, p.position.y, p.position.z)]) - where[at][joint])
@@ -122,5 +122,5 @@ def test_session_is_measured_and_tracked_to_its_end(
         if (at := stamp_ns(message.header.stamp)) in where
         for joint, p in zip(KEYPOINTS, message.poses, strict=True)
     ]
-    print(f"{name}: IoU {iou:.2f}, {len(states)} pictures, mean error {np.mean(errors):.3f} m")
+    print(f"{name}: IoU {iou:.2f}, {len(states)} images, mean error {np.mean(errors):.3f} m")
     assert np.mean(errors) < MEAN_ERROR_M

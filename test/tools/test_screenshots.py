@@ -1,4 +1,4 @@
-"""The pictures of the documents: made again, they are the same and small."""
+"""The images of the documents: made again, they are the same and small."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ COMMITTED = Path(__file__).parents[2] / "docs" / "images"
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("pictures") / "images"
+def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("images") / "images"
     finished: list[float] = []
     written = write_screenshots(folder, 0, finished.append)
     assert finished[-1] == 1.0
@@ -27,14 +27,14 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {path.stem: path for path in written}
 
 
-def near(picture: np.ndarray, colour: tuple[int, int, int]) -> int:
-    return np.count_nonzero(np.abs(picture.astype(int) - colour).max(axis=2) < 60)
+def near(image: np.ndarray, colour: tuple[int, int, int]) -> int:
+    return np.count_nonzero(np.abs(image.astype(int) - colour).max(axis=2) < 60)
 
 
 @pytest.mark.slow
-def test_every_picture_is_made_and_shows_what_it_is_about(pictures: dict[str, Path]) -> None:
-    assert sorted(pictures) == NAMES
-    shown = {name: cv2.imread(str(path)) for name, path in pictures.items()}
+def test_every_image_is_made_and_shows_what_it_is_about(images: dict[str, Path]) -> None:
+    assert sorted(images) == NAMES
+    shown = {name: cv2.imread(str(path)) for name, path in images.items()}
     assert near(shown["tracking"], OUTLINE_BGR) > 1000
     assert near(shown["guidance"], WANTED_BGR) > 1000
     white = shown["steps"][:, shown["steps"].shape[1] // 3 : 2 * shown["steps"].shape[1] // 3]
@@ -43,14 +43,14 @@ def test_every_picture_is_made_and_shows_what_it_is_about(pictures: dict[str, Pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_the_committed_picture_is_the_present_one(pictures: dict[str, Path], name: str) -> None:
+def test_the_committed_image_is_the_present_one(images: dict[str, Path], name: str) -> None:
     """If not: ``python -m tools.screenshots --output docs/images``.
 
-    Fonts and JPEG differ between releases of OpenCV, so pictures are compared coarsely.
+    Fonts and JPEG differ between releases of OpenCV, so images are compared coarsely.
     """
     made, committed = (
         cv2.resize(cv2.imread(str(path)), (60, 24), interpolation=cv2.INTER_AREA).astype(int)
-        for path in (pictures[name], COMMITTED / f"{name}.jpg")
+        for path in (images[name], COMMITTED / f"{name}.jpg")
     )
     assert np.abs(made - committed).mean() < 6
 

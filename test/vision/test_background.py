@@ -25,7 +25,7 @@ def flat(mean: float, stddev: float, shape: tuple[int, int] = (H, W)) -> Backgro
     return BackgroundModel(np.full(shape, mean, np.float32), np.full(shape, stddev, np.float32))
 
 
-def picture(level: float, person: float | None = None) -> np.ndarray:
+def image(level: float, person: float | None = None) -> np.ndarray:
     made = np.full((H, W), level)
     if person is not None:
         made[PERSON] = person
@@ -39,15 +39,15 @@ def person_mask() -> np.ndarray:
 
 
 @given(arrays(np.uint8, st.tuples(st.integers(2, 12), st.just(3), st.just(4))))
-def test_mean_and_deviation_are_those_of_numpy(pictures: np.ndarray) -> None:
+def test_mean_and_deviation_are_those_of_numpy(images: np.ndarray) -> None:
     learner = BackgroundLearner()
-    for one in pictures:
+    for one in images:
         learner.add(one)
     model = learner.model()
-    assert learner.count == len(pictures)
+    assert learner.count == len(images)
     assert model.mean.dtype == model.stddev.dtype == np.float32
-    np.testing.assert_allclose(model.mean, pictures.mean(axis=0), atol=1e-3)
-    np.testing.assert_allclose(model.stddev, pictures.std(axis=0, ddof=1), atol=1e-2)
+    np.testing.assert_allclose(model.mean, images.mean(axis=0), atol=1e-3)
+    np.testing.assert_allclose(model.stddev, images.std(axis=0, ddof=1), atol=1e-2)
 
 
 def test_mean_and_deviation_by_hand() -> None:
@@ -70,15 +70,15 @@ def test_what_was_learned_stays_when_more_is_added() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_deviation_needs_two_pictures(count: int) -> None:
+def test_a_deviation_needs_two_images(count: int) -> None:
     learner = BackgroundLearner()
     for _ in range(count):
         learner.add(np.zeros((2, 2), np.uint8))
-    with pytest.raises(ValueError, match=f"^{count} pictures learned"):
+    with pytest.raises(ValueError, match=f"^{count} images learned"):
         learner.model()
 
 
-def test_a_picture_of_another_size_is_refused() -> None:
+def test_an_image_of_another_size_is_refused() -> None:
     learner = BackgroundLearner()
     learner.add(np.zeros((4, 6), np.uint8))
     with pytest.raises(ValueError, match=r"\(6, 4\), those before it \(4, 6\)"):
@@ -119,7 +119,7 @@ def test_a_pixel_free_of_noise_does_not_fire_on_one_grey_level() -> None:
 @pytest.mark.parametrize("level", [40, 100, 180])
 @pytest.mark.parametrize("contrast", [-30, 30])
 def test_a_person_is_cut_out_along_the_outline(level: int, contrast: int) -> None:
-    got = SilhouetteExtractor(flat(level, 2))(picture(level, level + contrast))
+    got = SilhouetteExtractor(flat(level, 2))(image(level, level + contrast))
     assert set(np.unique(got)) == {0, 255}
     wrong = np.count_nonzero(got != person_mask())
     # The outline is 2 x (80 + 40) px long: at most the four corners may be rounded.
@@ -130,8 +130,8 @@ def test_a_person_is_cut_out_of_noise() -> None:
     rng = np.random.default_rng(3)
     learner = BackgroundLearner()
     for _ in range(30):
-        learner.add((picture(100) + rng.normal(0, 3, (H, W))).round().astype(np.uint8))
-    noisy = (picture(100, 150) + rng.normal(0, 3, (H, W))).round().astype(np.uint8)
+        learner.add((image(100) + rng.normal(0, 3, (H, W))).round().astype(np.uint8))
+    noisy = (image(100, 150) + rng.normal(0, 3, (H, W))).round().astype(np.uint8)
     plain = SilhouetteExtractor(learner.model(), PLAIN)(noisy)
     clean = SilhouetteExtractor(learner.model())(noisy)
     # The rule alone flags one pixel in twenty.
@@ -140,32 +140,32 @@ def test_a_person_is_cut_out_of_noise() -> None:
 
 
 def test_an_empty_scene_gives_nothing() -> None:
-    assert not SilhouetteExtractor(flat(100, 2))(picture(100)).any()
+    assert not SilhouetteExtractor(flat(100, 2))(image(100)).any()
 
 
 def test_a_shadow_is_not_the_person() -> None:
-    shadow = picture(150, 135)
+    shadow = image(150, 135)
     assert not SilhouetteExtractor(flat(150, 2))(shadow).any()
     without = BackgroundConfig(shadow=0.0)
     assert np.count_nonzero(SilhouetteExtractor(flat(150, 2), without)(shadow)) > 3000
     # Only what is darker can be a shadow.
-    assert np.count_nonzero(SilhouetteExtractor(flat(150, 2))(picture(150, 165))) > 3000
+    assert np.count_nonzero(SilhouetteExtractor(flat(150, 2))(image(150, 165))) > 3000
 
 
 @pytest.mark.parametrize("gain", [0.94, 1.06])
 def test_a_scene_that_flickers_stays_background(gain: float) -> None:
     model = flat(200, 2)
     extractor = SilhouetteExtractor(model)
-    got = extractor(picture(200 * gain, 100 * gain))
+    got = extractor(image(200 * gain, 100 * gain))
     assert extractor.gain == pytest.approx(gain, abs=1e-6)
     assert np.count_nonzero(got != person_mask()) <= 8
     rigid = SilhouetteExtractor(model, BackgroundConfig(flicker=0.0, shadow=0.0))
-    assert np.all(rigid(picture(200 * gain)) == 255)
+    assert np.all(rigid(image(200 * gain)) == 255)
 
 
 def test_a_larger_change_than_flicker_is_not_followed() -> None:
     extractor = SilhouetteExtractor(flat(100, 2))
-    extractor(picture(130))
+    extractor(image(130))
     assert extractor.gain == 1.0
 
 

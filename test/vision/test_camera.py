@@ -33,7 +33,7 @@ def test_projection_by_hand() -> None:
 
 
 def test_the_axes_of_the_two_frames() -> None:
-    # Two metres ahead, 0.3 to the right of the picture, 0.4 above the camera.
+    # Two metres ahead, 0.3 to the right of the image, 0.4 above the camera.
     np.testing.assert_allclose(
         CAMERA.reference_to_optical(np.array([-2, 0.3, 0.4])), (0.3, -0.4, 2)
     )
@@ -42,7 +42,7 @@ def test_the_axes_of_the_two_frames() -> None:
 def test_scaling_keeps_what_is_seen_with_pixel_centres_at_whole_numbers() -> None:
     half = CAMERA.scaled(160, 120)
     assert (half.width, half.height, half.fx, half.fy) == (160, 120, 150.0, 155.0)
-    # The middle of a picture of 160 px lies between pixels 79 and 80, not at 159.5 / 2.
+    # The middle of an image of 160 px lies between pixels 79 and 80, not at 159.5 / 2.
     assert (half.cx, half.cy) == (79.5, 59.5)
     # The outer corner of the first pixel is (-0.5, -0.5) at any size.
     corner = Camera(320, 240, 300, 300, -0.5, -0.5).scaled(64, 120)
@@ -173,14 +173,14 @@ def test_a_rectified_dot_is_where_a_pinhole_camera_sees_it(
     v, u = np.mgrid[: size[1], : size[0]]
     for (seen_u, seen_v), expected in zip(seen, ideal, strict=True):
         dot = 255 * np.exp(-((u - seen_u) ** 2 + (v - seen_v) ** 2) / (2 * 2.0**2))
-        picture = rectify(dot.round().astype(np.uint8)).astype(float)
-        assert picture.shape == (size[1], size[0])
-        centre = np.array([(u * picture).sum(), (v * picture).sum()]) / picture.sum()
+        image = rectify(dot.round().astype(np.uint8)).astype(float)
+        assert image.shape == (size[1], size[0])
+        centre = np.array([(u * image).sum(), (v * image).sum()]) / image.sum()
         np.testing.assert_allclose(centre, expected, atol=0.25)
 
 
 def test_what_the_lens_never_saw_repeats_the_border() -> None:
-    # Positive k1 pincushions: the corners of the rectified picture lie outside of the raw one.
+    # Positive k1 pincushions: the corners of the rectified image lie outside of the raw one.
     rectify = calibration(distortion=np.array([0.4, 0, 0, 0, 0])).rectifier(64, 48)
     assert rectify is not None
     np.testing.assert_array_equal(rectify(np.full((48, 64), 90, np.uint8)), 90)

@@ -1,4 +1,4 @@
-"""Decoding of pictures, against mosaics and rows made by hand."""
+"""Decoding of images, against mosaics and rows made by hand."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def padded(rows: Bytes, padding: int) -> bytes:
 
 
 def mosaic(pattern: str, bgr: tuple[int, int, int]) -> Bytes:
-    """A picture of one colour through a Bayer filter whose first four pixels are ``pattern``."""
+    """An image of one colour through a Bayer filter whose first four pixels are ``pattern``."""
     level = dict(zip("bgr", bgr, strict=True))
     cell = np.array([level[c] for c in pattern], np.uint8).reshape(2, 2)
     return np.tile(cell, (H // 2, W // 2))
@@ -53,8 +53,8 @@ def test_a_bayer_pattern_is_named_after_its_first_four_pixels(
     pattern: str, colour: tuple[int, int, int]
 ) -> None:
     raw = mosaic(pattern, colour)
-    picture = decode_bgr(raw.tobytes(), H, W, W, f"bayer_{pattern}8")
-    np.testing.assert_array_equal(picture, np.broadcast_to(colour, (H, W, 3)))
+    image = decode_bgr(raw.tobytes(), H, W, W, f"bayer_{pattern}8")
+    np.testing.assert_array_equal(image, np.broadcast_to(colour, (H, W, 3)))
     grey = decode_grey(raw.tobytes(), H, W, W, f"bayer_{pattern}8")
     np.testing.assert_allclose(grey, expected_grey(colour), atol=1.0)
 
@@ -65,8 +65,8 @@ def test_a_bayer_pattern_is_named_after_its_first_four_pixels(
 def test_colour_channels_are_in_the_order_of_the_name(encoding: str, order: str) -> None:
     level = dict(zip("bgra", (*RED, 99), strict=True))
     raw = np.tile(np.array([level[c] for c in order], np.uint8), (H, W))
-    picture = decode_bgr(padded(raw, 5), H, W, raw.shape[1] + 5, encoding)
-    np.testing.assert_array_equal(picture, np.broadcast_to(RED, (H, W, 3)))
+    image = decode_bgr(padded(raw, 5), H, W, raw.shape[1] + 5, encoding)
+    np.testing.assert_array_equal(image, np.broadcast_to(RED, (H, W, 3)))
     grey = decode_grey(padded(raw, 5), H, W, raw.shape[1] + 5, encoding)
     np.testing.assert_allclose(grey, expected_grey(RED), atol=1.0)
 
@@ -114,16 +114,14 @@ def test_every_kind_of_bytes_is_read(kind: type) -> None:
     padding=st.integers(0, 5),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_padding_never_reaches_the_picture(
-    height: int, width: int, padding: int, seed: int
-) -> None:
+def test_padding_never_reaches_the_image(height: int, width: int, padding: int, seed: int) -> None:
     pixels = np.random.default_rng(seed).integers(0, 256, (height, width), dtype=np.uint8)
     grey = decode_grey(padded(pixels, padding), height, width, width + padding, "mono8")
     np.testing.assert_array_equal(grey, pixels)
 
 
 @pytest.mark.parametrize("encoding", SUPPORTED_ENCODINGS)
-def test_every_encoding_gives_bytes_of_the_pictures_size(encoding: str) -> None:
+def test_every_encoding_gives_bytes_of_the_images_size(encoding: str) -> None:
     step = W * BYTES_PER_PIXEL.get(encoding, 1) + 4
     data = bytes(H * step)
     grey, bgr = (decode(data, H, W, step, encoding) for decode in (decode_grey, decode_bgr))
@@ -179,28 +177,28 @@ def test_a_mosaic_too_small_to_interpolate_is_refused(
 @pytest.mark.parametrize("decode", [decode_grey, decode_bgr])
 def test_a_mosaic_of_odd_size_has_no_black_border(shape: tuple[int, int], decode: object) -> None:
     h, w = shape
-    picture = decode(bytes([90]) * (h * w), h, w, w, "bayer_grbg8")  # type: ignore[operator]
-    np.testing.assert_array_equal(picture, 90)
+    image = decode(bytes([90]) * (h * w), h, w, w, "bayer_grbg8")  # type: ignore[operator]
+    np.testing.assert_array_equal(image, 90)
 
 
 @pytest.mark.parametrize("extension", [".jpg", ".png"])
-def test_compressed_pictures_come_back(extension: str) -> None:
-    picture = np.full((40, 48, 3), GREEN, np.uint8)
-    data = cv2.imencode(extension, picture)[1].tobytes()
-    np.testing.assert_allclose(decode_compressed(data, grey=False), picture, atol=4)
+def test_compressed_images_come_back(extension: str) -> None:
+    image = np.full((40, 48, 3), GREEN, np.uint8)
+    data = cv2.imencode(extension, image)[1].tobytes()
+    np.testing.assert_allclose(decode_compressed(data, grey=False), image, atol=4)
     grey = decode_compressed(array.array("B", data))
     assert grey.shape == (40, 48)
     np.testing.assert_allclose(grey, expected_grey(GREEN), atol=4)
 
 
-@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"no picture at all" * 9])
-def test_bytes_that_are_no_picture_are_refused(data: bytes) -> None:
+@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"no image at all" * 9])
+def test_bytes_that_are_no_image_are_refused(data: bytes) -> None:
     with pytest.raises(EncodingError, match=f"{len(data)} bytes"):
         decode_compressed(data)
 
 
 @pytest.mark.parametrize("extension", [".jpg", ".png"])
-def test_a_picture_cut_short_is_refused(extension: str) -> None:
+def test_an_image_cut_short_is_refused(extension: str) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (60, 80), dtype=np.uint8)
     data = cv2.imencode(extension, noise)[1].tobytes()
     with pytest.raises(EncodingError, match="JPEG or PNG"):

@@ -1,4 +1,4 @@
-"""Foreground by contrast: by hand, and as OpenCV's pictures of floats have it."""
+"""Foreground by contrast: by hand, and as OpenCV's images of floats have it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.vision.foreground import foreground_of
+from cardbox_tracker.vision.foreground import segment_foreground
 
 BRIGHTER, DARKER = 0.1, -0.05
 
@@ -16,7 +16,7 @@ BRIGHTER, DARKER = 0.1, -0.05
 def found(difference: np.ndarray, edge: float) -> np.ndarray:
     """Ten grey levels brighter or twenty darker make a score of 1."""
     values = difference.astype(np.float32)
-    return foreground_of(
+    return segment_foreground(
         values,
         np.full_like(values, BRIGHTER),
         np.full_like(values, DARKER),
@@ -55,5 +55,5 @@ def test_equal_to_passes_of_opencv(seed: int, shape: tuple[int, int], edge: floa
     score = np.maximum(difference * brighter, difference * darker)
     around = np.asarray(cv2.dilate(score, np.ones((3, 3), np.uint8))).reshape(shape)
     limit = np.maximum(around * np.float32(edge), np.float32(1))
-    made = foreground_of(difference, brighter, darker, edge, np.empty_like(score))
+    made = segment_foreground(difference, brighter, darker, edge, np.empty_like(score))
     np.testing.assert_array_equal(made, np.where(score >= limit, 255, 0))

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.vision.regions import recolour_small
+from cardbox_tracker.vision.regions import remove_small_regions
 
 
-def picture(*rows: str) -> np.ndarray:
+def image(*rows: str) -> np.ndarray:
     """White where there is an ``x``."""
     return np.array([[255 * (letter == "x") for letter in row] for row in rows], np.uint8)
 
 
 def recoloured(before: np.ndarray, colour: int, area_px: float) -> np.ndarray:
     after = before.copy()
-    recolour_small(after, colour, area_px)
+    remove_small_regions(after, colour, area_px)
     return after
 
 
@@ -35,30 +35,30 @@ def by_labels(before: np.ndarray, colour: int, area_px: float) -> np.ndarray:
 
 
 def test_specks_by_hand() -> None:
-    before = picture("x..xx", "..x..", "xx.x.", "xx...")
+    before = image("x..xx", "..x..", "xx.x.", "xx...")
     np.testing.assert_array_equal(
-        recoloured(before, 255, 2), picture("...xx", ".....", "xx...", "xx...")
+        recoloured(before, 255, 2), image("...xx", ".....", "xx...", "xx...")
     )
     np.testing.assert_array_equal(
-        recoloured(before, 255, 4.5), picture(".....", ".....", ".....", ".....")
+        recoloured(before, 255, 4.5), image(".....", ".....", ".....", ".....")
     )
     np.testing.assert_array_equal(recoloured(before, 255, 1), before)
 
 
 def test_holes_by_hand() -> None:
     """What touches by a corner alone is apart; the outside is a region like any other."""
-    before = picture("xxxxx.", "x.xxx.", "xx..x.", "xxxxx.")
+    before = image("xxxxx.", "x.xxx.", "xx..x.", "xxxxx.")
     np.testing.assert_array_equal(
-        recoloured(before, 0, 2), picture("xxxxx.", "xxxxx.", "xx..x.", "xxxxx.")
+        recoloured(before, 0, 2), image("xxxxx.", "xxxxx.", "xx..x.", "xxxxx.")
     )
     np.testing.assert_array_equal(
-        recoloured(before, 0, 3), picture("xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.")
+        recoloured(before, 0, 3), image("xxxxx.", "xxxxx.", "xxxxx.", "xxxxx.")
     )
     assert recoloured(before, 0, 5).all()
 
 
 def test_arms_that_meet_below_are_one_region() -> None:
-    before = picture("x.x.x", "x.x.x", "xxxxx")
+    before = image("x.x.x", "x.x.x", "xxxxx")
     np.testing.assert_array_equal(recoloured(before, 255, 11), before)
     assert not recoloured(before, 255, 12).any()
 

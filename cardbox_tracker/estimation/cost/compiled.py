@@ -32,7 +32,7 @@ class CompiledCost:
         self.rows = rows_above_hips(body, camera)
         self.silhouette_px = 0
         self._sizes, self._place, self._view = _constants(body, camera)
-        # Sums along a row fit 16 bits for any picture narrower than 32768 px, and stay in cache.
+        # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
         sums = np.int16 if camera.width < 2**15 else np.int32
         self._table = np.zeros((self.rows, camera.width + 1), sums)
         self._covered = np.zeros_like(self._table)
@@ -44,7 +44,7 @@ class CompiledCost:
         self.warm_up()
 
     def warm_up(self) -> None:
-        """Run every kernel once, so that no live picture waits for the compiler."""
+        """Run every kernel once, so that no live image waits for the compiler."""
         empty = np.zeros((self.camera.height, self.camera.width), np.uint8)
         self.observe(empty)
         # Pixels out of a message are read-only, which is another type to the compiler.

@@ -6,7 +6,7 @@ The idea: with total = number of silhouette pixels, equation (2) is
 
 A table of running sums of (1 - 2 f) along each row turns the inner sum of one covered run of pixels
 into a difference of two entries. So a particle costs the rows of its outline, never its area. For
-the arms the table holds 0 where the trunk covers the picture already, and an arm particle draws its
+the arms the table holds 0 where the trunk covers the image already, and an arm particle draws its
 own 4 patches, not 11.
 
 The pixel rule is that of :mod:`cardbox_tracker.vision.rasterisation`; the results are equal. A
@@ -135,7 +135,7 @@ def _snap(pixel: float) -> Any:
 
 @_inline
 def _row(y: float, rows: float) -> Any:
-    """First row at or below ``y``, within the picture."""
+    """First row at or below ``y``, within the image."""
     return np.ceil(min(max(y, 0.0), rows))
 
 

@@ -51,7 +51,7 @@ class SilhouetteCost(Protocol):
     def fix_arms(self, posture: FloatArray | None) -> None:
         """Draw the arms of ``posture`` (12,) beside every torso that follows; None draws none.
 
-        They stay where they are in the picture while the torsos move.
+        They stay where they are in the image while the torsos move.
         """
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
@@ -71,9 +71,9 @@ class SilhouetteCost(Protocol):
 
 
 def rows_above_hips(body: BodyModel, camera: Camera) -> int:
-    """Return how many rows of the picture, from its top, show what is above the hips.
+    """Return how many rows of the image, from its top, show what is above the hips.
 
-    The hips' row is taken where the torso stands; at the picture's edges a pitched camera would see
+    The hips' row is taken where the torso stands; at the image's edges a pitched camera would see
     the same height in the same row as well, since it turns about the rows' direction only.
     """
     hip = camera.reference_to_optical(np.array([-body.distance_m, 0.0, body.hip_height_m]))

@@ -29,7 +29,7 @@ _PRIOR_UNITS = np.where([name.endswith("flexion") for name in JOINT_NAMES], _RAN
 _PRIOR_UNITS[0] = np.inf
 _PRIOR_UNITS[1:4] = np.radians([20.0, 26.0, 20.0])
 _ABOVE_REST = 1.0 / _PRIOR_UNITS
-# A bow and leaning back lower the head alike in the picture, but people bow.
+# A bow and leaning back lower the head alike in the image, but people bow.
 _BELOW_REST = _ABOVE_REST.copy()
 _BELOW_REST[JOINT_NAMES.index("torso_pitch")] *= 3.0
 
@@ -38,19 +38,19 @@ class HierarchicalFilter:
     """Three particle filters that share one cost."""
 
     def __init__(
-        self, cost: SilhouetteCost, config: TrackerConfig, picture_px: int, rng: np.random.Generator
+        self, cost: SilhouetteCost, config: TrackerConfig, image_px: int, rng: np.random.Generator
     ) -> None:
         """Set the filters up; :meth:`scatter` gives them particles.
 
         Args:
             cost: rates postures; the caller lets it observe each silhouette.
             config: settings.
-            picture_px: pixels of a picture, to scale what the settings say of 320x240.
+            image_px: pixels of an image, to scale what the settings say of 320x240.
             rng: split into one stream a filter, so that threads cannot mix them.
         """
         self._cost = cost
         self._config = config
-        self._scale = picture_px / _REFERENCE_AREA_PX
+        self._scale = image_px / _REFERENCE_AREA_PX
         resampler = STRATEGIES[config.strategy]
         streams = rng.spawn(3)
         torso_noise = np.full(4, config.torso.rotation_noise_rad)

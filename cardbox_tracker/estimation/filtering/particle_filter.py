@@ -72,7 +72,7 @@ class ParticleFilter:
         Args:
             rate: costs of particles against the present silhouette.
             noise_scale: factor on sigma_beta.
-            sigma_scale: factor on sigma_gamma, such as for a larger picture.
+            sigma_scale: factor on sigma_gamma, such as for a larger image.
             explorers: so many particles, the last ones, are drawn from anywhere within the limits.
         """
         ancestors = self._resampler(

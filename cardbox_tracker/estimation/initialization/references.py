@@ -17,7 +17,7 @@ from cardbox_tracker.vision.camera import Camera
 Silhouette = NDArray[np.uint8]
 
 MIN_PERSON_FRACTION = 0.02
-"""Somebody close enough to be measured covers at least this fraction of the picture."""
+"""Somebody close enough to be measured covers at least this fraction of the image."""
 
 MAX_LIKENESS = 0.80
 """Two different reference postures overlap less than this, as IoU when laid over each other."""
@@ -30,7 +30,7 @@ _POSTURE_TEXT = {
 
 
 def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
-    """Return the majority (H, W) of the pictures of one held posture.
+    """Return the majority (H, W) of the images of one held posture.
 
     Raises:
         InitializationError: there are none.
@@ -47,22 +47,22 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
     """Refuse a silhouette (H, W) that cannot show the reference posture ``name``.
 
     Raises:
-        InitializationError: nobody is in the picture, or the person is cut off at its border.
+        InitializationError: nobody is in the image, or the person is cut off at its border.
     """
     if name not in REFERENCE_NAMES:
         raise ValueError(f"reference {name!r} is unknown; it is one of {REFERENCE_NAMES}")
     share = np.count_nonzero(silhouette) / silhouette.size
     if share < MIN_PERSON_FRACTION:
         raise InitializationError(
-            f"reference '{name}': nobody is in the picture ({100 * share:.1f} % foreground, "
+            f"reference '{name}': nobody is in the image ({100 * share:.1f} % foreground, "
             f"expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of the camera "
             f"and {_POSTURE_TEXT[name]}"
         )
     if share > 0.6:
         raise InitializationError(
-            f"reference '{name}': {100 * share:.0f} % of the picture are foreground, more than a "
+            f"reference '{name}': {100 * share:.0f} % of the image are foreground, more than a "
             "person can be; the background was learned in another light or with somebody in it: "
-            "leave the picture and learn it again (background/learn)"
+            "leave the image and learn it again (background/learn)"
         )
     for border, pixels in (
         ("left", silhouette[:, 0]),
@@ -72,7 +72,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         if np.any(pixels):
             raise InitializationError(
                 f"reference '{name}': the person is cut off at the {border} border of the "
-                f"picture; step back or to the middle, and {_POSTURE_TEXT[name]}"
+                f"image; step back or to the middle, and {_POSTURE_TEXT[name]}"
             )
 
 

@@ -16,7 +16,7 @@ _SPECK_PX = 2
 
 
 def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera) -> BodyModel:
-    """Return ``body`` so high that the top of its head is that of the person in the picture.
+    """Return ``body`` so high that the top of its head is that of the person in the image.
 
     How high the camera stands is not known before somebody is measured.
 
@@ -26,7 +26,7 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
         camera: working camera.
 
     Returns:
-        ``body`` itself if nobody is in the picture, or their head is above it.
+        ``body`` itself if nobody is in the image, or their head is above it.
     """
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:

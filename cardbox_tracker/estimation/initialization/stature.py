@@ -2,7 +2,7 @@
 
 A silhouette does not show the hips. They follow from the stature by the proportions of the human
 body (Drillis & Contini, "Body Segment Parameters", 1966), and the stature from whatever of the body
-is in the picture: the height of head and feet, or else the arm span and the height of the head
+is in the image: the height of head and feet, or else the arm span and the height of the head
 above the arms.
 """
 

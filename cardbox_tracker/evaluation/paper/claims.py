@@ -47,7 +47,7 @@ def claims(results: Mapping[str, Any], curves: Curves, timing: Mapping[str, Any]
     """Return the claims that ``results`` can judge."""
     found = [
         _cost(results),
-        _cost_of_each_picture(results, curves),
+        _cost_of_each_image(results, curves),
         *_elbows_and_hands(results),
         *_reproducibility(results),
         _similar_means(results, curves),
@@ -76,16 +76,16 @@ def _cost(results: Mapping[str, Any]) -> Claim:
     )
 
 
-def _cost_of_each_picture(results: Mapping[str, Any], curves: Curves) -> Claim:
+def _cost_of_each_image(results: Mapping[str, Any], curves: Curves) -> Claim:
     shares = {
         m: float(np.mean(curves[m, "drs"]["cost_px"] < curves[m, "srs"]["cost_px"]))
         for m in motions_in(results)
     }
     return Claim(
-        "DRS has the lower mean cost in each single picture.",
+        "DRS has the lower mean cost in each single image.",
         min(shares.values()) == 1.0,
-        "; ".join(f"{m} in {100 * share:.1f} % of the pictures" for m, share in shares.items()),
-        "The others are pictures in which both are near the start or at rest, or in which a share "
+        "; ".join(f"{m} in {100 * share:.1f} % of the images" for m, share in shares.items()),
+        "The others are images in which both are near the start or at rest, or in which a share "
         "of the DRS runs has lost an arm.",
     )
 
@@ -222,7 +222,7 @@ def _compromise(
         not missing,
         ". ".join(texts) + (f". Not clearly worse: {', '.join(missing)}" if missing else ""),
         "With 200 particles and the noise of Table I one cycle reaches about as far as these "
-        "motions go between two pictures, so it costs little to search around the best alone; and "
+        "motions go between two images, so it costs little to search around the best alone; and "
         "the 3D error is mostly depth, which an outline hardly shows whatever the rate.",
     )
 
@@ -261,9 +261,9 @@ def _less_to_draw(models: Mapping[str, Any], timing: Mapping[str, Any]) -> Claim
 def _real_time(timing: Mapping[str, Any]) -> Claim:
     frame_ms = timing["frame_ms"]
     return Claim(
-        f"600 particles are tracked in real time at {_FRAME_RATE_OF_PAPER:g} pictures a second.",
+        f"600 particles are tracked in real time at {_FRAME_RATE_OF_PAPER:g} images a second.",
         frame_ms < 1000.0 / _FRAME_RATE_OF_PAPER,
-        f"{frame_ms:.1f} ms a picture from silhouette to posture on one core, while the other "
+        f"{frame_ms:.1f} ms an image from silhouette to posture on one core, while the other "
         "cores were at the same work",
     )
 

@@ -163,12 +163,12 @@ class _Evaluation:
         results["session"] = {
             "name": folder.resolve().name,
             "initialization_iou": dict(session.initialization_iou),
-            "pictures": len(session.silhouettes),
+            "images": len(session.silhouettes),
         }
         return results, {"processor_s": {"experiments_1_to_3": self._processor_s(self._main)}}
 
     def true_angles(self) -> dict[str, Any]:
-        """True postures (n, 12) of the pictures of each motion, NaN where not known."""
+        """True postures (n, 12) of the images of each motion, NaN where not known."""
         return {
             cell.motion: cell.load(self._parts, self.sessions[cell.motion][1]).postures
             for cell in self._main
@@ -176,7 +176,7 @@ class _Evaluation:
         }
 
     def shown(self, motion: str) -> tuple[Session, Any, Any]:
-        """Session, and indices and postures of the pictures of an image sequence: DRS, run 0."""
+        """Session, and indices and postures of the images of an image sequence: DRS, run 0."""
         session = self.sessions[motion][1]
         cell = next(c for c in self._main if c.path == ("drs",) and c.motion == motion)
         postures = self._parts.load(cell.tasks[0])["postures"][0]
@@ -208,7 +208,7 @@ class _Evaluation:
         )
 
     def _frame_ms(self) -> float:
-        """Mean time of a picture in experiments 1 to 3, while all cores are busy."""
+        """Mean time of an image in experiments 1 to 3, while all cores are busy."""
         frames = sum(
             self._plan.runs * len(self.sessions[c.motion][1].silhouettes) for c in self._main
         )

@@ -44,7 +44,7 @@ class Cell:
     tasks: tuple[Task, ...]
 
     def load(self, parts: Parts, session: Session) -> MotionRuns:
-        """Return its runs over the pictures of its motion."""
+        """Return its runs over the images of its motion."""
         runs = load_runs(parts, self.tasks)
         return select_motion(runs, session, self.motion, self.setting.every)
 

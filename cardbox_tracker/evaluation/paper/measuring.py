@@ -28,7 +28,7 @@ from cardbox_tracker.simulation.session import session_camera
 FloatArray = NDArray[np.float64]
 
 DISTANCE_M = 2.4
-"""Far enough that the longest arms stay in the picture when stretched."""
+"""Far enough that the longest arms stay in the image when stretched."""
 
 POSTURE_MISS_DEG = 2.0
 """Standard deviation by which each angle of a reference posture is missed."""

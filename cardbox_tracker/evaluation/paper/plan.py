@@ -14,13 +14,13 @@ class Plan:
         side_runs: of each setting of experiments 4 and 9.
         particle_runs: of each setting of experiment 5.
         model_runs: of each model of experiment 6.
-        model_every: experiment 6 tracks only each picture of this number.
+        model_every: experiment 6 tracks only each image of this number.
         bodies: random people of experiment 8.
         seeds: seeds of experiment 8.
         survival_rates: e of experiment 4.
         particles: N of each filter in experiment 5.
-        speeds: name and stride of experiment 4: each picture, each third, each sixth.
-        fps: pictures a second of the synthetic sessions.
+        speeds: name and stride of experiment 4: each image, each third, each sixth.
+        fps: images a second of the synthetic sessions.
         size: their width and height, px.
         timing_rounds: repetitions of the timing of experiment 6.
     """

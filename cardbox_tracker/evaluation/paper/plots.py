@@ -47,7 +47,7 @@ def plot_all(
 
 
 def plot_errors(motion: str, curves: Curves, path: Path) -> None:
-    """Error of each of the six joints, per picture (the paper's figures GT1 and GT2)."""
+    """Error of each of the six joints, per image (the paper's figures GT1 and GT2)."""
     with _figure(path, 2, 3, (12, 5.2), sharex=True, sharey=True) as axes:
         for axis, name in zip(axes.ravel(), KEYPOINT_NAMES, strict=True):
             for strategy, colour in COLOURS.items():
@@ -63,7 +63,7 @@ def plot_errors(motion: str, curves: Curves, path: Path) -> None:
 
 
 def plot_costs(motions: list[str], curves: Curves, path: Path) -> None:
-    """Cost of the system's output, per picture."""
+    """Cost of the system's output, per image."""
     with _figure(path, 1, len(motions), (4.2 * len(motions), 3.2), sharey=True) as axes:
         for axis, motion in zip(axes[0], motions, strict=True):
             for strategy, colour in COLOURS.items():

@@ -53,7 +53,7 @@ def _head(results: Mapping[str, Any]) -> list[str]:
         return [
             f"# Evaluation on the recorded session {session['name']}",
             "",
-            f"Each strategy tracked its {session['pictures']} pictures {results['runs']} times "
+            f"Each strategy tracked its {session['images']} images {results['runs']} times "
             "with the parameters of the paper's Table I, with background and body learned from "
             f"the session's own first seconds (IoU of the references: {fits}). The truth is that "
             "of the recording: its joints are those of a realistic body, not of our model, so "
@@ -72,14 +72,14 @@ def _head(results: Mapping[str, Any]) -> list[str]:
         "",
         f"{results['runs']} runs of each strategy on each motion (experiments 1 to 3) with the "
         "parameters of the paper's Table I, preset `paper`. The person is synthetic, rounded and "
-        "not made of patches, so the model never fits perfectly; pictures have noise, the "
+        "not made of patches, so the model never fits perfectly; images have noise, the "
         "silhouettes come out of the background model and the body out of the initialization, as "
         "in use; the truth is exact. The side experiments take fewer runs: "
         f"{plan['side_runs']} (survival rate, schemes), {plan['particle_runs']} (particles), "
         f"{plan['model_runs']} (volumetric model).{quick}",
         "",
         "The tracker's verdict `lost` is switched off here, since it would leave out the "
-        "pictures in which a strategy does worst. All errors are means over runs and pictures; "
+        "images in which a strategy does worst. All errors are means over runs and images; "
         "± is one standard error over the runs.",
         "",
     ]
@@ -151,11 +151,11 @@ def _main(results: Mapping[str, Any]) -> Iterator[str]:
             for m in motions
         ),
     )
-    yield from ("![cost of each picture](cost.png)", "")
+    yield from ("![cost of each image](cost.png)", "")
     yield from (
         "## 3. Reproducibility",
         "",
-        "Standard deviation over the runs, averaged over the pictures, rad (m for `torso_y`); "
+        "Standard deviation over the runs, averaged over the images, rad (m for `torso_y`); "
         "bold where DRS is not below SRS:",
         "",
     )
@@ -182,7 +182,7 @@ def _survival(results: Mapping[str, Any]) -> Iterator[str]:
     yield from (
         "## 4. Survival rate",
         "",
-        "The same e in all three filters. Slow: every picture; fast: each third one, which is the "
+        "The same e in all three filters. Slow: every image; fast: each third one, which is the "
         "same motion three times as fast; very fast: each sixth. MPJPE in cm and cost in px, "
         "means over the motions:",
         "",
@@ -246,7 +246,7 @@ def _sequences(results: Mapping[str, Any]) -> Iterator[str]:
         f"## {number}Image sequences",
         "",
         "DRS, the first run. Rows: best estimate; matching result, in white the pixels that the "
-        "cost counts (below the hips, grey, nothing counts); raw picture.",
+        "cost counts (below the hips, grey, nothing counts); raw image.",
         "",
     )
     for m in motions_in(results):
@@ -282,7 +282,7 @@ def _initialization(results: Mapping[str, Any], timing: Mapping[str, Any]) -> It
     )
     yield from (
         "The synthetic person is rounded, so a size of ours that is a plain edge, such as the "
-        "depth of the head, is not the same thing in the picture: part of the bias is that.",
+        "depth of the head, is not the same thing in the image: part of the bias is that.",
         "",
         "![initialization](initialization.png)",
         "",
@@ -310,7 +310,7 @@ def _schemes(results: Mapping[str, Any], variants: Mapping[str, Any]) -> Iterato
         "All but DRS draw from weights exp(-W^2 / (2 sigma_gamma^2)), with Table I's sigma_gamma "
         "of 8000 and 4000 pixels. That is several times the cost itself, so the weights are "
         "nearly flat: resampling hardly selects, whichever scheme draws, and without the elite "
-        "particle there is little that holds the estimate to the picture. DRS selects by rank, "
+        "particle there is little that holds the estimate to the image. DRS selects by rank, "
         "which no width of weights can flatten.",
         "",
         "![schemes](schemes.png)",
@@ -332,7 +332,7 @@ def _recorded(folder: Path) -> Iterator[str]:
     yield from (
         "## Recorded sessions",
         "",
-        "A realistic skinned body, compressed pictures; MPJPE in cm and cost in px. Each has a "
+        "A realistic skinned body, compressed images; MPJPE in cm and cost in px. Each has a "
         "report of its own.",
         "",
     )
@@ -364,7 +364,7 @@ def _origin(results: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[s
         f"- processor: {results['cpu']}, {timing['jobs']} processes",
         f"- time: {sum(timing['processor_s'].values()) / 60:.1f} minutes of processor time; the "
         f"last call of the command took {timing['wall_s'] / 60:.1f} minutes",
-        "- all numbers: `results.json`; by picture: `per_frame.csv`; times: `timing.json`",
+        "- all numbers: `results.json`; by image: `per_frame.csv`; times: `timing.json`",
     )
 
 

@@ -98,7 +98,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_curves(curves: Curves, path: Path) -> None:
-    """Write one row for each motion, strategy and picture."""
+    """Write one row for each motion, strategy and image."""
     with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         header: list[str] | None = None

@@ -1,6 +1,6 @@
 """Image sequences in the style of the paper's figures (experiment 7).
 
-One column a picture; rows: the best estimate, the matching result, the raw picture.
+One column an image; rows: the best estimate, the matching result, the raw image.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cardbox_tracker.files import atomic_path
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, render
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 _GAP_PX = 4
 _SCALE = 0.6
@@ -34,15 +34,15 @@ _EDGE_BGR = (70, 40, 20)
 def write_sequence(
     session: Session, indices: Sequence[int], postures: NDArray[np.float64], path: Path
 ) -> None:
-    """Write the figure of the pictures ``indices`` (k) with the estimates ``postures`` (k, 12)."""
-    pictures = dict(zip(session.shown.tolist(), session.pictures, strict=True))
+    """Write the figure of the images ``indices`` (k) with the estimates ``postures`` (k, 12)."""
+    images = dict(zip(session.shown.tolist(), session.images, strict=True))
     columns = [
         np.concatenate(
             _with_gaps(
                 [
                     draw_estimate(session.body, session.camera, posture),
                     draw_difference(session, index, posture),
-                    _bgr(pictures[int(index)]),
+                    _bgr(images[int(index)]),
                 ],
                 axis=0,
             )
@@ -56,7 +56,7 @@ def write_sequence(
             raise CardboxError(f"cannot write {path}")
 
 
-def draw_estimate(body: BodyModel, camera: Camera, posture: NDArray[np.float64]) -> Picture:
+def draw_estimate(body: BodyModel, camera: Camera, posture: NDArray[np.float64]) -> ImageArray:
     """Return the model's patches on white, (H, W, 3) bgr; the nearest are drawn last."""
     canvas = np.full((camera.height, camera.width, 3), 255, np.uint8)
     if np.any(np.isnan(posture)):
@@ -70,7 +70,7 @@ def draw_estimate(body: BodyModel, camera: Camera, posture: NDArray[np.float64])
     return canvas
 
 
-def draw_difference(session: Session, index: int, posture: NDArray[np.float64]) -> Picture:
+def draw_difference(session: Session, index: int, posture: NDArray[np.float64]) -> ImageArray:
     """Return the pixels that the cost counts, white on black; rows below the hips are grey."""
     camera = session.camera
     rows = rows_above_hips(session.body, camera)
@@ -81,16 +81,16 @@ def draw_difference(session: Session, index: int, posture: NDArray[np.float64]) 
     return _bgr(difference)
 
 
-def _bgr(picture: Picture) -> Picture:
-    return np.repeat(picture[..., None], 3, axis=2)
+def _bgr(image: ImageArray) -> ImageArray:
+    return np.repeat(image[..., None], 3, axis=2)
 
 
-def _with_gaps(pictures: Sequence[Picture], axis: int) -> list[Picture]:
-    parts: list[Picture] = []
-    for picture in pictures:
+def _with_gaps(images: Sequence[ImageArray], axis: int) -> list[ImageArray]:
+    parts: list[ImageArray] = []
+    for image in images:
         if parts:
-            shape = list(picture.shape)
+            shape = list(image.shape)
             shape[axis] = _GAP_PX
             parts.append(np.full(shape, 160, np.uint8))
-        parts.append(picture)
+        parts.append(image)
     return parts

@@ -1,4 +1,4 @@
-"""What is tracked: the silhouettes of a session, cut out once, with the truth of each picture.
+"""What is tracked: the silhouettes of a session, cut out once, with the truth of each image.
 
 A session is a recording with ``ground_truth.json``, synthetic or real. Background and sizes of the
 person are learned from its own segments ``empty``, ``front``, ``side`` and ``arms``; tracking
@@ -33,29 +33,29 @@ FloatArray = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 SEQUENCE_LENGTH = 7
-"""So many pictures of each motion are kept for the image sequences."""
+"""So many images of each motion are kept for the image sequences."""
 
 _NOT_MOTIONS = ("empty", "enter", "front", "side", "arms", "transition", "neutral")
-# Nobody takes a posture, or leaves the picture, to the frame.
+# Nobody takes a posture, or leaves the image, to the frame.
 _MARGIN_S = 0.2
 
 
 @dataclass(frozen=True)
 class Session:
-    """One session from its first ``neutral`` segment on; n pictures.
+    """One session from its first ``neutral`` segment on; n images.
 
     Attributes:
         body: the person as the initialization measured them.
         camera: working camera, pitched.
         silhouettes: (n, H, W), 0 or 255.
-        segments: what the person does in each picture, (n,) of str.
-        time_s: seconds from the first picture of the recording, (n,).
+        segments: what the person does in each image, (n,) of str.
+        time_s: seconds from the first image of the recording, (n,).
         keypoints_m: true shoulders, elbows and hands, (n, 6, 3), metres in the optical frame; NaN
-            in a picture without truth.
+            in an image without truth.
         postures: true d1..d12, (n, 12); NaN where the truth does not say.
         torso_rad: true roll, pitch and yaw of the torso, (n, 3); NaN where it does not say.
-        shown: indices of the pictures kept, ``SEQUENCE_LENGTH`` a motion or fewer.
-        pictures: those, (len(shown), H, W), brightness.
+        shown: indices of the images kept, ``SEQUENCE_LENGTH`` a motion or fewer.
+        images: those, (len(shown), H, W), brightness.
         initialization_iou: fit of each reference, by name.
     """
 
@@ -68,7 +68,7 @@ class Session:
     postures: FloatArray
     torso_rad: FloatArray
     shown: NDArray[np.intp]
-    pictures: NDArray[np.uint8]
+    images: NDArray[np.uint8]
     initialization_iou: Mapping[str, float]
 
     @property
@@ -104,7 +104,7 @@ class Session:
         )
 
 
-_STORED = ("segments", "time_s", "keypoints_m", "postures", "torso_rad", "shown", "pictures")
+_STORED = ("segments", "time_s", "keypoints_m", "postures", "torso_rad", "shown", "images")
 
 
 @lru_cache(maxsize=4)
@@ -210,7 +210,7 @@ def _session(
     motions = motions_of(names)
     if not motions:
         raise CardboxError(
-            f"no picture of {folder} after the reference postures has a motion in the ground "
+            f"no image of {folder} after the reference postures has a motion in the ground "
             "truth; are recording and truth of one session?"
         )
     shown = np.unique(np.concatenate([_spread(np.nonzero(names == m)[0]) for m in motions]))

@@ -1,7 +1,7 @@
 """Track a session many times over, and say how well that went (experiments 1 to 3).
 
 Every run starts anew with a generator seeded by (seed, number of the run). The tracker's verdict
-``lost`` is switched off: it would leave out just those pictures in which a strategy did worst.
+``lost`` is switched off: it would leave out just those images in which a strategy did worst.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Setting:
         session: name of the session's file in the folder of the parts.
         config: settings of the tracker.
         seed: of the evaluation.
-        every: only each picture of this number; 3 is the same motion three times as fast.
+        every: only each image of this number; 3 is the same motion three times as fast.
         model: how costs are computed, see ``models.make_cost``.
     """
 
@@ -55,7 +55,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Runs:
-    """Results of r runs over n pictures; a picture without a person is NaN in every run.
+    """Results of r runs over n images; an image without a person is NaN in every run.
 
     Attributes:
         postures: estimates, (r, n, 12), rad and metres.
@@ -69,7 +69,7 @@ class Runs:
 
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` such that no picture is left out, and one run stays in one thread."""
+    """Return ``config`` such that no image is left out, and one run stays in one thread."""
     return replace(config, lost_iou=0.0, parallel_from=None)
 
 
@@ -124,7 +124,7 @@ def load_runs(parts: Parts, tasks: Sequence[Task]) -> Runs:
 
 @dataclass(frozen=True)
 class MotionRuns:
-    """Runs and truth of the n pictures of one motion, all of them with a person and truth.
+    """Runs and truth of the n images of one motion, all of them with a person and truth.
 
     Attributes:
         runs: the estimates.
@@ -158,8 +158,8 @@ def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> 
 def summarize(motion: MotionRuns) -> dict[str, Any]:
     """Return the figures of experiments 1 to 3 of one motion and one strategy.
 
-    Each is a mean over runs and pictures, but ``std_dof``: the standard deviation over the runs,
-    averaged over the pictures, rad (metres for ``torso_y``).
+    Each is a mean over runs and images, but ``std_dof``: the standard deviation over the runs,
+    averaged over the images, rad (metres for ``torso_y``).
     """
     runs = motion.runs
     errors_m = distances_m(runs.keypoints_m, motion.keypoints_m)

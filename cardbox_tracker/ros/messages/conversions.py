@@ -1,4 +1,4 @@
-"""Pictures and calibrations between messages and the core, without copies where possible.
+"""Images and calibrations between messages and the core, without copies where possible.
 
 Received data is an ``array.array`` that numpy reads in place; what is sent is an ``array.array``
 too, the only kind that rclpy takes without looking at every byte.
@@ -19,7 +19,7 @@ from cardbox_tracker.errors import CameraError, EncodingError
 from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.encodings import decode_compressed, decode_grey
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 
 
 def stamp_ns(stamp: Time) -> int:
@@ -27,8 +27,8 @@ def stamp_ns(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def brightness_of(message: Image | CompressedImage) -> Picture:
-    """Return the brightness (H, W) of a picture message.
+def brightness_of(message: Image | CompressedImage) -> ImageArray:
+    """Return the brightness (H, W) of an image message.
 
     Raises:
         EncodingError: the encoding is not supported or the bytes do not match it.
@@ -45,7 +45,7 @@ def brightness_of(message: Image | CompressedImage) -> Picture:
     )
 
 
-def silhouette_of(message: Image) -> Picture:
+def silhouette_of(message: Image) -> ImageArray:
     """Return the silhouette (H, W), 0 or 255, a view of the message's data where rows are tight.
 
     Raises:
@@ -66,9 +66,9 @@ def silhouette_of(message: Image) -> Picture:
     return data[: step * height].reshape(height, step)[:, :width]
 
 
-def image_message(header: Header, picture: NDArray[Any], encoding: str) -> Image:
-    """Return a message of ``picture`` (H, W) or (H, W, 3), uint8 or float32, as ``encoding``."""
-    contiguous = np.ascontiguousarray(picture)
+def image_message(header: Header, image: NDArray[Any], encoding: str) -> Image:
+    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32, as ``encoding``."""
+    contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,
         height=contiguous.shape[0],
@@ -84,19 +84,19 @@ def image_message(header: Header, picture: NDArray[Any], encoding: str) -> Image
 
 
 def check_shape(
-    picture: Picture, calibration: Calibration, image_topic: str, info_topic: str
+    image: ImageArray, calibration: Calibration, image_topic: str, info_topic: str
 ) -> None:
-    """Check that a picture (H, W) has the aspect ratio of its calibration.
+    """Check that an image (H, W) has the aspect ratio of its calibration.
 
     Raises:
-        CameraError: it has not, so that the CameraInfo is not that of the picture.
+        CameraError: it has not, so that the CameraInfo is not that of the image.
     """
-    height, width = picture.shape
+    height, width = image.shape
     if abs(width * calibration.height - height * calibration.width) > max(width, height):
         raise CameraError(
-            f"the pictures on {image_topic} are {width}x{height} but {info_topic} describes "
+            f"the images on {image_topic} are {width}x{height} but {info_topic} describes "
             f"{calibration.width}x{calibration.height}, another shape; expected the CameraInfo of "
-            "these pictures: calibrate the camera at the size it delivers"
+            "these images: calibrate the camera at the size it delivers"
         )
 
 
@@ -138,7 +138,7 @@ def camera_of(message: CameraInfo) -> Camera:
     """Return the pinhole camera of a ``silhouette/camera_info``.
 
     Raises:
-        CameraError: the matrix is all zero or the picture is distorted.
+        CameraError: the matrix is all zero or the image is distorted.
     """
     k = message.k
     if not (k[0] > 0 and k[4] > 0):

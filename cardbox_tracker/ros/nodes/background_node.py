@@ -1,4 +1,4 @@
-"""The node ``background``: pictures in, silhouettes out."""
+"""The node ``background``: images in, silhouettes out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.resize import to_working_size
 
-_LARGE_PICTURE_BYTES = 400_000
+_LARGE_IMAGE_BYTES = 400_000
 _LOSS = 0.1
 _DRIFT_GREY_LEVELS = 12.0
 _COVERED = 0.6
@@ -30,7 +30,7 @@ class BackgroundNode(CardboxNode):
     """Learns the empty scene and cuts out whoever enters it."""
 
     def __init__(self, **options: Any) -> None:
-        """Subscribe to the camera and wait for its pictures."""
+        """Subscribe to the camera and wait for its images."""
         super().__init__("background", **options)
         warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
@@ -43,8 +43,8 @@ class BackgroundNode(CardboxNode):
         self._rectifier: Rectifier | None = None
         self._learner = BackgroundLearner(self._config)
         self._extractor: SilhouetteExtractor | None = None
-        self._picture: conversions.Picture | None = None
-        self._picture_bytes = 0
+        self._image: conversions.ImageArray | None = None
+        self._image_bytes = 0
         self._covered = 0.0
 
         self._silhouette = self.hand_over(Image, "silhouette", qos.SILHOUETTE)
@@ -57,12 +57,12 @@ class BackgroundNode(CardboxNode):
         self._image_topic = self.resolve(topic)
         self._info_topic = self.resolve("camera_info")
         self.subscribe(CameraInfo, "camera_info", self._on_info, qos.SENSOR_DATA)
-        self.subscribe(kind, topic, self._on_picture, qos.SENSOR_DATA)
+        self.subscribe(kind, topic, self._on_image, qos.SENSOR_DATA)
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
         self.diagnostics.advice = self._advice
         self.diagnostics.wait_for(
-            f"pictures on {self._image_topic} and their CameraInfo on {self._info_topic}"
+            f"images on {self._image_topic} and their CameraInfo on {self._info_topic}"
         )
 
     def _changed(self, settings: BackgroundParameters) -> None:
@@ -72,15 +72,15 @@ class BackgroundNode(CardboxNode):
         self._learner.config = self._config
 
     def _learn(self) -> str:
-        if self._picture is None:
+        if self._image is None:
             raise CameraError(
-                f"no picture was received yet on {self._image_topic}, so there is nothing to learn "
+                f"no image was received yet on {self._image_topic}, so there is nothing to learn "
                 "from; is the camera running, and its CameraInfo on "
                 f"{self._info_topic}? See 'ros2 topic hz {self._image_topic}'"
             )
         self._forget()
         return (
-            f"learning the background from the next {self._config.learn_images} pictures; "
+            f"learning the background from the next {self._config.learn_images} images; "
             "nobody may be in view"
         )
 
@@ -108,37 +108,37 @@ class BackgroundNode(CardboxNode):
             self._camera = self._calibration.camera(*self._size)
         except CameraError as error:
             raise CameraError(
-                f"{self._info_topic}, of the pictures on {self._image_topic}: {error}"
+                f"{self._info_topic}, of the images on {self._image_topic}: {error}"
             ) from None
         self._forget()
-        self.diagnostics.wait_for(f"pictures on {self._image_topic}")
+        self.diagnostics.wait_for(f"images on {self._image_topic}")
 
-    def _on_picture(self, message: Image | CompressedImage, sent_ns: int) -> None:
+    def _on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
-        self._picture_bytes = len(message.data)
+        self._image_bytes = len(message.data)
         if self._camera is None or self._calibration is None:
             if not self._info_key:
                 self.diagnostics.wait_for(
-                    f"the CameraInfo on {self._info_topic} of the pictures on {self._image_topic}"
+                    f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
             return
         full = conversions.brightness_of(message)
         conversions.check_shape(full, self._calibration, self._image_topic, self._info_topic)
-        picture = to_working_size(full, *self._size)
+        image = to_working_size(full, *self._size)
         if self._rectifier is not None:
-            picture = self._rectifier(picture)
-        self._picture = picture
+            image = self._rectifier(image)
+        self._image = image
         if self._extractor is None:
-            self._add_to_background(message.header, picture)
+            self._add_to_background(message.header, image)
         if self._extractor is not None:
-            self._publish(message.header, self._extractor, picture)
+            self._publish(message.header, self._extractor, image)
             self.diagnostics.working(sent_ns)
 
-    def _add_to_background(self, header: Header, picture: conversions.Picture) -> None:
-        self._learner.add(picture)
+    def _add_to_background(self, header: Header, image: conversions.ImageArray) -> None:
+        self._learner.add(image)
         if not self._learner.is_ready:
             self.diagnostics.wait_for(
-                f"{self._config.learn_images} pictures of the empty scene on {self._image_topic} "
+                f"{self._config.learn_images} images of the empty scene on {self._image_topic} "
                 "(learning the background: nobody may be in view)"
             )
             return
@@ -146,14 +146,14 @@ class BackgroundNode(CardboxNode):
         self._extractor = SilhouetteExtractor(model, self._config)
         self._mean.publish(conversions.image_message(header, model.mean, "32FC1"))
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
-        self.get_logger().info(f"background learned from {self._learner.count} pictures")
+        self.get_logger().info(f"background learned from {self._learner.count} images")
 
     def _publish(
-        self, header: Header, extractor: SilhouetteExtractor, picture: conversions.Picture
+        self, header: Header, extractor: SilhouetteExtractor, image: conversions.ImageArray
     ) -> None:
         assert self._camera is not None
-        silhouette = extractor(picture)
-        # The picture first: whoever tracks it need not wait for what hardly ever changes.
+        silhouette = extractor(image)
+        # The image first: whoever tracks it need not wait for what hardly ever changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, self._camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size
@@ -161,24 +161,24 @@ class BackgroundNode(CardboxNode):
     def _values(self) -> dict[str, str]:
         return {
             "background learned from": f"{self._learner.count}/{self._config.learn_images}",
-            "foreground (% of the picture)": f"{100 * self._covered:.1f}",
+            "foreground (% of the image)": f"{100 * self._covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
         }
 
     def _drift(self) -> float:
         """How much brighter the scene became; the person covers less than half of it."""
-        if self._extractor is None or self._picture is None:
+        if self._extractor is None or self._image is None:
             return 0.0
-        return float(np.median(self._picture - self._extractor.model.mean))
+        return float(np.median(self._image - self._extractor.model.mean))
 
     def _advice(self) -> list[str]:
         advice = []
-        if self.diagnostics.input.loss > _LOSS and self._picture_bytes > _LARGE_PICTURE_BYTES:
+        if self.diagnostics.input.loss > _LOSS and self._image_bytes > _LARGE_IMAGE_BYTES:
             advice.append(
-                f"{100 * self.diagnostics.input.loss:.0f} % of the pictures on {self._image_topic} "
-                f"({self._picture_bytes // 1000} kB each) are lost on the way: start all nodes "
+                f"{100 * self.diagnostics.input.loss:.0f} % of the images on {self._image_topic} "
+                f"({self._image_bytes // 1000} kB each) are lost on the way: start all nodes "
                 "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
-                "config/fastdds_large_images.xml, or use smaller, grey or compressed pictures"
+                "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
             )
         if abs(self._drift()) > _DRIFT_GREY_LEVELS or self._covered > _COVERED:
             advice.append(

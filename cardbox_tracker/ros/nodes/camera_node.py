@@ -31,7 +31,7 @@ _RETRY_S = 1.0
 
 
 class CameraNode(CardboxNode):
-    """Reads pictures in a thread of its own and publishes each with its calibration."""
+    """Reads images in a thread of its own and publishes each with its calibration."""
 
     def __init__(self, **options: Any) -> None:
         """Open the device or file and start reading.
@@ -73,11 +73,11 @@ class CameraNode(CardboxNode):
         started_s = due_s = time.monotonic()
         while not self._stop.is_set():
             settings = self.parameters.value
-            ok, picture = self._capture.read()
+            ok, image = self._capture.read()
             if not ok:
                 if not settings.file:
                     self.diagnostics.problem(
-                        f"{settings.device} delivers no picture; is it plugged in, and used by no "
+                        f"{settings.device} delivers no image; is it plugged in, and used by no "
                         "other program? ('fuser -v' tells)"
                     )
                     self._stop.wait(_RETRY_S)
@@ -93,23 +93,23 @@ class CameraNode(CardboxNode):
                 due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
                 self._stop.wait(max(due_s - time.monotonic(), 0.0))
             try:
-                self._publish(np.asarray(picture, dtype=np.uint8), settings)
+                self._publish(np.asarray(image, dtype=np.uint8), settings)
             except Exception as error:
                 if not self._stop.is_set():
-                    self.diagnostics.problem(f"cannot publish the picture: {error!r}")
+                    self.diagnostics.problem(f"cannot publish the image: {error!r}")
 
-    def _publish(self, picture: conversions.Picture, settings: CameraParameters) -> None:
+    def _publish(self, image: conversions.ImageArray, settings: CameraParameters) -> None:
         header = Header(frame_id=settings.frame_id, stamp=self.get_clock().now().to_msg())
-        if settings.encoding == "mono8" and picture.ndim == 3:
-            picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        elif settings.encoding == "bgr8" and picture.ndim == 2:
-            picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-        height, width = picture.shape[:2]
+        if settings.encoding == "mono8" and image.ndim == 3:
+            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        elif settings.encoding == "bgr8" and image.ndim == 2:
+            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+        height, width = image.shape[:2]
         calibration = self._calibration or assumed_calibration(
             width, height, settings.horizontal_fov_deg
         )
         self._infos.publish(conversions.calibration_message(header, calibration))
-        self._images.publish(conversions.image_message(header, picture, settings.encoding))
+        self._images.publish(conversions.image_message(header, image, settings.encoding))
         self.diagnostics.input.add(conversions.stamp_ns(header.stamp))
         self.diagnostics.working()
 

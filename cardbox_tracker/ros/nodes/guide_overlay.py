@@ -49,7 +49,7 @@ class GuideOverlay:
             side_turn=settings.side_turn,
         )
         if step.name in REFERENCE_NAMES:
-            picture = draw_guidance(
+            image = draw_guidance(
                 silhouette,
                 at_height_of(silhouette, body, camera),
                 camera.with_pitch(body.camera_pitch_rad),
@@ -59,5 +59,5 @@ class GuideOverlay:
                 _SCALE,
             )
         else:
-            picture = draw_message(silhouette, self.status)
-        self._publisher.publish(conversions.image_message(message.header, picture, "bgr8"))
+            image = draw_message(silhouette, self.status)
+        self._publisher.publish(conversions.image_message(message.header, image, "bgr8"))

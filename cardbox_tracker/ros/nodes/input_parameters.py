@@ -24,7 +24,7 @@ class CameraParameters(NodeParameters):
     )
     rate_hz: float = parameter(
         15.0,
-        "pictures a second; 0 takes the file's own rate",
+        "images a second; 0 takes the file's own rate",
         unit="Hz",
         limits=(0.0, 240.0),
         read_only=True,
@@ -79,7 +79,7 @@ class PlayBagParameters(NodeParameters):
         [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
     )
     wait_for_subscribers: bool = parameter(
-        True, "begin when somebody subscribes to a played picture topic", read_only=True
+        True, "begin when somebody subscribes to a played image topic", read_only=True
     )
     wait_for_topics: list[str] = parameter(
         [],

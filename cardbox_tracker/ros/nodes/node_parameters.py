@@ -27,7 +27,7 @@ _TRACKER = TrackerConfig()
 
 @dataclass(frozen=True)
 class BackgroundParameters(NodeParameters):
-    """Cut the person out of the camera's pictures."""
+    """Cut the person out of the camera's images."""
 
     image_transport: str = parameter(
         "raw",
@@ -42,7 +42,7 @@ class BackgroundParameters(NodeParameters):
         240, "working resolution, height", unit="px", limits=(32, 4096), read_only=True
     )
     learn_images: int = parameter(
-        _BACKGROUND.learn_images, "pictures of the empty scene to learn from", limits=(2, 10000)
+        _BACKGROUND.learn_images, "images of the empty scene to learn from", limits=(2, 10000)
     )
     threshold: float = parameter(
         _BACKGROUND.threshold,
@@ -88,12 +88,12 @@ class BackgroundParameters(NodeParameters):
     )
     min_area: float = parameter(
         _BACKGROUND.min_area,
-        "specks smaller than this fraction of the picture are dropped",
+        "specks smaller than this fraction of the image are dropped",
         limits=(0.0, 1.0),
     )
     max_hole: float = parameter(
         _BACKGROUND.max_hole,
-        "holes smaller than this fraction of the picture are filled",
+        "holes smaller than this fraction of the image are filled",
         limits=(0.0, 1.0),
     )
 
@@ -179,7 +179,7 @@ class TrackerParameters(NodeParameters):
     particles: int = parameter(
         0, "particles of each of the three filters; 0: preset", limits=(0, 1000000)
     )
-    cycles: int = parameter(0, "estimation cycles a picture; 0: preset", limits=(0, 100))
+    cycles: int = parameter(0, "estimation cycles an image; 0: preset", limits=(0, 100))
     average: int = parameter(
         0, "best particles whose weighted mean is the result; 0: preset", limits=(0, 1000000)
     )
@@ -207,7 +207,7 @@ class TrackerParameters(NodeParameters):
         _TRACKER.lost_iou, "an overlap (IoU) below this counts as lost", limits=(0.0, 1.0)
     )
     lost_frames: int = parameter(
-        _TRACKER.lost_frames, "so many lost pictures in a row are a loss", limits=(1, 1000000)
+        _TRACKER.lost_frames, "so many lost images in a row are a loss", limits=(1, 1000000)
     )
     seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1))
     model_file: str = parameter(

@@ -33,7 +33,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _PROGRESS_S = 5.0
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Recorded once, at the time of their making; a late subscriber needs them too.
 _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
 
@@ -74,7 +74,7 @@ class PlayBagNode(CardboxNode):
         self._watched = [
             publisher
             for topic, publisher in self._publishers_of.items()
-            if self._reader.topics[topic] in _PICTURES
+            if self._reader.topics[topic] in _IMAGES
         ] or self._all()
 
     def _advertise(self, topic: str, kind: str) -> Publisher:
@@ -147,7 +147,7 @@ class PlayBagNode(CardboxNode):
     def _settle(self, delay_s: float) -> None:
         """Serve calls until nobody has subscribed or left for ``delay_s``.
 
-        Whoever subscribes is found topic by topic; so their first picture has its CameraInfo.
+        Whoever subscribes is found topic by topic; so their first image has its CameraInfo.
         """
         subscribers: list[int] = []
         since_s = time.monotonic()

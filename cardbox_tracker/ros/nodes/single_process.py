@@ -39,7 +39,7 @@ class AllNodes:
     """The nodes of one camera, in the order of the data."""
 
     def __init__(self, source: str | None) -> None:
-        """Create them, with the ``source`` of pictures if it is one of ``SOURCES``.
+        """Create them, with the ``source`` of images if it is one of ``SOURCES``.
 
         Raises:
             CardboxError: one of them cannot start.
@@ -106,7 +106,7 @@ def source_from(arguments: Sequence[str]) -> str | None:
         "--params-file; the bag of play_bag: -p play_bag:bag:=BAG.",
     )
     parser.add_argument(
-        "--with", dest="source", choices=SOURCES, help="also the source of the pictures"
+        "--with", dest="source", choices=SOURCES, help="also the source of the images"
     )
     source: str | None = parser.parse_args(arguments).source
     return source

@@ -24,7 +24,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Camera
 
 _REASONS = {
-    NO_PERSON: "nobody is in the picture",
+    NO_PERSON: "nobody is in the image",
     LOST: (
         "the person was lost (the model does not fit the silhouette); call tracker/reset when they "
         "stand in the front reference posture, or initialize again if it is another person"
@@ -39,7 +39,7 @@ class TrackerNode(CardboxNode):
         """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
-        # Compiles what no cache has yet, so that no live picture waits for it.
+        # Compiles what no cache has yet, so that no live image waits for it.
         self.get_logger().info("preparing (the very first start compiles for half a minute)")
         compile_all()
         self._body: BodyModel | None = None
@@ -149,7 +149,7 @@ class TrackerNode(CardboxNode):
 
     def _values(self) -> dict[str, str]:
         values = {"state": self._state or "not started"}
-        values |= {f"pictures {state}": str(count) for state, count in self._counts.items()}
+        values |= {f"images {state}": str(count) for state, count in self._counts.items()}
         estimate = self._estimate
         if estimate is not None and estimate.posture is not None:
             values["cost (px)"] = f"{estimate.cost_px}"

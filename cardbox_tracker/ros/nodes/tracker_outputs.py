@@ -1,4 +1,4 @@
-"""What the tracker publishes of one picture."""
+"""What the tracker publishes of one image."""
 
 from __future__ import annotations
 
@@ -38,7 +38,11 @@ class TrackerOutputs:
         self._guided = step_of(message.data) is not None
 
     def publish(
-        self, header: Header, estimate: Estimate, silhouette: conversions.Picture, tracker: Tracker
+        self,
+        header: Header,
+        estimate: Estimate,
+        silhouette: conversions.ImageArray,
+        tracker: Tracker,
     ) -> None:
         """Publish a posture only where there is one: nothing stale under a new stamp."""
         if estimate.posture is not None:
@@ -59,15 +63,15 @@ class TrackerOutputs:
             self._markers.publish(results.no_markers_message(header))
         self._state = estimate.state
         if _wanted(self._overlay) and not self._guided:
-            picture = draw_overlay(silhouette, tracker.body, tracker.camera, estimate)
-            self._overlay.publish(conversions.image_message(header, picture, "bgr8"))
+            image = draw_overlay(silhouette, tracker.body, tracker.camera, estimate)
+            self._overlay.publish(conversions.image_message(header, image, "bgr8"))
 
     def waiting(self, message: Image, text: str) -> None:
         """Show a silhouette and what the tracker waits for, where the overlay would be."""
         if not _wanted(self._overlay) or self._guided:
             return
-        picture = draw_message(conversions.silhouette_of(message), text)
-        self._overlay.publish(conversions.image_message(message.header, picture, "bgr8"))
+        image = draw_message(conversions.silhouette_of(message), text)
+        self._overlay.publish(conversions.image_message(message.header, image, "bgr8"))
 
 
 class Rep155Outputs:

@@ -1,6 +1,6 @@
 """What a node says of itself on ``/diagnostics`` once a second, and in its log when that changes.
 
-A node that publishes nothing looks dead; here it says what it waits for. Lost pictures are noticed
+A node that publishes nothing looks dead; here it says what it waits for. Lost images are noticed
 by the spacing of their stamps, since the middleware does not tell.
 """
 
@@ -39,7 +39,7 @@ class StreamStatistics:
         self.went_back = 0
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # The same in order: with every picture the period is asked for.
+        # The same in order: with every image the period is asked for.
         self._ordered_ns: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
@@ -70,7 +70,7 @@ class StreamStatistics:
     def period_ns(self) -> int:
         """Spacing of the stamps where none is missing, ns.
 
-        A low percentile: where most pictures are lost, the median is a multiple of the period.
+        A low percentile: where most images are lost, the median is a multiple of the period.
         """
         return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
 
@@ -87,9 +87,9 @@ class NodeDiagnostics:
     """State, rates, latency and losses of one node.
 
     Attributes:
-        input: the pictures or silhouettes that drive the node.
+        input: the images or silhouettes that drive the node.
         extra: called once a second for further values, name to text.
-        advice: called once a second for warnings that come and go, such as lost pictures.
+        advice: called once a second for warnings that come and go, such as lost images.
     """
 
     def __init__(self, node: Node) -> None:
@@ -132,7 +132,7 @@ class NodeDiagnostics:
         if sent_ns > 0:
             latency_ns = time.time_ns() - sent_ns
             self._latencies_ms.append(latency_ns / 1e6)
-            # The next picture was due before this one was done.
+            # The next image was due before this one was done.
             self._late += 0 < self.input.period_ns < latency_ns
 
     def warn(self, text: str) -> None:

@@ -158,7 +158,7 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
     try:
         node = create()
         # What was made so far stays, compiled code above all; looking through it for garbage in the
-        # middle of a picture takes a tenth of a second.
+        # middle of an image takes a tenth of a second.
         gc.collect()
         gc.freeze()
         work(node)

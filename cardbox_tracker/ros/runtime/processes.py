@@ -28,7 +28,7 @@ EXECUTABLES: dict[str, str] = {
 
 
 def isolate() -> None:
-    """Keep this process and its children off other people's graphs; let large pictures through.
+    """Keep this process and its children off other people's graphs; let large images through.
 
     A domain or profile that is set already is kept.
     """

@@ -2,7 +2,7 @@
 
 rclpy's own executor asks each node for its subscriptions, services, timers and QoS events before
 every wait and builds a wait set of them: nearly a millisecond where a node has forty of them, with
-every picture. Here, as in rclcpp's ``StaticSingleThreadedExecutor``, they are gathered when
+every image. Here, as in rclcpp's ``StaticSingleThreadedExecutor``, they are gathered when
 something was created or destroyed, and the callback of a subscription is called as soon as it is
 ready. All else, which is rare, is left to rclpy: services, timers, events and coroutines.
 """

@@ -128,13 +128,13 @@ def assert_all_equal(case: Case) -> None:
 
 @settings(max_examples=60)
 @given(SMALL_CASES)
-def test_every_cost_of_small_pictures_is_equal(case: Case) -> None:
+def test_every_cost_of_small_images_is_equal(case: Case) -> None:
     assert_all_equal(case)
 
 
 @settings(max_examples=8)
 @given(LARGE_CASES)
-def test_every_cost_of_large_pictures_is_equal(case: Case) -> None:
+def test_every_cost_of_large_images_is_equal(case: Case) -> None:
     assert_all_equal(case)
 
 
@@ -218,7 +218,7 @@ def hand_trunk() -> np.ndarray:
 
 def hand_full() -> np.ndarray:
     expected = hand_trunk()
-    # The person's left is to the right of the picture.
+    # The person's left is to the right of the image.
     expected[24:36, 36:38] = 255
     expected[24:36, 26:28] = 255
     return expected
@@ -278,7 +278,7 @@ def test_a_new_silhouette_forgets_the_fixed_arms(hand_cost: SilhouetteCost) -> N
     assert hand_cost.torso(np.zeros((1, 4))).tolist() == [TRUNK_PX]
 
 
-def test_a_model_outside_of_the_picture_costs_the_silhouette(hand_cost: SilhouetteCost) -> None:
+def test_a_model_outside_of_the_image_costs_the_silhouette(hand_cost: SilhouetteCost) -> None:
     hand_cost.observe(hand_full())
     away = np.zeros((2, 12))
     away[:, 0] = (-2.9, 2.9)
@@ -315,7 +315,7 @@ def test_a_silhouette_of_another_size_is_refused(
 @pytest.mark.parametrize(
     ("hip_height_m", "pitch_rad", "rows"),
     [
-        # 20 px a metre below row 23.5; whatever lies outside of the picture is its border.
+        # 20 px a metre below row 23.5; whatever lies outside of the image is its border.
         (-0.6, 0.0, 36),
         (0.0, 0.0, 24),
         (-1.1, 0.0, 46),
@@ -323,7 +323,7 @@ def test_a_silhouette_of_another_size_is_refused(
         (2.0, 0.0, 1),
         # Looking down by as much as the hips are low moves them to the middle.
         (-0.6, np.arctan2(0.6, 2.0), 24),
-        # Behind a camera that looks up steeply is no row of the picture.
+        # Behind a camera that looks up steeply is no row of the image.
         (-4.0, -1.2, 48),
     ],
 )

@@ -28,7 +28,7 @@ from cardbox_tracker.vision.rasterisation import render
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel(hip_height_m=-0.51)
 FRONT = reference_posture("front")
-PICTURE_PX = 320 * 240
+IMAGE_PX = 320 * 240
 
 
 class ConstantCost:
@@ -59,11 +59,11 @@ class ConstantCost:
 
 
 def on_constant_cost(
-    config: TrackerConfig, picture_px: int = PICTURE_PX
+    config: TrackerConfig, image_px: int = IMAGE_PX
 ) -> tuple[HierarchicalFilter, ConstantCost]:
     cost = ConstantCost()
     config = replace(config, parallel_from=None)
-    return HierarchicalFilter(cost, config, picture_px, np.random.default_rng(0)), cost
+    return HierarchicalFilter(cost, config, image_px, np.random.default_rng(0)), cost
 
 
 def before_somebody(
@@ -108,7 +108,7 @@ def test_both_arms_run_at_once_where_there_is_enough_to_do(
 ) -> None:
     _, cost = on_constant_cost(paper_preset())
     config = replace(paper_preset().with_particles(particles), parallel_from=parallel_from)
-    filters = HierarchicalFilter(cost, config, PICTURE_PX, np.random.default_rng(0))
+    filters = HierarchicalFilter(cost, config, IMAGE_PX, np.random.default_rng(0))
     seen = set()
 
     def rate(side: str, arm_postures: np.ndarray) -> np.ndarray:
@@ -123,7 +123,7 @@ def test_both_arms_run_at_once_where_there_is_enough_to_do(
 def test_an_error_in_the_other_thread_is_not_lost() -> None:
     filters, cost = on_constant_cost(paper_preset())
     config = replace(paper_preset(), parallel_from=0)
-    filters = HierarchicalFilter(cost, config, PICTURE_PX, np.random.default_rng(0))
+    filters = HierarchicalFilter(cost, config, IMAGE_PX, np.random.default_rng(0))
 
     def fail(side: str, arm_postures: np.ndarray) -> np.ndarray:
         if side == "left":
@@ -215,10 +215,10 @@ def test_a_fraction_of_the_arms_explores_and_the_torso_never_does(
 
 
 def test_the_estimate_is_the_best_or_the_mean_of_the_best() -> None:
-    """The prior makes costs differ; a picture of four times the pixels spreads them four times."""
-    for average, picture_px, scale in ((1, PICTURE_PX, 1.0), (20, 4 * PICTURE_PX, 4.0)):
+    """The prior makes costs differ; an image of four times the pixels spreads them four times."""
+    for average, image_px, scale in ((1, IMAGE_PX, 1.0), (20, 4 * IMAGE_PX, 4.0)):
         config = replace(paper_preset(), prior=0.01, average=average)
-        filters, _ = on_constant_cost(config, picture_px)
+        filters, _ = on_constant_cost(config, image_px)
         filters.scatter(FRONT)
         posture = filters.cycle()
         np.testing.assert_array_equal(posture[TORSO], filters.torso.mean(average, scale))

@@ -204,7 +204,7 @@ def test_the_standard_deviation_by_hand() -> None:
     assert filters.particles[:, 0].tolist() == [99, 1, 0, -99]
 
 
-def test_a_larger_picture_spreads_the_weights_of_the_standard_deviation() -> None:
+def test_a_larger_image_spreads_the_weights_of_the_standard_deviation() -> None:
     half = 4.0 * SPREAD_PX * np.log(2.0)
     filters = with_particles(np.array([0.0, 1, 4]), 500.0 + np.array([0.0, half, 2 * half]))
     # Weights 4/7, 2/7 and 1/7 around 0.

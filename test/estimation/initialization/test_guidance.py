@@ -20,7 +20,7 @@ class Room:
     def capture(self, name: str) -> str:
         if self.failures:
             self.failures -= 1
-            raise InitializationError("nobody is in the picture")
+            raise InitializationError("nobody is in the image")
         self.captured.append(name)
         return "captured"
 
@@ -44,12 +44,12 @@ def test_a_failed_capture_says_why_and_is_tried_again() -> None:
     room = Room(failures=1)
     room.guidance().run(["front"], "left", count_down_s=1, attempts=2)
     assert room.captured == ["front"]
-    assert "front: not captured: nobody is in the picture" in room.lines
+    assert "front: not captured: nobody is in the image" in room.lines
 
 
 def test_it_gives_up_with_the_reason() -> None:
     room = Room(failures=9)
-    with pytest.raises(InitializationError, match="nobody is in the picture"):
+    with pytest.raises(InitializationError, match="nobody is in the image"):
         room.guidance().run(["front"], "left", count_down_s=1, attempts=2)
     assert room.captured == []
 
@@ -68,5 +68,5 @@ def test_every_line_of_the_guidance_is_a_step_and_no_other() -> None:
     assert [step.left_s for step in steps[:4] if step] == [3, 2, 1, None]
     assert steps[0] and steps[0].words == instruction("front", "left")
     assert step_of("measuring: 40 %") == ("measuring", "40 %", None)
-    for other in ("", "measured; fit (IoU) front 0.93", "nobody is in the picture: come nearer"):
+    for other in ("", "measured; fit (IoU) front 0.93", "nobody is in the image: come nearer"):
         assert step_of(other) is None

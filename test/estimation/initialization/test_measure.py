@@ -25,7 +25,7 @@ from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = session_camera()
 BODIES = 8
-# So far away that tall people with arms stretched sideways are in the picture.
+# So far away that tall people with arms stretched sideways are in the image.
 DISTANCE_M = 2.3
 
 # Seen directly, in the silhouette of one part alone. At 2.3 m a pixel is 7 mm; two edges that are
@@ -55,7 +55,7 @@ def references_of(body: BodyModel) -> dict[str, np.ndarray]:
         posture = reference_posture(name, body.side_turn)
         posture[0] = body.lateral_m
         silhouette = render(cardbox_patches(body, posture), camera)
-        # The model ends at the hips; a person goes on, down to the picture's lower border.
+        # The model ends at the hips; a person goes on, down to the image's lower border.
         middle = round(camera.cx + camera.fx * body.lateral_m / body.distance_m)
         silhouette[rows_above_hips(body, camera) :, middle - 20 : middle + 20] = 255
         silhouettes[name] = silhouette
@@ -256,7 +256,7 @@ def test_the_required_fit_is_a_setting() -> None:
 @pytest.mark.parametrize(
     ("name", "replacement", "text"),
     [
-        ("front", None, "reference 'front': nobody is in the picture"),
+        ("front", None, "reference 'front': nobody is in the image"),
         ("side", "front", "'front' and 'side' are too alike"),
         ("arms", "front", "'front' and 'arms' are too alike"),
     ],

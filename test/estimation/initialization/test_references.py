@@ -47,12 +47,12 @@ def test_good_references_pass(side_turn: str, torso_y_m: float) -> None:
 
 def test_the_average_is_the_majority() -> None:
     rows = ([0, 0, 0, 1], [0, 0, 1, 1], [0, 1, 1, 1])
-    pictures = [np.array([row], np.uint8) * 255 for row in rows]
-    average = average_silhouette(pictures)
+    images = [np.array([row], np.uint8) * 255 for row in rows]
+    average = average_silhouette(images)
     assert average.dtype == np.uint8
     assert average.tolist() == [[0, 0, 255, 255]]
     # A tie is background.
-    assert average_silhouette(pictures[:2]).tolist() == [[0, 0, 0, 255]]
+    assert average_silhouette(images[:2]).tolist() == [[0, 0, 0, 255]]
 
 
 def test_no_silhouette_at_all_is_refused() -> None:
@@ -68,19 +68,19 @@ def test_no_silhouette_at_all_is_refused() -> None:
         ("arms", "step in front of the camera and face the camera, both arms stretched sideways"),
     ],
 )
-def test_nobody_in_the_picture_is_refused(name: str, advice: str) -> None:
+def test_nobody_in_the_image_is_refused(name: str, advice: str) -> None:
     # 2 % of 160 x 120 px are 384.
     references = all_seen() | {name: block(slice(10, 20), slice(10, 48))}
-    expected = rf"reference '{name}': nobody is in the picture \(2.0 % foreground, .*{advice}"
+    expected = rf"reference '{name}': nobody is in the image \(2.0 % foreground, .*{advice}"
     with pytest.raises(InitializationError, match=expected):
         check_references(references)
     check_reference(name, block(slice(10, 26), slice(10, 34)))  # 384 px
 
 
-def test_a_picture_full_of_foreground_is_refused() -> None:
+def test_an_image_full_of_foreground_is_refused() -> None:
     with pytest.raises(
         InitializationError,
-        match=r"reference 'front': 81 % of the picture are foreground.*learn it again",
+        match=r"reference 'front': 81 % of the image are foreground.*learn it again",
     ):
         check_reference("front", block(slice(6, 114), slice(8, 152)))
 
@@ -99,13 +99,13 @@ def test_a_person_cut_off_at_a_border_is_refused(
 ) -> None:
     with pytest.raises(
         InitializationError,
-        match=f"reference '{name}': the person is cut off at the {border} border of the picture; "
+        match=f"reference '{name}': the person is cut off at the {border} border of the image; "
         "step back or to the middle, and ",
     ):
         check_reference(name, block(rows, columns))
 
 
-def test_legs_may_leave_the_picture() -> None:
+def test_legs_may_leave_the_image() -> None:
     check_reference("front", block(slice(10, 120), slice(60, 100)))
 
 

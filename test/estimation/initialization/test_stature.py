@@ -1,4 +1,4 @@
-"""Stature and heights out of the picture."""
+"""Stature and heights out of the image."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_the_height_of_a_row_is_that_of_the_point_seen_there(
 
 
 @pytest.mark.parametrize(("rows", "expected_m"), [(165, 1.65), (190, 1.9)])
-def test_whose_feet_are_in_the_picture_needs_no_guess(rows: int, expected_m: float) -> None:
+def test_whose_feet_are_in_the_image_needs_no_guess(rows: int, expected_m: float) -> None:
     # 3.3 px a centimetre at 1 m, so 1 px is a centimetre at 3.3 m.
     front = block(30, 30 + rows, 130, 190)
     assert stature_m({"front": front, "arms": outstretched(rows)}, CAMERA, 3.3) == pytest.approx(

@@ -73,11 +73,11 @@ def test_cost() -> None:
     assert "bow 1501 against 1500 px" in claim.evidence
 
 
-def test_cost_of_a_single_picture() -> None:
+def test_cost_of_a_single_image() -> None:
     results, curves, timing = all_true()
     curves["wave", "drs"]["cost_px"] = np.array([900.0, 900.0, 1600.0, 900.0])
     (claim,) = failing(results, curves, timing)
-    assert "wave in 75.0 % of the pictures" in claim.evidence
+    assert "wave in 75.0 % of the images" in claim.evidence
 
 
 def test_one_worse_elbow_is_named_and_does_not_count_over_the_whole_sequence() -> None:

@@ -114,7 +114,7 @@ def test_no_time_is_in_the_results(output: Path) -> None:
     assert timing["frame_ms"] > 0
 
 
-def test_every_picture_of_every_motion_is_in_the_table(output: Path) -> None:
+def test_every_image_of_every_motion_is_in_the_table(output: Path) -> None:
     with (output / "per_frame.csv").open() as file:
         rows = list(csv.DictReader(file))
     results = results_in(output)

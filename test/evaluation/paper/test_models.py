@@ -68,7 +68,7 @@ def test_the_parts_of_the_cost_agree_with_the_whole(name: str, session: Session)
     alone = cost.torso(posture[None, TORSO])[0]
     arms = {side: cost.arm(side, hidden[None, joints])[0] for side, joints in ARMS.items()}
     whole = cost.full(posture[None])[0]
-    # The arms do not overlap in the picture, so each changes the cost by itself.
+    # The arms do not overlap in the image, so each changes the cost by itself.
     assert whole == arms["left"] + arms["right"] - alone
 
 

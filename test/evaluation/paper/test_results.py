@@ -47,7 +47,7 @@ def test_motions_are_the_keys_with_both_strategies() -> None:
     assert motions_in(results) == ["wave", "reach"]
 
 
-def test_curves_have_a_row_a_picture(tmp_path: Path) -> None:
+def test_curves_have_a_row_an_image(tmp_path: Path) -> None:
     path = tmp_path / "per_frame.csv"
     columns = {"time_s": np.array([0.0, 0.5]), "cost_px": np.array([10.0, 1 / 3])}
     write_curves({("wave", "drs"): columns, ("wave", "srs"): columns}, path)

@@ -46,8 +46,8 @@ def test_the_truth_is_that_of_the_kinematics(session: Session) -> None:
     np.testing.assert_allclose(session.torso_rad, session.postures[:, 1:4], atol=1e-3)
 
 
-def test_pictures_for_the_sequence_are_of_the_motion(session: Session) -> None:
-    assert len(session.shown) == len(session.pictures) == SEQUENCE_LENGTH
+def test_images_for_the_sequence_are_of_the_motion(session: Session) -> None:
+    assert len(session.shown) == len(session.images) == SEQUENCE_LENGTH
     assert set(session.segments[session.shown]) == {"bow"}
 
 
@@ -60,7 +60,7 @@ def test_a_stored_session_comes_back(session: Session, tmp_path: Path) -> None:
     assert loaded.initialization_iou == session.initialization_iou
     for name in ("silhouettes", "segments", "time_s", "keypoints_m", "postures", "torso_rad"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(session, name))
-    np.testing.assert_array_equal(loaded.pictures, session.pictures)
+    np.testing.assert_array_equal(loaded.images, session.images)
 
 
 def test_the_same_seed_gives_the_same_session(session: Session) -> None:

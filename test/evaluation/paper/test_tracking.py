@@ -31,7 +31,7 @@ from cardbox_tracker.evaluation.paper.tracking import (
 
 
 def hand_made() -> MotionRuns:
-    """Two runs over two pictures; the second run is off by known amounts."""
+    """Two runs over two images; the second run is off by known amounts."""
     truth_m = np.random.default_rng(0).normal(0.0, 0.5, (2, 6, 3))
     keypoints_m = np.stack([truth_m, truth_m + np.array([0.0, 0.0, 0.2])])
     postures = np.zeros((2, 2, 12))
@@ -89,7 +89,7 @@ def test_brief_figures_and_their_mean_over_motions() -> None:
     assert mean["stderr_mpjpe_m"] == pytest.approx(0.1 / np.sqrt(2))
 
 
-def test_pictures_of_other_segments_or_without_a_person_do_not_count(session: Session) -> None:
+def test_images_of_other_segments_or_without_a_person_do_not_count(session: Session) -> None:
     n = len(session.silhouettes)
     costs = np.full((2, n), 7.0)
     (bowing,) = np.nonzero(session.segments == "bow")
@@ -102,13 +102,13 @@ def test_pictures_of_other_segments_or_without_a_person_do_not_count(session: Se
     assert chosen.time_s[0] == 0.0
 
 
-def test_no_picture_is_left_out_as_lost() -> None:
+def test_no_image_is_left_out_as_lost() -> None:
     assert comparable(default_preset()).lost_iou == 0.0
     assert comparable(paper_preset()).torso == paper_preset().torso
 
 
 def test_runs_are_those_of_the_tracker(session: Session, tmp_path: Path) -> None:
-    """Each run by itself, with its own seed; a stride leaves pictures out."""
+    """Each run by itself, with its own seed; a stride leaves images out."""
     parts = Parts(tmp_path)
     np.savez(tmp_path / "session.npz", **session.to_arrays())
     config = comparable(paper_preset().with_particles(20))

@@ -1,4 +1,4 @@
-"""Messages and the core agree on pictures, calibrations and results."""
+"""Messages and the core agree on images, calibrations and results."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ def test_a_malformed_silhouette_is_refused(
         assert word in str(caught.value)
 
 
-def test_compressed_picture_becomes_brightness() -> None:
-    picture = np.full((24, 32), 120, np.uint8)
-    data = cv2.imencode(".jpg", picture)[1].tobytes()
+def test_compressed_image_becomes_brightness() -> None:
+    image = np.full((24, 32), 120, np.uint8)
+    data = cv2.imencode(".jpg", image)[1].tobytes()
     got = conversions.brightness_of(CompressedImage(format="jpeg", data=data))
-    np.testing.assert_allclose(got, picture, atol=2)
+    np.testing.assert_allclose(got, image, atol=2)
 
 
 def test_camera_survives_its_camera_info() -> None:
@@ -90,7 +90,7 @@ def test_binning_and_region_of_interest_are_taken_into_the_camera() -> None:
     roi = RegionOfInterest(x_offset=40, y_offset=20, width=160, height=120)
     message = info(roi=roi, binning_x=2, binning_y=2)
     got = calibration_from_info(message, "a", "b").camera(80, 60)
-    # A point at pixel (u, v) of the full picture is at ((u - 40 + 0.5) / 2 - 0.5, ...) of this one.
+    # A point at pixel (u, v) of the full image is at ((u - 40 + 0.5) / 2 - 0.5, ...) of this one.
     point = np.array([0.1, -0.05, 2.0])
     u, v = CAMERA.project(point)
     np.testing.assert_allclose(

@@ -28,7 +28,7 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.simulation.session import session_camera  # noqa: E402
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 NODES = ("camera", "play_bag", "background", "initializer", "tracker")
 # What rclpy adds to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")

@@ -63,13 +63,13 @@ def test_stamps_that_go_back_are_noticed() -> None:
 
 def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callable) -> None:
     diagnostics = NodeDiagnostics(make_node())
-    diagnostics.wait_for("pictures on /image_raw")
+    diagnostics.wait_for("images on /image_raw")
     status = diagnostics._status()
     assert (status.level, status.message) == (
         DiagnosticStatus.WARN,
-        "waiting for pictures on /image_raw",
+        "waiting for images on /image_raw",
     )
-    diagnostics.problem("the picture has encoding '16UC3'")
+    diagnostics.problem("the image has encoding '16UC3'")
     assert diagnostics._status().level == DiagnosticStatus.ERROR
     diagnostics.working(sent_ns=1)
     status = diagnostics._status()

@@ -14,7 +14,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.errors import CardboxError  # noqa: E402
-from cardbox_tracker.ros import qos  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.ros.runtime.handover import Handover  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
 

@@ -14,7 +14,6 @@ from rclpy.parameter import Parameter
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization.measure import InitializationConfig
-from cardbox_tracker.ros import parameter_docs
 from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
 from cardbox_tracker.ros.nodes.node_parameters import (
     NODES,
@@ -24,8 +23,9 @@ from cardbox_tracker.ros.nodes.node_parameters import (
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters, NodeParameters, parameter
 from cardbox_tracker.vision.background import BackgroundConfig
+from tools import parameter_docs
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
