@@ -333,7 +333,7 @@ def _initialize(options: argparse.Namespace) -> None:
         seed=options.seed,
     )
     # Absurd constants are refused by their own names, before anything follows from them.
-    BodyModel(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
+    BodyModel.of(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
     folder = options.output.parent
     if not folder.is_dir():
         reason = "Not a directory" if folder.exists() else "No such file or directory"

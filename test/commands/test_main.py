@@ -51,7 +51,7 @@ class Files:
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp("cli")
     synthesize_session(folder / "session", "bow", fps=4.0, width=160, height=120)
-    save_body_model(BodyModel(hip_height_m=-0.51), folder / "person.yaml")
+    save_body_model(BodyModel.of(hip_height_m=-0.51), folder / "person.yaml")
     text = (folder / "person.yaml").read_text()
     (folder / "text.txt").write_text("no recording, no model\n")
     (folder / "binary.yaml").write_bytes(bytes(range(256)))
@@ -311,7 +311,7 @@ def test_the_course_of_the_readme(files: Files, capsys: pytest.CaptureFixture[st
     out = capsys.readouterr().out
     assert "upper_arm_length" in out
     assert f"wrote {model}" in out
-    assert load_body_model(model).distance_m == 2.0
+    assert load_body_model(model).placement.distance_m == 2.0
     words = ("track", files / "session", *BACKGROUND, "--model", model, "--start", "15.6")
     assert run(*words, "--csv", table, "--bag", bag, "--preset", "paper", "--particles", 50) == 0
     out = capsys.readouterr().out
