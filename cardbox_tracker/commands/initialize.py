@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> None:
         seed=options.seed,
     )
     # An impossible distance or pitch is refused by its own name, before anything follows from it.
-    BodyModel(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
+    BodyModel.of(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
     _check_folder(options.output)
     spans = {name: getattr(options, name) for name in _REFERENCES}
     with BagReader(options.recording) as bag:

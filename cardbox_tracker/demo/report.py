@@ -34,7 +34,8 @@ def write_report(
     """Write everything into ``output``, print the table, return what report.json holds."""
     with BagReader(session) as bag:
         height, width = next(iter(result.silhouettes.values())).shape
-        camera = bag.calibration().camera(width, height).with_pitch(result.body.camera_pitch_rad)
+        pitch_rad = result.body.camera_pose.pitch_rad
+        camera = bag.calibration().camera(width, height, pitch_rad)
     expected = [stamp for stamp in result.truth.frames if stamp >= result.start_ns]
     tracked = [stamp for stamp in expected if stamp in result.postures]
     estimates = rate(result, camera, tracked)

@@ -72,13 +72,13 @@ class Tracker:
             cost: another implementation of the cost, for comparison.
         """
         self.body = body
-        self.camera = camera.with_pitch(body.camera_pitch_rad)
+        self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._cost = cost or CompiledCost(body, self.camera)
         self._keypoints = CompiledKeypoints(body, self.camera)
         self._reference = reference_posture("front")
-        self._reference[0] = body.lateral_m
+        self._reference[0] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), self.camera, self._cost.rows)
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self.reset()
@@ -141,4 +141,4 @@ class Tracker:
         """``torso_y`` under which the silhouette's median column lies."""
         columns = np.count_nonzero(silhouette[: self._cost.rows], axis=0).cumsum()
         middle = int(np.searchsorted(columns, columns[-1] / 2))
-        return float((middle - self.camera.cx) / self.camera.fx * self.body.distance_m)
+        return float((middle - self.camera.cx) / self.camera.fx * self.body.placement.distance_m)

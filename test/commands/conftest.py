@@ -56,7 +56,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of good files and bad ones."""
     folder = tmp_path_factory.mktemp("cardbox")
     synthesize_session(folder / "session", "bow", fps=4.0, width=160, height=120)
-    save_body_model(BodyModel(hip_height_m=-0.51), folder / "person.yaml")
+    save_body_model(BodyModel.of(hip_height_m=-0.51), folder / "person.yaml")
     text = (folder / "person.yaml").read_text()
     (folder / "text.txt").write_text("no recording, no model\n")
     (folder / "binary.yaml").write_bytes(bytes(range(256)))

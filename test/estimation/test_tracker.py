@@ -27,7 +27,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 NOBODY = np.zeros((120, 160), np.uint8)
 STILL = TrackerConfig(
     torso=FilterConfig(rotation_noise_rad=0.0), arm=FilterConfig(rotation_noise_rad=0.0)
@@ -42,7 +42,7 @@ def front(torso_y_m: float = 0.0) -> np.ndarray:
 
 def seen(posture: np.ndarray, body: BodyModel = BODY) -> np.ndarray:
     """The model's own silhouette."""
-    camera = CAMERA.with_pitch(body.camera_pitch_rad)
+    camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
     return render(cardbox_patches(body, posture), camera)
 
 
@@ -203,7 +203,7 @@ def test_the_papers_tracker_goes_on_from_where_the_person_was() -> None:
 
 
 def test_reset_begins_from_the_front_reference() -> None:
-    body = replace(BODY, lateral_m=0.1)
+    body = BODY.with_values(lateral_m=0.1)
     tracker = Tracker(body, CAMERA, STILL)
     start = reference_posture("front")
     start[0] = 0.1
@@ -226,7 +226,7 @@ def test_reset_forgets_the_images_that_did_not_fit() -> None:
 
 
 def test_the_camera_is_pitched_as_the_body_model_says() -> None:
-    body = replace(BODY, camera_pitch_rad=0.15)
+    body = BODY.with_values(camera_pitch_rad=0.15)
     estimate = Tracker(body, CAMERA, STILL).track(seen(front(), body))
     assert estimate.cost_px == 0
     assert estimate.iou == 1.0

@@ -116,7 +116,7 @@ def test_a_launch_file_leads_to_joint_states(
         assert expected["/eye"] <= found
     text = log.read_text()
     where_m = np.median([state.position[0] for state in states[5:]])
-    assert where_m == pytest.approx(scene.body.lateral_m, abs=0.1)
+    assert where_m == pytest.approx(scene.body.placement.lateral_m, abs=0.1)
     assert text.count("process started with pid") == (1 if single_process == "true" else 4)
     assert "Traceback" not in text and "process has died" not in text, text[-4000:]
 

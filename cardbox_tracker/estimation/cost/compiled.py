@@ -197,5 +197,5 @@ def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray,
     """Sizes, place and view as the kernels take them."""
     pitch = camera.pitch_rad
     view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
-    place = (body.distance_m, body.hip_height_m)
+    place = (body.placement.distance_m, body.placement.hip_height_m)
     return np.array(body.sizes), np.array(place), np.array(view)

@@ -76,7 +76,9 @@ def rows_above_hips(body: BodyModel, camera: Camera) -> int:
     The hips' row is taken where the torso stands; at the image's edges a pitched camera would see
     the same height in the same row as well, since it turns about the rows' direction only.
     """
-    hip = camera.reference_to_optical(np.array([-body.distance_m, 0.0, body.hip_height_m]))
+    hip = camera.reference_to_optical(
+        np.array([-body.placement.distance_m, 0.0, body.placement.hip_height_m])
+    )
     if hip[2] <= 0:
         return camera.height
     return int(np.clip(np.ceil(camera.project(hip)[1]), 1, camera.height))

@@ -16,7 +16,7 @@ is reached. Beyond the paper:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -173,19 +173,19 @@ class _Search:
             np.where(_ALONG_BONES, _LENGTH_SCATTER, _BREADTH_SCATTER) * self._initial,
             _LEAST_SCATTER_M,
         )
-        self._place = BodyModel(
+        self._start = BodyModel.of(
             self._sizes,
-            config.distance_m,
-            crown_m - CROWN_TO_HIP * stature,
-            lateral_m(references["front"], camera, config.distance_m),
-            config.camera_pitch_rad,
-            config.side_turn,
+            distance_m=config.distance_m,
+            hip_height_m=crown_m - CROWN_TO_HIP * stature,
+            lateral_m=lateral_m(references["front"], camera, config.distance_m),
+            camera_pitch_rad=config.camera_pitch_rad,
+            side_turn=config.side_turn,
         )
         self._costs = {}
         self._asked = {}
         self._postures = {}
         for name, silhouette in references.items():
-            self._costs[name] = CompiledCost(self._place, camera)
+            self._costs[name] = CompiledCost(self._start, camera)
             self._costs[name].observe(silhouette)
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
@@ -238,11 +238,10 @@ class _Search:
 
     def result(self) -> InitializationResult:
         """Return the sizes rounded to a tenth of a millimetre, and the fit."""
-        place = self._place
-        body = replace(
-            place,
+        start = self._start
+        body = start.with_values(
             sizes=np.round(self._sizes, 4),
-            hip_height_m=round(float(place.hip_height_m), 4),
+            hip_height_m=round(float(start.placement.hip_height_m), 4),
             lateral_m=round(float(self._postures["front"][0]), 4),
         )
         iou = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -56,10 +56,10 @@ def make_case(
     focal = rng.uniform(0.5, 2.0) * width
     middle = rng.uniform(-0.1, 1.1, 2) * size
     camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *middle, pitch_rad)
-    body = BodyModel(
+    body = BodyModel.of(
         random_sizes(rng),
-        distance_m * rng.uniform(0.9, 1.1),
-        rng.uniform(-0.6, 0.1) * distance_m,
+        distance_m=distance_m * rng.uniform(0.9, 1.1),
+        hip_height_m=rng.uniform(-0.6, 0.1) * distance_m,
         camera_pitch_rad=pitch_rad,
     )
     low, high = JOINT_LIMITS.T
@@ -145,7 +145,7 @@ def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> 
     sizes = np.array([random_sizes(rng) for _ in case.postures])
     expected = []
     for one, posture in zip(sizes, case.postures, strict=True):
-        reference = ReferenceCost(replace(case.body, sizes=one), case.camera)
+        reference = ReferenceCost(case.body.with_values(sizes=one), case.camera)
         reference.observe(case.silhouette)
         expected.append(reference.full(posture[None])[0])
     compiled = case.costs()[1]
@@ -205,7 +205,7 @@ def hand_body() -> BodyModel:
     sizes = np.empty(len(HAND_SIZES))
     for name, value in HAND_SIZES.items():
         sizes[SIZE_INDEX[name]] = value
-    return BodyModel(sizes, distance_m=2.0, hip_height_m=-0.6)
+    return BodyModel.of(sizes, distance_m=2.0, hip_height_m=-0.6)
 
 
 def hand_trunk() -> np.ndarray:
@@ -328,5 +328,5 @@ def test_a_silhouette_of_another_size_is_refused(
     ],
 )
 def test_rows_above_the_hips_by_hand(hip_height_m: float, pitch_rad: float, rows: int) -> None:
-    body = replace(hand_body(), hip_height_m=hip_height_m)
+    body = hand_body().with_values(hip_height_m=hip_height_m)
     assert rows_above_hips(body, HAND_CAMERA.with_pitch(pitch_rad)) == rows

@@ -26,7 +26,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 FRONT = reference_posture("front")
 IMAGE_PX = 320 * 240
 
