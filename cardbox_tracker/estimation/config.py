@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from cardbox_tracker.estimation.cost.prior import RestPrior
+from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
 
@@ -57,8 +59,7 @@ class TrackerConfig:
         strategy: a name of ``resampling.STRATEGIES``.
         cycles: estimation cycles a frame.
         noise_decay: factor on the noise from one cycle of a frame to the next.
-        prior: cost of an angle one unit from rest (see ``hierarchy``), as a fraction of the
-            silhouette's pixels.
+        terms: settings of the cost's terms beside the silhouette's (``estimation/cost``).
         average: output the weighted mean of this many best particles; 1 outputs the best.
         explore: fraction of the arms' particles that each frame draws from anywhere within the
             joint limits, so that an arm that was lost is found again.
@@ -77,7 +78,7 @@ class TrackerConfig:
     strategy: str = "drs"
     cycles: int = 1
     noise_decay: float = 1.0
-    prior: float = 0.0
+    terms: tuple[TermSettings, ...] = ()
     average: int = 1
     explore: float = 0.0
     torso_beside_arms: bool = True
@@ -98,7 +99,6 @@ class TrackerConfig:
             )
         _check("cycles", self.cycles, 1, 100)
         _check("noise_decay", self.noise_decay, 0.0, 1.0)
-        _check("prior", self.prior, 0.0, 1.0)
         if self.parallel_from is not None:
             _check("parallel_from", self.parallel_from, 0, 1_000_000)
         _check("average", self.average, 1, min(self.torso.particles, self.arm.particles))
@@ -129,7 +129,7 @@ def default_preset() -> TrackerConfig:
     return TrackerConfig(
         cycles=2,
         noise_decay=0.5,
-        prior=0.012,
+        terms=(RestPrior(0.012),),
         average=20,
         explore=0.2,
         recover=True,

@@ -36,7 +36,7 @@ from cardbox_tracker.body.sizes import (
     FloatArray,
 )
 from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.initialization.references import (
     Silhouette,
     check_references,
@@ -181,12 +181,12 @@ class _Search:
             camera_pitch_rad=config.camera_pitch_rad,
             side_turn=config.side_turn,
         )
-        self._costs = {}
+        self._camera = camera
+        self._seen = {}
         self._asked = {}
         self._postures = {}
         for name, silhouette in references.items():
-            self._costs[name] = CompiledCost(self._start, camera)
-            self._costs[name].observe(silhouette)
+            self._seen[name] = CompiledSilhouette(self._start, camera).look(silhouette)
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
             self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
@@ -228,12 +228,12 @@ class _Search:
         self._sizes, self._postures[name] = sizes, posture
 
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
-        cost = self._costs[name]
-        weight_px = self._config.prior * cost.silhouette_px
+        seen = self._seen[name]
+        weight_px = self._config.prior * seen.frame.foreground_px
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
-        rated: FloatArray = cost.bodies(sizes, postures) + weight_px * prior
+        rated: FloatArray = seen.bodies(sizes, postures) + weight_px * prior
         return rated
 
     def result(self) -> InitializationResult:
@@ -244,11 +244,11 @@ class _Search:
             hip_height_m=round(float(start.placement.hip_height_m), 4),
             lateral_m=round(float(self._postures["front"][0]), 4),
         )
-        iou = {}
-        for name, cost in self._costs.items():
-            fitted = CompiledCost(body, cost.camera)
-            fitted.observe(self._references[name])
-            iou[name] = fitted.overlap(self._postures[name])[1]
+        fitted = CompiledSilhouette(body, self._camera)
+        iou = {
+            name: fitted.look(silhouette).overlap(self._postures[name])[1]
+            for name, silhouette in self._references.items()
+        }
         return InitializationResult(body, iou, self._rounds, self._history)
 
 
