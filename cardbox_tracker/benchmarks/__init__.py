@@ -1,1 +1,1 @@
-"""How fast it is: the core, its stages, the nodes over DDS, MediaPipe beside them."""
+"""The speed: the core, its steps, the nodes over DDS, and MediaPipe for comparison."""

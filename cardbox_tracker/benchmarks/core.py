@@ -1,7 +1,7 @@
-"""How long the estimation takes: whole frames, their stages, and ratios taken in the same run.
+"""How long the estimation takes: per image, per step, and ratios measured in one run.
 
-All of it runs in one process that is pinned to one core, but for what says otherwise. Whatever is
-compared takes turns, a few images each, so that a busy machine is unfair to nobody.
+Everything runs in one process on one core unless a function says otherwise. What is compared takes
+turns of a few images, so that other load on the machine affects all of it.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def frame_times_ms(
 ) -> dict[str, Times]:
     """Let each of ``trackers`` do all images, in turns; milliseconds of each image, (n,).
 
-    The first images of a turn find the caches full of what others left there, as in no live
-    node; they count like all others, but for those before anything was compiled or allocated.
+    In the first images of a turn the caches hold the data of the others, which does not happen in a
+    live node; these images count too. Only those of the warm-up are left out.
     """
     times: dict[str, list[float]] = {name: [] for name in trackers}
     count = len(scene.silhouettes)
@@ -98,7 +98,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
 def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
     """Measure a frame, image to posture with the default preset, a 30th of a second apart.
 
-    So it is in a live node: while it waits, the processor slows down and its caches are given away.
+    As in a live node: while it waits, the processor slows down and its caches lose its data.
     """
     extractor = extractor_of(scene)
     tracker = Tracker(scene.body, scene.camera, one_core(default_preset()))
@@ -118,7 +118,7 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
 def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
     """Compare both arms at the same time with one after the other, on two cores.
 
-    For few particles, and for so many that it pays.
+    With few particles, and with many, where it saves time.
     """
     result: dict[str, Any] = {}
     with pinned(2) as cores:
@@ -137,9 +137,9 @@ def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
 
 
 def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:
-    """Return how many times longer the box model takes than the cardbox, by equal compiled tools.
+    """Return how many times as long the box model takes as the cardbox, both compiled.
 
-    The corners are made beforehand: what counts is drawing 42 planes against 15.
+    Corners are computed beforehand: only drawing 42 planes and 15 planes is compared.
     """
     rng = np.random.default_rng(0)
     front = reference_posture("front")
@@ -162,7 +162,7 @@ def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30
 
 
 def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, float]]:
-    """Measure a whole frame at several resolutions, by turns; all with as many images."""
+    """Measure a whole frame at several resolutions, in turns, with the same number of images."""
     trackers = {f"{s.camera.width}x{s.camera.height}": follow(s, paper_preset()) for s in scenes}
     times = frame_times_ms(scenes[0], trackers)
     return {name: summary(values) for name, values in times.items()}
@@ -191,7 +191,7 @@ def measure_particles(
 
 
 def particles_at_30hz(particles: dict[str, dict[str, float]]) -> int:
-    """Return how many particles two cores do in a thirtieth of a second, between those measured."""
+    """Return how many particles two cores manage in 1/30 s, interpolated between those measured."""
     counts = np.array([float(count) for count in particles])
     times = np.array([entry["cores_2_ms"] for entry in particles.values()])
     times = np.maximum.accumulate(times)

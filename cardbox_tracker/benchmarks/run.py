@@ -1,4 +1,4 @@
-"""``cardbox benchmark``: how fast it is on this machine, as a JSON file and a readable report."""
+"""``cardbox benchmark``: the speed of this machine, as a JSON file and a report."""
 
 from __future__ import annotations
 

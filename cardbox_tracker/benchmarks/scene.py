@@ -1,4 +1,4 @@
-"""What the benchmarks run on: a synthetic person who waves, at any resolution."""
+"""The input of the benchmarks: a synthetic person who waves, at any resolution."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BenchmarkScene:
 
     Attributes:
         body: the person.
-        camera: who sees them.
+        camera: the camera they stand in front of.
         empty: the scene without them, (m, H, W), brightness.
         images: with them, (n, H, W), brightness.
         silhouettes: exact, (n, H, W), 0 or 255.

@@ -6,15 +6,15 @@ with s = 1 on the left and -1 on the right,
     R_upper_arm = R_torso Rz(-s y) Rx(s p) Rz(s r),    R_forearm = R_upper_arm Ry(-e)
 
 so p says how far the arm is raised, y to which side (0: outwards, 90 degrees: forwards), r turns
-the upper arm about itself and e bends the elbow. Where the arm hangs (p = 0), y means nothing, and
-where it is straight (e = 0), r means nothing. Both happen at rest. And each direction is reached
-twice: (y, p) and (y + 180 degrees, -p), likewise (r, e). So an arm that swings through rest would
-jump by half a turn if the positive values were always taken. :class:`Rep155Joints` remembers the
-last angles and takes the nearer pair; what means nothing stays as it was.
+the upper arm about its own axis and e bends the elbow. If the arm hangs (p = 0), y is undefined; if
+it is straight (e = 0), r is undefined; at rest both are. Also, two pairs of angles describe each
+direction: (y, p) and (y + 180 degrees, -p), likewise (r, e). If the positive values were always
+taken, the joints would jump by half a turn when an arm swings through rest. :class:`Rep155Joints`
+therefore remembers the last angles and takes the nearer pair; an undefined angle keeps its value.
 
-The joint ``waist`` is ours (``torso_pitch``). The reference model has no other joint of the spine;
-``body``, ``y_waist`` and ``r_waist`` are added for the place, the turn and the bend aside, so that
-``body`` is the middle of the hips below the sensor's frame. The head does not move on our torso.
+The joint ``waist`` is our ``torso_pitch``. The reference model has no other joint of the spine;
+``body``, ``y_waist`` and ``r_waist`` are added for the position, the turn and the sideways bend, so
+that ``body`` is the middle of the hips, in the sensor's frame. The head does not move on the torso.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LOWEST_RAISE_RAD = -np.pi / 3
 LOWEST_BEND_RAD = -np.pi / 6
 """The same of the elbow, which REP-155 bends in one direction only."""
 
-# Nearer to the singular direction, the other angle stays: less than a millimetre of an arm.
+# Nearer to the singular direction the other angle is kept: less than a millimetre of an arm.
 _MEANINGLESS_RAD = 1e-3
 
 
@@ -82,7 +82,7 @@ def _angles(
 ) -> tuple[float, float]:
     """Return turn and tilt with (sine, cosine) = sin(tilt) (sin, cos)(turn) and up = cos(tilt).
 
-    Of both solutions the one nearer to the last, if its tilt is not below ``lowest``.
+    Of the two solutions it is the one nearer to the last, if its tilt is not below ``lowest``.
     """
     tilt = float(np.arctan2(np.hypot(sine, cosine), up))
     sign = 1.0 if last_tilt >= 0 else -1.0
@@ -95,6 +95,6 @@ def _angles(
 
 
 def _near(angle: float, last: float) -> float:
-    """``angle``, whole turns added, so that it is nearest to ``last``; stays within two turns."""
+    """``angle`` plus the whole turns that bring it nearest to ``last``; stays within two turns."""
     near = last + np.remainder(angle - last + np.pi, 2 * np.pi) - np.pi
     return float(near if abs(near) <= 2 * np.pi else np.remainder(near + np.pi, 2 * np.pi) - np.pi)

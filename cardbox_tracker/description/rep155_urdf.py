@@ -6,8 +6,8 @@
     l_elbow_ID -(fixed)-> l_wrist_ID, and the same with r_
 
 Every link and joint but the sensor's frame ends in ``_ID``. As in the reference model, ``torso`` is
-at the height of the shoulders, ``l_shoulder`` is the upper arm and ``l_elbow`` the forearm. What
-the reference model calls wrist is the end of the fist here, where the outline ends.
+at the height of the shoulders, ``l_shoulder`` is the upper arm and ``l_elbow`` the forearm. The
+wrist of the reference model is the end of the fist here, where the outline ends.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str) -> str:
 
     Args:
         body: the measured person.
-        body_id: what every name of the person ends in, letters, digits and underscores.
+        body_id: ending of all link and joint names; letters, digits and underscores.
         optical_frame: frame of the camera, the root of the tree.
     """
     robot = add_robot(f"human_{body_id}")

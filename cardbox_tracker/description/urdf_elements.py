@@ -1,4 +1,4 @@
-"""The elements of a URDF: links, boxes to look at, joints."""
+"""The elements of a URDF: links, visible boxes, joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Vector = Sequence[float]
 
 COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
 """Colour of each material."""
-# URDF demands both; the values say nothing of a person and are only formal.
+# URDF requires both; the values do not describe a person.
 _FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
 
 

@@ -1,4 +1,4 @@
-"""Draw what a person shall do, to be read from two metres away: an outline and large text."""
+"""Draw instructions that can be read from two metres away: an outline and large text."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cardbox_tracker.vision.camera import Camera
 WANTED_BGR = (0, 220, 255)
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-# As fractions of the image: a person two metres away reads it, and it leaves the head free.
+# Fractions of the image: readable from two metres away, without covering the head.
 _LINE_HEIGHT = 0.075
 _NUMBER_HEIGHT = 0.22
 _WIDTH = 0.95
@@ -40,7 +40,7 @@ def draw_guidance(
 
     Args:
         image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        body: somebody of about the person's size, at their distance.
+        body: a body of about the person's size, at their distance.
         camera: working camera.
         posture: the wanted posture (12,).
         words: written along the top, in two lines.
@@ -54,7 +54,7 @@ def draw_guidance(
     view = camera.scaled(*canvas.shape[1::-1])
     patches = cardbox_patches(body, posture)
     width = max(2, round(canvas.shape[1] / 160))
-    # A dark rim keeps the line visible before a white silhouette.
+    # A dark rim keeps the line visible on a white silhouette.
     draw_outline(canvas, view, patches, (0, 0, 0), width + 2)
     draw_outline(canvas, view, patches, WANTED_BGR, width)
     end = _draw_words(canvas, words)
@@ -80,7 +80,7 @@ def _draw_words(canvas: ImageArray, words: str) -> int:
 
 
 def _draw_number(canvas: ImageArray, text: str, top: int) -> None:
-    """Write at the left edge, below ``top``: beside the head of somebody in the middle."""
+    """Write at the left edge, below ``top``: beside the head of a person in the middle."""
     height, width = canvas.shape[:2]
     size = _size_of_height(_NUMBER_HEIGHT * height)
     thickness = _thickness(size)
@@ -101,7 +101,7 @@ def _size_of_height(height_px: float) -> float:
 
 
 def _size_of_width(text: str, width_px: int) -> float:
-    # Bold letters are wider than thin ones, so they are measured as they are drawn, roughly.
+    # Bold letters are wider than thin ones, so their width is taken at the thickness drawn.
     size = _size_of_height(_LINE_HEIGHT * width_px * 0.75)
     drawn_px = cv2.getTextSize(text, _FONT, size, _thickness(size))[0][0]
     return size * _WIDTH * width_px / max(drawn_px, 1)

@@ -23,10 +23,10 @@ _TRIANGLES = (0, 1, 2, 0, 2, 3)
 
 
 class MarkerShapes(NamedTuple):
-    """Two triangles a patch, and a line a bone.
+    """Two triangles per patch, and one line per bone.
 
     Attributes:
-        triangles_m: (90, 3), three corners a triangle, metres in the optical frame.
+        triangles_m: (90, 3), three corners per triangle, metres in the optical frame.
         colors: colour of each corner, 90 of them.
         bones_m: (16, 3), both ends of each bone.
     """

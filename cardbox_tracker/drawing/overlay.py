@@ -89,7 +89,7 @@ def draw_model(canvas: ImageArray, body: BodyModel, camera: Camera, posture: Flo
     Tinted patches by side, the outline of them all, and the skeleton.
     """
     tint = canvas.copy()
-    # The torso first: an arm before it stays visible.
+    # The torso first, so that an arm in front of it stays visible.
     parts = sorted(
         _polygons(camera, cardbox_patches(body, posture)), key=lambda part: part[0] in _PART_BGR
     )
@@ -150,7 +150,7 @@ def draw_text(
     (width, height), below = cv2.getTextSize(text, font, size, thickness)
     margin = round(8 * scale)
     left, bottom = margin, margin + height + line * (height + below + margin)
-    # On a dark ground the text stays readable before any wall.
+    # On a dark background the text is readable in front of any wall.
     corner = (left + width + margin // 2, bottom + below)
     cv2.rectangle(
         canvas, (left - margin // 2, bottom - height - margin // 2), corner, (0, 0, 0), -1
@@ -173,7 +173,7 @@ def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
     model = np.zeros((fine.height, fine.width), np.uint8)
     for _, polygon in _polygons(fine, patches):
         cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
-    # A patch seen edge-on is a whisker, which tells nothing of where the part ends.
+    # A patch seen edge-on is a thin line that does not show where the part ends.
     whisker = max(3, fine.width // 128)
     opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
     found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)

@@ -1,4 +1,4 @@
-"""Write a video file, whole or not at all."""
+"""Write a video file, completely or not at all."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How good it is: metrics, the paper's experiments, benchmarks, plots, reports."""
+"""How accurate the tracker is: error measures, ground truth, the paper's experiments."""

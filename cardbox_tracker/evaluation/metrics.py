@@ -1,8 +1,8 @@
 """Error measures, by their standard names.
 
 ``MPJPE`` is the mean distance between estimated and true joints. ``PA-MPJPE`` is the same after the
-best similarity transform (Procrustes): what is left of the error when place, size and heading of
-the person do not count. Everything takes leading dimensions, such as runs and images.
+best similarity transform (Procrustes): the error that is left without position, size and heading of
+the person. All functions take leading dimensions, such as runs and images.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class TrueFrame:
     Attributes:
         segment: what the person does.
         keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
-        posture: d1..d12 (12,), where the person is a model of ours.
+        posture: d1..d12 (12,), where the person has our model's joints.
         torso_rad: roll, pitch and yaw of the torso (3,), where they are known.
     """
 

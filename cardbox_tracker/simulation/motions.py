@@ -23,7 +23,7 @@ _ENTER_FROM_M = 1.6
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of the timeline; ``pose`` takes seconds from its start, None is the empty scene."""
+    """Part of the timeline; ``pose`` takes seconds from its start, None is the empty scene."""
 
     name: str
     start_s: float
@@ -46,7 +46,7 @@ def _envelope(t: float, duration_s: float, ramp_s: float) -> float:
 
 
 def _ramp(angle_rad: float) -> float:
-    """max(0, angle) without its kink, where an arm's speed would jump; 0 at 0."""
+    """max(0, angle), rounded at 0 so that an arm's speed does not jump."""
     rounding_rad = np.radians(5.0)
     return float((angle_rad + np.hypot(angle_rad, rounding_rad) - rounding_rad) / 2.0)
 
@@ -66,7 +66,7 @@ def wave(t: float) -> FloatArray:
 
 
 def bend(t: float) -> FloatArray:
-    """Bend aside to both sides, twice, for ``BEND_S`` seconds."""
+    """Bend sideways to both sides, twice, for ``BEND_S`` seconds."""
     posture = reference_posture("front")
     roll = np.radians(22.0) * np.sin(2.0 * np.pi * 2.0 * t / BEND_S) * _envelope(t, BEND_S, 1.0)
     posture[1] = roll

@@ -1,8 +1,8 @@
 """A person with volume: rounded parts around the skeleton, no cardbox.
 
-Each part is a stack of elliptical rings; what lies between two neighbouring rings is their convex
-hull. The rings follow the sizes of a :class:`BodyModel` loosely, as flesh does: limbs taper, the
-torso narrows at waist and shoulders, there are a neck, fists and legs. So the cardbox never matches
+Each part is a stack of elliptical rings; between two neighbouring rings it is their convex hull.
+The rings follow the sizes of a :class:`BodyModel` roughly: limbs taper, the torso narrows at waist
+and shoulders, and there are a neck, fists and legs. The cardbox model therefore never matches
 perfectly, while the skeleton is known exactly.
 """
 
@@ -124,7 +124,7 @@ def _head(body: BodyModel, frames: BodyFrames) -> Part:
 
 
 def _legs(body: BodyModel, frames: BodyFrames) -> list[Part]:
-    """Two legs that stand straight below the hips and only turn with them."""
+    """Two straight legs below the hips, which only turn with the hips."""
     aside = body.size("waist_width") / 4
     radius = 0.98 * aside
     length = 1.6 * (body.size("waist_height") + body.size("torso_height"))
@@ -148,7 +148,7 @@ def _tube(
     radius_m: float,
     brightness: int,
 ) -> Part:
-    """Round part from ``start`` to ``end``; ``profile`` has (place along it, factor on radius)."""
+    """Round part from ``start`` to ``end``; ``profile`` has (fraction of length, radius factor)."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     z = axis / length

@@ -1,4 +1,4 @@
-"""Images of a synthetic person before a wall, as a camera with noise would take them."""
+"""Images of a synthetic person in front of a wall, with the noise of a camera."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Scene:
         texture: standard deviation of the wall's blotches, grey levels.
         noise: standard deviation of the sensor's noise, grey levels.
         flicker: standard deviation of the whole scene's brightness, as a fraction.
-        shadow: how much darker the wall is in the middle of the person's soft shadow, a fraction.
+        shadow: how much darker the wall is in the middle of the person's soft shadow, fraction.
     """
 
     wall: float = 180.0
@@ -71,7 +71,7 @@ class Renderer:
         return np.clip(np.rint(clean * gain + noise), 0, 255).astype(np.uint8), mask
 
     def _shade(self, cover: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Where the wall lies in the person's shadow, (H, W) in [0, 1]: light from above left."""
+        """Depth of the person's shadow on the wall, (H, W) in [0, 1]: light from above left."""
         height, width = cover.shape
         move = np.array([(1.0, 0.0, 0.05 * width), (0.0, 1.0, 0.04 * height)])
         cast = cv2.warpAffine(cover, move, (width, height))
@@ -86,7 +86,7 @@ class Renderer:
         )
         shade = np.zeros((camera.height, camera.width), np.uint8)
         cover = np.zeros_like(shade)
-        # The farthest first, so that a near arm covers the torso and the torso a far arm.
+        # From far to near, so that a near arm covers the torso, and the torso a far arm.
         parts = sorted(person_parts(body, posture), key=lambda part: part.rings[..., 0].mean())
         for part in parts:
             points = camera.reference_to_optical(part.rings)
@@ -95,7 +95,7 @@ class Renderer:
             pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
             for i, pair in enumerate(pairwise(pixels)):
                 hull = cv2.convexHull(np.concatenate(pair))
-                # A little light from above, so that a part is no flat patch.
+                # Slightly brighter towards the top, so that a part is not one flat grey.
                 level = part.brightness + 6 * (i % 3)
                 cv2.fillConvexPoly(shade, hull, level, cv2.LINE_8, _SHIFT)
                 cv2.fillConvexPoly(cover, hull, 255, cv2.LINE_8, _SHIFT)

@@ -115,7 +115,7 @@ def synthesize_session(
             if segment.pose is None:
                 image, mask = renderer.image()
             else:
-                # Nobody stands quite still: a slow random walk that is pulled back.
+                # People sway a little: a slow random walk that is pulled back to its centre.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
                 posture[0] += body.placement.lateral_m + sway

@@ -23,8 +23,8 @@ class Claim:
 
     Attributes:
         text: what is claimed.
-        holds: whether it is so in every case that was tried.
-        evidence: the numbers, and the cases where it is not so.
+        holds: whether it is true in every case that was tried.
+        evidence: the numbers, and the cases where it is not true.
         why: an explanation, shown where it does not hold; may be empty.
     """
 
@@ -36,10 +36,10 @@ class Claim:
 
 _AMBIGUOUS = (
     "An outline hardly shows depth: a torso that leans towards the camera, with its yaw and the "
-    "arms adjusted, covers nearly the same pixels as one that does not. DRS finds such an "
-    "explanation of lower cost, settles in it and stays, in one run in this and in another in "
-    "that; so its cost is lower while the torso and the arms that hang on it may be farther off, "
-    "or scatter more from run to run. SRS selects too weakly to settle in any."
+    "arms adjusted, covers nearly the same pixels as one that does not. DRS settles in one such "
+    "posture of low cost, in each run possibly in another. Its cost is therefore lower, while the "
+    "torso and the arms attached to it may be farther off, or vary more from run to run. SRS "
+    "selects too weakly to settle in any."
 )
 
 
@@ -85,8 +85,8 @@ def _cost_of_each_image(results: Mapping[str, Any], curves: Curves) -> Claim:
         "DRS has the lower mean cost in each single image.",
         min(shares.values()) == 1.0,
         "; ".join(f"{m} in {100 * share:.1f} % of the images" for m, share in shares.items()),
-        "The others are images in which both are near the start or at rest, or in which a share "
-        "of the DRS runs has lost an arm.",
+        "The others are images in which both are near the start or at rest, or in which some of "
+        "the DRS runs have lost an arm.",
     )
 
 
@@ -108,7 +108,7 @@ def _of_all_and_each(
     scale: float,
     unit: str,
 ) -> list[Claim]:
-    """One claim on the mean over the motions, as in the paper's sequence of them; one on each."""
+    """Two claims: on the mean over all motions, as in the paper, and on each motion by itself."""
     motions = motions_in(results)
     values = {
         m: [[scale * results[m][s][figure][n] for n in names] for s in ("drs", "srs")]
@@ -153,7 +153,7 @@ def _similar_means(results: Mapping[str, Any], curves: Curves) -> Claim:
         f"The mean of an elbow angle (here {ELBOW}) is similar with both, within 10 degrees.",
         max(gaps.values()) < 10.0,
         "; ".join(f"{m} {gap:.1f} degrees apart" for m, gap in gaps.items()),
-        "In part of the runs a forearm is lost and turns to the other side, which moves the mean; "
+        "In some of the runs a forearm is lost and turns to the other side, which moves the mean; "
         "the figure of experiment 3 shows with which strategy.",
     )
 
@@ -168,7 +168,8 @@ def _hands_are_worst(results: Mapping[str, Any]) -> Claim:
     same = "not quite" if "session" in results else "exactly"
     return Claim(
         "Hands are tracked worse than elbows and shoulders (DRS). The paper blames the different "
-        f"hands of the two body models; here model and truth mean {same} the same point.",
+        f"hands of the two body models; here the hands of model and truth are {same} the same "
+        "point.",
         all(hand > max(shoulder, elbow) for shoulder, elbow, hand in rows.values()),
         "shoulder, elbow, hand: "
         + "; ".join(f"{m} {s:.1f}, {e:.1f}, {h:.1f} cm" for m, (s, e, h) in rows.items()),
@@ -184,13 +185,13 @@ def _bowing(results: Mapping[str, Any]) -> Claim:
     gap = errors["bow"] - errors[worst]
     depth = 100 * results["bow"]["drs"]["axis_error_m"]["depth"]
     return Claim(
-        "Motion towards the camera (bow forward) is tracked as well as motion aside, that is, no "
-        "worse than the other motions by two standard errors.",
+        "Motion towards the camera (bow forward) is tracked as well as sideways motion, that is, "
+        "not worse than the other motions by two standard errors.",
         gap <= 2 * float(np.hypot(margins["bow"], margins[worst])),
         "DRS, all six joints: "
         + "; ".join(f"{m} {errors[m]:.1f} ± {margins[m]:.1f} cm" for m in motions)
         + f"; of the bow's error, {depth:.1f} cm are depth",
-        "A bow changes the outline little, and leaning back looks alike.",
+        "A bow changes the outline little, and leaning back changes it in the same way.",
     )
 
 
@@ -218,12 +219,12 @@ def _compromise(
             f"{_words(speed)}: least {_number(values[best], unit)} at e = {best:g}; {ends}"
         )
     return Claim(
-        f"The survival rate is a compromise: both extremes are worse {where} than a rate between.",
+        f"The survival rate is a compromise: both extremes are worse {where} than a middle rate.",
         not missing,
         ". ".join(texts) + (f". Not clearly worse: {', '.join(missing)}" if missing else ""),
         "With 200 particles and the noise of Table I one cycle reaches about as far as these "
-        "motions go between two images, so it costs little to search around the best alone; and "
-        "the 3D error is mostly depth, which an outline hardly shows whatever the rate.",
+        "motions go between two images, so searching around the best particle alone loses "
+        "little; and the 3D error is mostly depth, which an outline hardly shows at any rate.",
     )
 
 
@@ -263,8 +264,8 @@ def _real_time(timing: Mapping[str, Any]) -> Claim:
     return Claim(
         f"600 particles are tracked in real time at {_FRAME_RATE_OF_PAPER:g} images a second.",
         frame_ms < 1000.0 / _FRAME_RATE_OF_PAPER,
-        f"{frame_ms:.1f} ms an image from silhouette to posture on one core, while the other "
-        "cores were at the same work",
+        f"{frame_ms:.1f} ms per image from silhouette to posture on one core, while the other "
+        "cores did the same work",
     )
 
 

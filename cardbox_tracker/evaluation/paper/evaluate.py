@@ -1,4 +1,4 @@
-"""``cardbox evaluate``: the paper's experiments, from nothing to the report."""
+"""``cardbox evaluate``: the paper's experiments, from the recordings to the report."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """How well the initialization measures people (experiment 8).
 
-Two questions are asked apart: how far the 18 sizes of many random people are off, each measured
-once, and how much the sizes of one person scatter when only the seed of the search differs. The
-references are drawn without sensor noise, but nobody holds them to the degree: the angles miss by
-a few degrees.
+Two things are measured separately: the errors of the 18 sizes of many random people, each measured
+once, and the spread of the sizes of one person when only the seed of the search differs. The
+references are drawn without sensor noise, but with angles that are a few degrees off, as those of
+real people are.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The cardbox against the volumetric model (experiment 6): equal tools, different planes.
+"""The cardbox against the volumetric model (experiment 6): the same code draws either.
 
 :class:`PlaneSilhouette` draws any set of planes with OpenCV and counts the pixels of the XOR, so
-the two models differ in nothing but the planes they are made of. Both take the same 18 sizes; the
-boxes span the very sizes of the patches.
+the two models differ only in their planes. Both take the same 18 sizes; the boxes are as large as
+the patches.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def microseconds_a_particle(
 ) -> dict[str, float]:
     """Measure how long the full cost of one posture takes with each model, microseconds.
 
-    The models take turns, so that a busy machine is unfair to none of them; the median counts.
+    The models take turns, so that other load on the machine affects both; medians are compared.
     """
     rng = np.random.default_rng(0)
     front = reference_posture("front")

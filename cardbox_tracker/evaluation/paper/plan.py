@@ -1,4 +1,4 @@
-"""How large an evaluation is: numbers of runs, and the values that are swept."""
+"""The size of an evaluation: numbers of runs, and the values that are tried."""
 
 from __future__ import annotations
 

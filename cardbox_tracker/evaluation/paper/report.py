@@ -55,9 +55,9 @@ def _head(results: Mapping[str, Any]) -> list[str]:
             "",
             f"Each strategy tracked its {session['images']} images {results['runs']} times "
             "with the parameters of the paper's Table I, with background and body learned from "
-            f"the session's own first seconds (IoU of the references: {fits}). The truth is that "
-            "of the recording: its joints are those of a realistic body, not of our model, so "
-            "shoulders and hands do not mean quite the same points.",
+            f"the session's own first seconds (IoU of the references: {fits}). The true joints are "
+            "those of a realistically shaped body and not of our model, so shoulders and hands are "
+            "not exactly the same points.",
             "",
         ]
     plan = results["plan"]
@@ -71,14 +71,15 @@ def _head(results: Mapping[str, Any]) -> list[str]:
         "# Evaluation: the paper's experiments on synthetic sessions",
         "",
         f"{results['runs']} runs of each strategy on each motion (experiments 1 to 3) with the "
-        "parameters of the paper's Table I, preset `paper`. The person is synthetic, rounded and "
-        "not made of patches, so the model never fits perfectly; images have noise, the "
-        "silhouettes come out of the background model and the body out of the initialization, as "
-        "in use; the truth is exact. The side experiments take fewer runs: "
+        "parameters of the paper's Table I, preset `paper`. The person is synthetic, with rounded "
+        "parts instead of patches, so the model never fits perfectly, and its true posture is "
+        "known exactly. Images have noise; as in real use, the silhouettes come from the "
+        "background model and the sizes from the initialization. The side experiments have fewer "
+        "runs: "
         f"{plan['side_runs']} (survival rate, schemes), {plan['particle_runs']} (particles), "
         f"{plan['model_runs']} (volumetric model).{quick}",
         "",
-        "The tracker's verdict `lost` is switched off here, since it would leave out the "
+        "The state `lost` is switched off here, since it would leave out the "
         "images in which a strategy does worst. All errors are means over runs and images; "
         "± is one standard error over the runs.",
         "",
@@ -108,8 +109,8 @@ def _main(results: Mapping[str, Any]) -> Iterator[str]:
         ([m, s.upper(), *(_cm(c["error_m"][n]) for n in KEYPOINT_NAMES)] for m, s, c in cells),
     )
     yield from (
-        "MPJPE is the mean of the six; PA-MPJPE is what is left of it after the best move, turn "
-        "and scale; then the error along each axis of the camera, cm:",
+        "MPJPE is the mean of the six; PA-MPJPE is the error left after the best translation, "
+        "rotation and scale; then the error along each axis of the camera, cm:",
         "",
     )
     yield from _table(
@@ -223,7 +224,7 @@ def _models(results: Mapping[str, Any], timing: Mapping[str, Any]) -> Iterator[s
         "Both are drawn by the same code (OpenCV) from the same sizes, DRS, Table I; each part of "
         "the volumetric model is a box that spans the patches of the cardbox. Every face of a box "
         "is drawn: leaving out those turned away would halve their number. The sizes were found "
-        "with the cardbox, which is in its favour in the errors.",
+        "with the cardbox model, which favours it in the errors.",
         "",
     )
     yield from _table(
@@ -281,8 +282,8 @@ def _initialization(results: Mapping[str, Any], timing: Mapping[str, Any]) -> It
         ),
     )
     yield from (
-        "The synthetic person is rounded, so a size of ours that is a plain edge, such as the "
-        "depth of the head, is not the same thing in the image: part of the bias is that.",
+        "The synthetic person is rounded, so the straight edges of our patches, such as the depth "
+        "of the head, have no exact counterpart in the image. This is part of the bias.",
         "",
         "![initialization](initialization.png)",
         "",
@@ -291,7 +292,7 @@ def _initialization(results: Mapping[str, Any], timing: Mapping[str, Any]) -> It
 
 def _schemes(results: Mapping[str, Any], variants: Mapping[str, Any]) -> Iterator[str]:
     yield from (
-        "## 9. Standard resampling schemes, and where this package stands today",
+        "## 9. Standard resampling schemes, and the presets",
         "",
         "Everything else as in Table I. The elite is the best particle, kept unchanged. MPJPE in "
         "cm, cost in px, standard deviation over the runs in rad (mean of the 11 angles); means "
@@ -309,14 +310,14 @@ def _schemes(results: Mapping[str, Any], variants: Mapping[str, Any]) -> Iterato
     yield from (
         "All but DRS draw from weights exp(-W^2 / (2 sigma_gamma^2)), with Table I's sigma_gamma "
         "of 8000 and 4000 pixels. That is several times the cost itself, so the weights are "
-        "nearly flat: resampling hardly selects, whichever scheme draws, and without the elite "
-        "particle there is little that holds the estimate to the image. DRS selects by rank, "
-        "which no width of weights can flatten.",
+        "nearly equal: resampling hardly selects, whatever the scheme, and without the elite "
+        "particle little keeps the estimate close to the image. DRS selects by rank, so the width of "
+        "the weights does not matter.",
         "",
         "![schemes](schemes.png)",
         "",
         "Beyond the paper: `torso_rated_alone` is Table I without drawing the arms of the last "
-        "estimate beside the torso; `default` is the preset that `cardbox track` takes.",
+        "estimate together with the torso; `default` is the default preset of `cardbox track`.",
         "",
     )
     yield from _table(

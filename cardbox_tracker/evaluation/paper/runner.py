@@ -2,8 +2,8 @@
 
 A task is a function and its arguments; its result is a dictionary of arrays. Each finished result
 is a file in the folder ``parts`` of the output, written atomically, under a name that depends on
-the function, its arguments and the sources it depends on. The same task is therefore done once,
-however often the evaluation is interrupted, and never taken from another version of the program.
+the function, its arguments and the sources it depends on. A task is therefore done once, however
+often the evaluation is interrupted, and results of another version are never reused.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class Task:
         name: for the file's name; letters, digits, dots and dashes.
         function: of a module, so that another process finds it; takes the folder of the parts and
             the arguments, returns arrays.
-        arguments: frozen dataclasses, numbers, strings and tuples: their ``repr`` tells all.
-        effort: how long it takes, in any unit, for the progress bar.
+        arguments: frozen dataclasses, numbers, strings and tuples, whose ``repr`` is complete.
+        effort: expected time in any unit, for the progress bar.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Parts:
                 f"cannot make the folder {folder}: {error.strerror}; "
                 "give --output a folder that can be written"
             ) from None
-        # Tell at once, and not after the first result, that nothing can be written.
+        # Say at once, and not after the first result, that nothing can be written.
         with atomic_path(folder / "writable"):
             pass
         (folder / "writable").unlink(missing_ok=True)
@@ -124,7 +124,7 @@ class Parts:
         todo = {
             path: task for task in tasks if not self.is_done(task) for path in [self.path(task)]
         }
-        # The longest first, so that no core is left alone with one in the end.
+        # The longest first, so that no core is still busy with one when the others are done.
         order = sorted(todo.items(), key=lambda item: -item[1].effort)
         total = sum(task.effort for task in todo.values()) or 1.0
         finished = 0.0
@@ -168,9 +168,9 @@ def _perform(path: Path, task: Task) -> None:
 
 @contextmanager
 def _ignored_interrupts() -> Iterator[None]:
-    """Processes started meanwhile never see Ctrl-C: what a child is at, it finishes.
+    """Processes started in this context ignore Ctrl-C and finish their task.
 
-    The parent alone reacts to it, when it does again.
+    Only the parent reacts to Ctrl-C, after the context.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -203,7 +203,7 @@ def result_sources(root: Path) -> list[Path]:
     """Return the source files below ``root`` that results depend on.
 
     Raises:
-        FileNotFoundError: one of the places has no source file; it was moved.
+        FileNotFoundError: a listed folder or file does not exist; it was moved.
     """
     found = []
     for place in _SOURCES:

@@ -1,4 +1,4 @@
-"""What is tracked: the silhouettes of a session, cut out once, with the truth of each image.
+"""The input of the experiments: silhouettes of a session, with the truth of each image.
 
 A session is a recording with ``ground_truth.json``, synthetic or real. Background and sizes of the
 person are learned from its own segments ``empty``, ``front``, ``side`` and ``arms``; tracking
@@ -36,7 +36,7 @@ SEQUENCE_LENGTH = 7
 """So many images of each motion are kept for the image sequences."""
 
 _NOT_MOTIONS = ("empty", "enter", "front", "side", "arms", "transition", "neutral")
-# Nobody takes a posture, or leaves the image, to the frame.
+# People do not take a posture, or leave the view, exactly at the end of a segment.
 _MARGIN_S = 0.2
 
 
@@ -135,7 +135,7 @@ def recorded_session(
     size: tuple[int, int] = (320, 240),
     progress: Callable[[float], None] | None = None,
 ) -> Session:
-    """Read a session: learn background and person, cut out every silhouette.
+    """Read a session: learn background and person, segment every silhouette.
 
     Args:
         folder: holds ``ground_truth.json`` and the recording, or the recording in ``bag``.

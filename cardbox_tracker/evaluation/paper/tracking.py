@@ -1,7 +1,7 @@
-"""Track a session many times over, and say how well that went (experiments 1 to 3).
+"""Track a session many times, and summarize the errors (experiments 1 to 3).
 
-Every run starts anew with a generator seeded by (seed, number of the run). The tracker's verdict
-``lost`` is switched off: it would leave out just those images in which a strategy did worst.
+Every run starts anew with a generator seeded by (seed, number of the run). The state ``lost`` is
+switched off: it would leave out the very images in which a strategy is worst.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Runs:
 
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` such that no image is left out, and one run stays in one thread."""
+    """Return ``config`` changed so that no image is left out and a run stays in one thread."""
     return replace(config, lost_iou=0.0, parallel_from=None)
 
 
@@ -181,7 +181,7 @@ def summarize(motion: MotionRuns) -> dict[str, Any]:
 
 
 def brief(motion: MotionRuns) -> dict[str, float]:
-    """Return the few figures by which settings are compared with each other."""
+    """Return the figures by which settings are compared."""
     errors_m = distances_m(motion.runs.keypoints_m, motion.keypoints_m)
     return {
         "mean_cost_px": float(motion.runs.costs_px.mean()),
@@ -197,7 +197,7 @@ def mean_brief(figures: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the means over motions of what :func:`brief` gives for each."""
     means = {name: float(np.mean([f[name] for f in figures])) for name in figures[0]}
     for name in ("stderr_mpjpe_m", "stderr_cost_px"):
-        # The motions are tracked apart from each other, so their errors are independent.
+        # The motions are tracked separately, so their errors are independent.
         squares = np.sum([f[name] ** 2 for f in figures])
         means[name] = float(np.sqrt(squares) / len(figures))
     return means

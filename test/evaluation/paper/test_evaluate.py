@@ -198,10 +198,10 @@ def test_quick_is_smaller_than_full_in_everything() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--runs", "1"], "expected a whole number from 2 on"),
-        (["--runs", "many"], "expected a whole number from 2 on"),
-        (["--jobs", "0"], "expected a whole number from 1 on"),
-        (["--seed", "-1"], "expected a whole number from 0 on"),
+        (["--runs", "1"], "expected a whole number of 2 or more"),
+        (["--runs", "many"], "expected a whole number of 2 or more"),
+        (["--jobs", "0"], "expected a whole number of 1 or more"),
+        (["--seed", "-1"], "expected a whole number of 0 or more"),
     ],
 )
 def test_bad_numbers_are_told(
