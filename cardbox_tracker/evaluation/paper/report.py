@@ -311,8 +311,8 @@ def _schemes(results: Mapping[str, Any], variants: Mapping[str, Any]) -> Iterato
         "All but DRS draw from weights exp(-W^2 / (2 sigma_gamma^2)), with Table I's sigma_gamma "
         "of 8000 and 4000 pixels. That is several times the cost itself, so the weights are "
         "nearly equal: resampling hardly selects, whatever the scheme, and without the elite "
-        "particle little keeps the estimate close to the image. DRS selects by rank, so the width of "
-        "the weights does not matter.",
+        "particle little keeps the estimate close to the image. DRS selects by rank, so the width "
+        "of the weights does not matter.",
         "",
         "![schemes](schemes.png)",
         "",
