@@ -61,6 +61,10 @@ _ALONG_BONES = np.array(
 )
 # Which angles a person misses when asked for a reference posture, and by how much.
 _LOOSE_ANGLE_RAD = np.radians(5.0)
+# How far the place of a reference posture is searched from one round to the next.
+_PLACE_NOISE_M = 0.02
+# The noise of the sizes after a round that found nothing better, as a fraction of that before.
+_SHRINK = 0.7
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ class _Search:
         size_mask[SUBSETS[subset]] = 1.0
         loose = _loose_joints(name)
         posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
-        posture_noise[0] = 0.02
+        posture_noise[0] = _PLACE_NOISE_M
         sizes, posture = self._sizes, self._postures[name]
         best = float(self._rate(name, sizes[None], posture[None])[0])
         scale = 1.0
@@ -220,7 +224,7 @@ class _Search:
             if costs[winner] < best:
                 best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
             else:
-                scale *= 0.7
+                scale *= _SHRINK
             history.append(best)
             if scale * config.sigma_alpha_m < config.accuracy_m:
                 break
