@@ -11,6 +11,12 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    place_of,
+    shape_of,
+    view_of,
+)
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import (
     CostArray,
     Silhouette,
@@ -31,7 +37,9 @@ class CompiledCost:
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
         self.silhouette_px = 0
-        self._sizes, self._place, self._view = _constants(body, camera)
+        self._parts, self._shoulder = shape_of(body.sizes)
+        self._place = place_of(body)
+        self._view = view_of(camera)
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
         sums = np.int16 if camera.width < 2**15 else np.int32
         self._table = np.zeros((self.rows, camera.width + 1), sums)
@@ -56,14 +64,14 @@ class CompiledCost:
         self.fix_torso(np.zeros(4))
         self.arm("left", np.zeros((1, 4)))
         self.full(np.zeros((1, 12)))
-        self.bodies(self._sizes[None], np.zeros((1, 12)))
+        self.bodies(self.body.sizes[None], np.zeros((1, 12)))
 
     def observe(self, silhouette: Silhouette) -> None:
         """See :class:`SilhouetteCost`."""
         check_silhouette(silhouette, self.camera)
         seen = np.ascontiguousarray(silhouette[: self.rows])
         words = seen.view(np.uint64) if seen.shape[1] % 8 == 0 else _NO_WORDS
-        self.silhouette_px = int(kernels.running_sums(seen, words, self._table))
+        self.silhouette_px = int(fill_row_sums(seen, words, self._table))
         self.fix_arms(None)
 
     def torso(self, torso_postures: FloatArray) -> CostArray:
@@ -72,7 +80,7 @@ class CompiledCost:
         costs = np.empty(len(postures), np.int64)
         kernels.trunk_costs(
             postures,
-            self._sizes,
+            self._parts,
             self._place,
             self._view,
             self._torso_table,
@@ -89,7 +97,8 @@ class CompiledCost:
             self._torso_base += int(
                 kernels.cover_arms(
                     np.array(posture, dtype=np.float64),
-                    self._sizes,
+                    self._parts,
+                    self._shoulder,
                     self._place,
                     self._view,
                     self._table,
@@ -102,7 +111,12 @@ class CompiledCost:
         self._torso = np.array(torso_posture, dtype=np.float64)
         self._base = self.silhouette_px + int(
             kernels.cover_trunk(
-                self._torso, self._sizes, self._place, self._view, self._table, self._covered
+                self._torso,
+                self._parts,
+                self._place,
+                self._view,
+                self._table,
+                self._covered,
             )
         )
 
@@ -114,7 +128,8 @@ class CompiledCost:
             postures,
             _SIDE_SIGN[side],
             self._torso,
-            self._sizes,
+            self._parts,
+            self._shoulder,
             self._place,
             self._view,
             self._covered,
@@ -139,9 +154,9 @@ class CompiledCost:
         """Costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12), in one place."""
         costs = np.empty(len(sizes), np.int64)
         kernels.body_costs(
-            np.ascontiguousarray(sizes, dtype=np.float64),
-            self._place,
             np.ascontiguousarray(postures, dtype=np.float64),
+            *shape_of(np.asarray(sizes, dtype=np.float64)),
+            self._place,
             self._view,
             self._table,
             self.silhouette_px,
@@ -167,7 +182,8 @@ class CompiledCost:
         areas = np.empty(len(contiguous), np.int64)
         kernels.full_costs(
             contiguous,
-            self._sizes,
+            self._parts,
+            self._shoulder,
             self._place,
             self._view,
             self._table,
@@ -183,7 +199,7 @@ class CompiledKeypoints:
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
-        self._constants = _constants(body, camera)
+        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
         self(np.zeros(12))
 
     def __call__(self, posture: FloatArray) -> FloatArray:
@@ -191,11 +207,3 @@ class CompiledKeypoints:
         points = np.empty((6, 3))
         kernels.keypoints(np.array(posture, dtype=np.float64), *self._constants, points)
         return points
-
-
-def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Sizes, place and view as the kernels take them."""
-    pitch = camera.pitch_rad
-    view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
-    place = (body.distance_m, body.hip_height_m)
-    return np.array(body.sizes), np.array(place), np.array(view)
