@@ -41,7 +41,7 @@ from cardbox_tracker.estimation.cost.silhouette import (
     rows_above_hips,
 )
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M
+from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near, in_front
 
 FloatArray = NDArray[np.float64]
 
@@ -135,9 +135,13 @@ class PlaneCost:
         return cost, (union - cost) / union if union else 0.0
 
     def _project(self, postures: FloatArray) -> NDArray[np.int32]:
-        """Corners (N, planes, 4, 2) in pixels with ``_SHIFT`` fractional bits."""
+        """Outlines (N, planes, n, 2) in pixels with ``_SHIFT`` fractional bits.
+
+        n is 4 unless the near plane cuts any of them.
+        """
         optical = self.camera.reference_to_optical(self._planes.corners_m(self.body, postures))
-        optical[..., 2] = np.maximum(optical[..., 2], NEAR_PLANE_M)
+        if not in_front(optical).all():
+            optical = _cut(optical)
         pixels = np.clip(self.camera.project(optical), -30_000, 30_000)
         return np.asarray(np.round(pixels * (1 << _SHIFT)), dtype=np.int32)
 
@@ -149,6 +153,22 @@ class PlaneCost:
             cv2.bitwise_xor(self._model, self._silhouette, dst=self._differing)
             costs[i] = cv2.countNonZero(self._differing)
         return costs
+
+
+def _cut(corners_m: FloatArray) -> FloatArray:
+    """Cut planes (N, planes, 4, 3) at the near plane: (N, planes, 6, 3), the last corner repeated.
+
+    Of what is behind it all corners lie far aside, outside of any image.
+    """
+    cut = np.empty((*corners_m.shape[:-2], 6, 3))
+    for index in np.ndindex(corners_m.shape[:-2]):
+        polygon = clip_near(corners_m[index])
+        if len(polygon) < 3:
+            cut[index] = (1e3, 1e3, NEAR_PLANE_M)
+        else:
+            cut[index][: len(polygon)] = polygon
+            cut[index][len(polygon) :] = polygon[-1]
+    return cut
 
 
 def _fill(mask: NDArray[np.uint8], polygons: NDArray[np.int32]) -> None:
