@@ -73,17 +73,11 @@ class BackgroundModel:
 class BackgroundLearner:
     """Averages images of the empty scene, one at a time (Welford's algorithm)."""
 
-    def __init__(self, config: BackgroundConfig | None = None) -> None:
+    def __init__(self) -> None:
         """Start with nothing learned."""
-        self.config = config or BackgroundConfig()
         self.count = 0
         self._mean: FloatImage | None = None
         self._squares: FloatImage | None = None
-
-    @property
-    def is_ready(self) -> bool:
-        """True once ``config.learn_images`` images were added."""
-        return self.count >= self.config.learn_images
 
     def add(self, brightness: NDArray[np.uint8] | FloatImage) -> None:
         """Learn from one image (H, W).
