@@ -19,6 +19,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("vision", "description"),
     ("estimation",),
     ("drawing",),
+    ("outputs",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),

@@ -15,6 +15,7 @@ from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
+from cardbox_tracker.outputs import FIGURES
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.node_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
@@ -152,8 +153,7 @@ class TrackerNode(CardboxNode):
         values |= {f"images {state}": str(count) for state, count in self._counts.items()}
         estimate = self._estimate
         if estimate is not None and estimate.posture is not None:
-            values["cost (px)"] = f"{estimate.cost_px}"
-            values["iou"] = f"{estimate.iou:.3f}"
+            values |= {figure.label: figure.text(estimate) for figure in FIGURES}
             if estimate.posture_stddev is not None:
                 angles = estimate.posture_stddev[1:]
                 values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
