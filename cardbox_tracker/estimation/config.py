@@ -67,7 +67,7 @@ class TrackerConfig:
             to cover the upper arms.
         parallel_from: arms of so many particles or more are estimated at the same time, in two
             threads; with fewer, waking the other thread costs more than it saves. None: never.
-        recover: search anew when the person was lost, or came back into the image.
+        relocalize: search anew when the person was lost, or came back into the image.
         lost_iou: an IoU below this counts as lost.
         lost_frames: after so many lost frames in a row the state is ``lost``.
     """
@@ -82,7 +82,7 @@ class TrackerConfig:
     explore: float = 0.0
     torso_beside_arms: bool = True
     parallel_from: int | None = 500
-    recover: bool = False
+    relocalize: bool = False
     lost_iou: float = 0.4
     lost_frames: int = 5
 
@@ -132,7 +132,7 @@ def default_preset() -> TrackerConfig:
         prior=0.012,
         average=20,
         explore=0.2,
-        recover=True,
+        relocalize=True,
     )
 
 

@@ -99,7 +99,7 @@ class Tracker:
         """
         self._cost.observe(silhouette)
         if self._cost.silhouette_px < self._min_person_px:
-            if self.config.recover and self._started:
+            if self.config.relocalize and self._started:
                 # Whoever comes back may stand elsewhere: begin again when somebody is there.
                 self._started = False
             return Estimate(NO_PERSON)
@@ -107,7 +107,7 @@ class Tracker:
         cost_px, iou = self._cost.overlap(posture)
         self._poor_frames = self._poor_frames + 1 if iou < self.config.lost_iou else 0
         if self._poor_frames >= self.config.lost_frames:
-            if self.config.recover:
+            if self.config.relocalize:
                 self._started = False
             return Estimate(LOST)
         return Estimate(
@@ -129,10 +129,10 @@ class Tracker:
         """Scatter around the front reference where the person stands, then settle."""
         self._started = True
         reference = self._reference.copy()
-        if self.config.recover:
+        if self.config.relocalize:
             reference[0] = self._lateral_m(silhouette)
         posture = self._filter.scatter(clip_to_limits(reference))
-        if self.config.recover:
+        if self.config.relocalize:
             for cycle in range(_RECOVERY_CYCLES):
                 posture = self._filter.cycle(_RECOVERY_NOISE * self.config.noise_decay**cycle)
         return posture

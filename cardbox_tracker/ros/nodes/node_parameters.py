@@ -234,7 +234,7 @@ class TrackerParameters(NodeParameters):
             strategy=base.strategy if self.strategy == "preset" else self.strategy,
             cycles=self.cycles or base.cycles,
             average=self.average or base.average,
-            recover=base.recover if self.recover == "preset" else self.recover == "always",
+            relocalize=base.relocalize if self.recover == "preset" else self.recover == "always",
             lost_iou=self.lost_iou,
             lost_frames=self.lost_frames,
         )

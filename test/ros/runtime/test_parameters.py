@@ -207,7 +207,7 @@ def test_tracker_settings_override_the_preset() -> None:
         recover="always",
     ).config()
     assert isinstance(config, TrackerConfig)
-    assert config.strategy == "srs" and config.recover
+    assert config.strategy == "srs" and config.relocalize
     assert config.torso.particles == config.arm.particles == 50
     assert config.arm.survival_rate == 0.3
     assert config.torso.survival_rate == TrackerConfig().torso.survival_rate
