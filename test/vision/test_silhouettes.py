@@ -94,10 +94,12 @@ def test_settings_changed_while_learning_hold_afterwards() -> None:
     made = pipeline()
     made.learn(level(96))
     made.learn(level(104))
-    made.config = BackgroundConfig(learn_images=2, clean_up=False, threshold=1e-3, min_stddev=0.0)
+    made.config = BackgroundConfig(learn_images=2, clean_up=False, threshold=0.5)
     assert made.has_enough
     made.finish_learning()
-    assert made.silhouette(level(101)).all()
+    # Mean 100, standard deviation sqrt(32): foreground from 2.83 grey levels on.
+    assert not made.silhouette(level(102)).any()
+    assert made.silhouette(level(103)).all()
 
 
 def test_relearning_forgets() -> None:

@@ -22,9 +22,9 @@ from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 # The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
 _LOSS_TO_WARN = 0.1
-# Above the noise of the median (below 1), below what automatic exposure does (20 and more).
+# Well above the noise of a median over the image.
 _DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# A person who can be measured covers at most a third of the image.
+# More of the image than a person who is wholly in view covers.
 _COVERAGE_TO_WARN = 0.6
 
 

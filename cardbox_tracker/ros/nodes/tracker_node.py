@@ -17,8 +17,8 @@ from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
 from cardbox_tracker.outputs import FIGURES
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.node_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
