@@ -18,6 +18,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledCost, CompiledKeypoints
 from cardbox_tracker.estimation.cost.silhouette import Silhouette, SilhouetteCost
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
+from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -90,6 +91,19 @@ class Tracker:
         )
         self._started = False
         self._poor_frames = 0
+
+    def configure(self, config: TrackerConfig) -> bool:
+        """Use other settings from the next silhouette on.
+
+        Returns:
+            True if they need other particles, so that tracking starts again as after
+            :meth:`reset`.
+        """
+        is_new_start = restarts(self.config, config)
+        self.config = config
+        if is_new_start:
+            self.reset()
+        return is_new_start
 
     def track(self, silhouette: Silhouette) -> Estimate:
         """Estimate the posture behind ``silhouette`` (H, W), 0 or 255.

@@ -36,21 +36,21 @@ class StreamStatistics:
         """Start with nothing received."""
         self.received = 0
         self.dropped = 0
-        self.went_back = 0
+        self.out_of_order = 0
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
         # The same in order: with every image the period is asked for.
         self._ordered_ns: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
-        """Count a message of that stamp; return False if its stamp went back or stayed."""
+        """Count a message of that stamp; return False if it is not later than the one before."""
         self.received += 1
         last_ns, self._last_ns = self._last_ns, stamp_ns
         if last_ns is None:
             return True
         spacing_ns = stamp_ns - last_ns
         if spacing_ns <= 0:
-            self.went_back += 1
+            self.out_of_order += 1
             self._spacings_ns.clear()
             self._ordered_ns.clear()
             return False
@@ -171,7 +171,7 @@ class NodeDiagnostics:
             "published": str(published),
             "dropped (by stamps)": str(self.input.dropped),
             "late": str(self._late),
-            "stamps that went back": str(self.input.went_back),
+            "out of order (by stamps)": str(self.input.out_of_order),
         }
         if self._latencies_ms:
             values["latency p95 (ms)"] = f"{np.percentile(self._latencies_ms, 95):.2f}"

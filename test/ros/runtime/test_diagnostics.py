@@ -57,7 +57,7 @@ def test_the_period_is_that_of_the_latest_stamps() -> None:
 def test_stamps_that_go_back_are_noticed() -> None:
     statistics = fed(list(range(20)))
     assert not statistics.add(0)
-    assert statistics.went_back == 1
+    assert statistics.out_of_order == 1
     assert statistics.add(PERIOD_NS)
 
 
