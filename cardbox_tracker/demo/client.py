@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
@@ -20,6 +21,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.outputs import OUTPUTS, posture_from
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.messages import results
+from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 
@@ -36,6 +38,7 @@ class Client:
 
     Attributes:
         body_model: YAML text of the measured person, once it was published.
+        initialization_iou: mean fit of the references, once it was published.
         postures: joint positions (12,) by stamp, ns.
         keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
         silhouettes: (H, W) by stamp, ns.
@@ -45,6 +48,7 @@ class Client:
     def __init__(self, nodes: Nodes, bag: BagWriter) -> None:
         """Subscribe to everything the nodes publish."""
         self.body_model = ""
+        self.initialization_iou: float | None = None
         self.postures: dict[int, NDArray[np.float64]] = {}
         self.keypoints_m: dict[int, NDArray[np.float64]] = {}
         self.silhouettes: dict[int, NDArray[np.uint8]] = {}
@@ -62,6 +66,9 @@ class Client:
                 kind, topic, self._recorder(topic, kind), profile, raw=True
             )
         self._node.create_subscription(String, "play_bag/status", self._note_status, qos.LATCHED)
+        self._node.create_subscription(
+            DiagnosticStatus, "initializer/result", self._note_result, qos.LATCHED
+        )
 
     def _recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
         name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
@@ -91,6 +98,11 @@ class Client:
 
     def _note_status(self, message: String) -> None:
         self._player_status = message.data
+
+    def _note_result(self, message: DiagnosticStatus) -> None:
+        # Where it failed, the service's answer says why.
+        if message.level == DiagnosticStatus.OK:
+            self.initialization_iou = mean_iou_of(message)
 
     def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
         """Serve topics until ``condition`` holds.

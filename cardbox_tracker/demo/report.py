@@ -38,7 +38,6 @@ def write_report(
     tracked = [stamp for stamp in expected if stamp in result.postures]
     estimates = rate(result, camera, tracked)
     error = tracking_error({s: result.keypoints_m[s] for s in tracked}, result.truth)
-    fits = initialization_fit(result.answer)
     report: dict[str, object] = {
         "preset": preset,
         "seed": seed,
@@ -53,7 +52,7 @@ def write_report(
         "mean_cost_px": float(np.mean([estimate.cost_px for estimate in estimates.values()])),
         "mean_iou": float(np.mean([estimate.iou for estimate in estimates.values()])),
         "fps": result.fps,
-        "initialization_iou": fits,
+        "initialization_iou": result.initialization_iou,
     }
     with atomic_path(output / "report.json") as path:
         path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
@@ -77,11 +76,6 @@ def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int,
             TRACKING, posture=result.postures[stamp], cost_px=cost_px, iou=iou
         )
     return estimates
-
-
-def initialization_fit(answer: str) -> float:
-    """Mean IoU out of the initializer's answer ("... mean 0.87; ...")."""
-    return float(answer.split("mean ")[1].split(";")[0])
 
 
 def plot_joint_states(result: DemoResult, stamps: list[int], path: Path) -> None:

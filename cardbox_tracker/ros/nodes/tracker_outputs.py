@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from sensor_msgs.msg import Image, JointState
-from std_msgs.msg import Header, String
+from std_msgs.msg import Bool, Header, String
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.drawing.overlay import draw_message, draw_overlay
-from cardbox_tracker.estimation.initialization.guidance import step_of
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.outputs import OUTPUTS, JointValues, Output, OutputStream
 from cardbox_tracker.ros.messages import conversions, results
@@ -34,10 +33,10 @@ class TrackerOutputs:
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._human = Rep155Outputs(node, rep155_id) if rep155_id else None
         self._guided = False
-        node.subscribe(String, "initializer/status", self._on_status, qos.LATCHED)
+        node.subscribe(Bool, "initializer/guiding", self._on_guiding, qos.LATCHED)
 
-    def _on_status(self, message: String, _: int) -> None:
-        self._guided = step_of(message.data) is not None
+    def _on_guiding(self, message: Bool, _: int) -> None:
+        self._guided = message.data
 
     def publish(
         self,
