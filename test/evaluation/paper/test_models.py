@@ -33,14 +33,14 @@ def test_the_paper_counts_fewer_planes_for_the_cardbox() -> None:
 
 def test_planes_that_reach_behind_the_camera_are_cut_as_the_reference_cuts_them() -> None:
     # Half a metre before the camera: an arm points past it, or the trunk is bent past it.
-    body, camera = BodyModel(distance_m=0.5), Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
+    body, camera = BodyModel.of(distance_m=0.5), Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
     some = np.zeros((2, N_JOINTS))
     some[0, 3], some[0, 5] = -0.5, np.pi / 2
     some[1, 2] = 0.8
-    drawn, reference = make_cost("cardbox", body, camera), ReferenceCost(body, camera)
-    for cost in (drawn, reference):
-        cost.observe(np.zeros((120, 160), np.uint8))
-    np.testing.assert_allclose(drawn.full(some), reference.full(some), rtol=0.05)
+    nobody = np.zeros((120, 160), np.uint8)
+    drawn = make_silhouette_term("cardbox", body, camera).look(nobody).postures(some)
+    reference = ReferenceSilhouette(body, camera).look(nobody).postures(some)
+    np.testing.assert_allclose(drawn, reference, rtol=0.05)
 
 
 @pytest.mark.parametrize("name", MODELS)
