@@ -16,11 +16,12 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # From the bottom to the top: a module imports from its own folder and from the layers before.
 # Folders named together do not import each other.
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "files", "progress"),
+    ("errors", "files", "progress", "settings"),
     ("body",),
     ("vision", "description"),
     ("estimation",),
     ("drawing",),
+    ("outputs",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),

@@ -31,7 +31,7 @@ def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
         "--preset",
         choices=PRESETS,
         default=default,
-        help="tracker settings: the paper's Table I, or those that track best",
+        help="tracker settings: paper is Table I of the paper, default tracks best",
     )
 
 

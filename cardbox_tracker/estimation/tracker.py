@@ -18,9 +18,16 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Image, Silhouette, SumOfTerms, TermObservation
+from cardbox_tracker.estimation.cost.terms import (
+    Image,
+    Silhouette,
+    SumOfTerms,
+    Term,
+    TermObservation,
+)
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
 from cardbox_tracker.estimation.filtering.pose_filter import PoseFilter
+from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -85,7 +92,7 @@ class Tracker:
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._silhouette = silhouette or CompiledSilhouette(body, self.camera)
-        self._terms = [settings.build(body, self.camera) for settings in self.config.terms]
+        self._terms = self._built(self.config)
         self._make_filter = make_filter
         self._keypoints = CompiledKeypoints(body, self.camera)
         self._reference = reference_posture("front")
@@ -94,12 +101,30 @@ class Tracker:
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self.reset()
 
+    def _built(self, config: TrackerConfig) -> list[Term]:
+        return [settings.build(self.body, self.camera) for settings in config.terms]
+
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
         image_px = self.camera.width * self.camera.height
         self._filter = self._make_filter(self.config, image_px, self._rng.spawn(1)[0])
         self._started = False
         self._poor_frames = 0
+
+    def configure(self, config: TrackerConfig) -> bool:
+        """Use other settings from the next silhouette on.
+
+        Returns:
+            True if they need other particles, so that tracking starts again as after
+            :meth:`reset`.
+        """
+        is_new_start = restarts(self.config, config)
+        if config.terms != self.config.terms:
+            self._terms = self._built(config)
+        self.config = config
+        if is_new_start:
+            self.reset()
+        return is_new_start
 
     def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
         """Estimate the posture behind a silhouette.
@@ -113,7 +138,7 @@ class Tracker:
         """
         frame = self._silhouette.frame(silhouette, image)
         if frame.foreground_px < self._min_person_px:
-            if self.config.recover and self._started:
+            if self.config.relocalize and self._started:
                 # The person may come back elsewhere: search anew as soon as there is one.
                 self._started = False
             return Estimate(NO_PERSON)
@@ -127,7 +152,7 @@ class Tracker:
         cost_px, iou = seen.overlap(posture)
         self._poor_frames = self._poor_frames + 1 if iou < self.config.lost_iou else 0
         if self._poor_frames >= self.config.lost_frames:
-            if self.config.recover:
+            if self.config.relocalize:
                 self._started = False
             return Estimate(LOST)
         return Estimate(
@@ -144,10 +169,10 @@ class Tracker:
         """Start around the front reference where the person stands, then settle."""
         self._started = True
         reference = self._reference.copy()
-        if self.config.recover:
+        if self.config.relocalize:
             reference[0] = self._lateral_m(silhouette)
         self._filter.initialize(observation, clip_to_limits(reference))
-        if self.config.recover:
+        if self.config.relocalize:
             for cycle in range(_RECOVERY_CYCLES):
                 noise_scale = _RECOVERY_NOISE * self.config.noise_decay**cycle
                 self._filter.iterate(observation, noise_scale)

@@ -26,14 +26,14 @@ def test_the_paper_preset_is_table_one() -> None:
     assert config.strategy == "drs"
     # One cycle a frame whose best particle is the result, and nothing else.
     assert (config.cycles, config.average, config.terms, config.explore) == (1, 1, (), 0.0)
-    assert not config.recover
+    assert not config.relocalize
 
 
 def test_the_default_preset_has_the_filters_of_table_one() -> None:
     default, paper = default_preset(), paper_preset()
     assert (default.torso, default.arm) == (paper.torso, paper.arm)
     assert default.cycles > 1
-    assert default.recover
+    assert default.relocalize
 
 
 def test_presets_by_name() -> None:

@@ -341,3 +341,27 @@ def test_the_tracker_works_with_any_filter() -> None:
 def test_an_image_of_another_size_is_refused() -> None:
     with pytest.raises(ValueError, match=r"image has shape \(60, 80, 3\); the camera's is"):
         make().track(seen(front()), np.zeros((60, 80, 3), np.uint8))
+
+
+def test_settings_without_other_particles_hold_from_the_next_silhouette_on() -> None:
+    changed, unchanged = make(), make()
+    images = waving(6)
+    for image in images[:3]:
+        changed.track(image), unchanged.track(image)
+    assert not changed.configure(replace(changed.config, lost_iou=0.5, lost_frames=3))
+    for image in images[3:5]:
+        first, second = changed.track(image), unchanged.track(image)
+        assert first.posture is not None and second.posture is not None
+        assert first.posture.tobytes() == second.posture.tobytes()
+    assert not changed.configure(replace(changed.config, lost_iou=1.0, lost_frames=1))
+    assert changed.track(images[5]).state == LOST
+
+
+@pytest.mark.parametrize("change", [{"strategy": "srs"}, {"average": 3}, {"torso": FilterConfig()}])
+def test_settings_with_other_particles_start_again(change: dict[str, Any]) -> None:
+    tracker = make()
+    tracker.track(seen(front()))
+    config = replace(tracker.config, **change)
+    assert tracker.configure(config)
+    assert tracker.config == config
+    assert tracker.track(seen(front())).state == TRACKING

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
+from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
 from cardbox_tracker.vision.camera import Camera
@@ -31,7 +34,7 @@ class CompiledSilhouette(SilhouetteTerm):
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernels if they are not yet."""
         super().__init__(body, camera)
-        self._constants = _constants(body, camera)
+        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
         self._sums = np.int16 if camera.width < 2**15 else np.int32
         self.warm_up()
@@ -53,7 +56,7 @@ class CompiledSilhouette(SilhouetteTerm):
         upper = np.ascontiguousarray(frame.silhouette[: self.rows])
         words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
         row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
-        kernels.running_sums(upper, words, row_sums)
+        fill_row_sums(upper, words, row_sums)
         return CompiledObservation(frame, row_sums, *self._constants)
 
     def look(self, silhouette: Silhouette) -> CompiledObservation:
@@ -68,16 +71,18 @@ class CompiledObservation(SilhouetteObservation):
     Attributes:
         frame: the frame.
         row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
-        sizes: the body's sizes, (18,), metres.
-        place: distance and height of the hips, (2,), metres.
-        view: focal lengths, principal point, cosine and sine of the pitch, (6,).
+        parts: lengths of the body's parts, (6, 6), metres (``kernel_arguments``).
+        shoulder: where the shoulder joints are in the torso's frame, (2,), metres.
+        place: where the hips are.
+        view: the camera.
     """
 
     frame: Frame
     row_sums: NDArray[Any]
-    sizes: FloatArray
-    place: FloatArray
-    view: FloatArray
+    parts: FloatArray
+    shoulder: FloatArray
+    place: PlaceTuple
+    view: ViewTuple
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """See :class:`SilhouetteObservation`."""
@@ -87,7 +92,13 @@ class CompiledObservation(SilhouetteObservation):
             posture = np.array(arms, dtype=np.float64)
             base += int(
                 kernels.cover_arms(
-                    posture, self.sizes, self.place, self.view, self.row_sums, row_sums
+                    posture,
+                    self.parts,
+                    self.shoulder,
+                    self.place,
+                    self.view,
+                    self.row_sums,
+                    row_sums,
                 )
             )
 
@@ -95,7 +106,7 @@ class CompiledObservation(SilhouetteObservation):
             particles = np.ascontiguousarray(torsos, dtype=np.float64)
             counts = np.empty(len(particles), np.int64)
             kernels.trunk_costs(
-                particles, self.sizes, self.place, self.view, row_sums, base, counts
+                particles, self.parts, self.place, self.view, row_sums, base, counts
             )
             return counts.astype(np.float64)
 
@@ -106,7 +117,7 @@ class CompiledObservation(SilhouetteObservation):
         pose = np.array(torso, dtype=np.float64)
         covered = np.empty_like(self.row_sums)
         base = self.frame.foreground_px + int(
-            kernels.cover_trunk(pose, self.sizes, self.place, self.view, self.row_sums, covered)
+            kernels.cover_trunk(pose, self.parts, self.place, self.view, self.row_sums, covered)
         )
 
         def costs(side: str, arms: FloatArray) -> FloatArray:
@@ -116,7 +127,8 @@ class CompiledObservation(SilhouetteObservation):
                 particles,
                 _SIDE_SIGN[side],
                 pose,
-                self.sizes,
+                self.parts,
+                self.shoulder,
                 self.place,
                 self.view,
                 covered,
@@ -144,9 +156,9 @@ class CompiledObservation(SilhouetteObservation):
         """Return costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12)."""
         costs = np.empty(len(sizes), np.int64)
         kernels.body_costs(
-            np.ascontiguousarray(sizes, dtype=np.float64),
-            self.place,
             np.ascontiguousarray(postures, dtype=np.float64),
+            *shape_of(np.asarray(sizes, dtype=np.float64)),
+            self.place,
             self.view,
             self.row_sums,
             self.frame.foreground_px,
@@ -172,7 +184,8 @@ class CompiledObservation(SilhouetteObservation):
         areas = np.empty(len(contiguous), np.int64)
         kernels.full_costs(
             contiguous,
-            self.sizes,
+            self.parts,
+            self.shoulder,
             self.place,
             self.view,
             self.row_sums,
@@ -188,7 +201,7 @@ class CompiledKeypoints:
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
-        self._constants = _constants(body, camera)
+        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
         self(np.zeros(12))
 
     def __call__(self, posture: FloatArray) -> FloatArray:
@@ -196,11 +209,3 @@ class CompiledKeypoints:
         points = np.empty((6, 3))
         kernels.keypoints(np.array(posture, dtype=np.float64), *self._constants, points)
         return points
-
-
-def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Sizes, place and view as the kernels take them."""
-    pitch = camera.pitch_rad
-    view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
-    place = (body.placement.distance_m, body.placement.hip_height_m)
-    return np.array(body.sizes), np.array(place), np.array(view)

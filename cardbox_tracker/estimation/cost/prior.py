@@ -18,6 +18,7 @@ from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.prior_kernels import squared_distances
 from cardbox_tracker.estimation.cost.terms import ARMS, ArmCosts, Frame, TorsoCosts
+from cardbox_tracker.settings import check, setting
 from cardbox_tracker.vision.camera import Camera
 
 _FLEXION_UNIT, _ABDUCTION_UNIT = 1 / 6, 1.0
@@ -47,14 +48,14 @@ _BELOW_REST, _ABOVE_REST = _units()
 
 @dataclass(frozen=True)
 class RestPrior:
-    """Settings of the rest prior, and the term itself.
+    """Settings of the rest prior, and the term itself."""
 
-    Attributes:
-        weight: cost of an angle that is one unit from rest, as a fraction of the silhouette's
-            foreground pixels.
-    """
-
-    weight: float = 0.012
+    weight: float = setting(
+        0.012,
+        "cost of an angle that is one unit from rest, as a fraction of the silhouette's "
+        "foreground pixels",
+        limits=(0.0, 1.0),
+    )
 
     def __post_init__(self) -> None:
         """Check the range.
@@ -62,8 +63,7 @@ class RestPrior:
         Raises:
             ValueError: ``weight`` is out of range.
         """
-        if not 0.0 <= self.weight <= 1.0:
-            raise ValueError(f"prior weight is {self.weight:g}; expected 0 to 1")
+        check(self)
 
     def build(self, body: BodyModel, camera: Camera) -> RestPrior:
         """Return the term; it is the same for any body and camera."""

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import in_front
 
 _LOWEST_M, _HIGHEST_M = -2.5, 1.5
 _SPECK_PX = 2
@@ -32,9 +34,9 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
     view = camera.with_pitch(body.camera_pose.pitch_rad)
     heights_m = np.linspace(_LOWEST_M, _HIGHEST_M, 200)
     tops = np.repeat(forward_kinematics(body, np.zeros(12)).head[None], len(heights_m), axis=0)
-    tops[:, 2] += body.size("head_height") / 2 + heights_m - body.placement.hip_height_m
+    tops[:, 2] += body_parts(body.sizes).head.height_m / 2 + heights_m - body.placement.hip_height_m
     optical = view.reference_to_optical(tops)
     # Far above or below a pitched camera there is no row to compare.
-    seen = optical[:, 2] > 0.1
+    seen = in_front(optical)
     off_px = np.abs(view.project(optical[seen])[:, 1] - rows[0])
     return body.with_values(hip_height_m=float(heights_m[seen][np.argmin(off_px)]))

@@ -36,7 +36,7 @@ from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ARMS, ArmCosts, Frame, Silhouette, TorsoCosts
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M
+from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near, in_front
 
 FloatArray = NDArray[np.float64]
 
@@ -136,9 +136,13 @@ class PlaneObservation(SilhouetteObservation):
         return np.zeros((self.frame.rows, self.camera.width), np.uint8)
 
     def _project(self, postures: FloatArray) -> NDArray[np.int32]:
-        """Corners (N, planes, 4, 2) in pixels with ``_SHIFT`` fractional bits."""
+        """Outlines (N, planes, n, 2) in pixels with ``_SHIFT`` fractional bits.
+
+        n is 4 unless the near plane cuts any of them.
+        """
         optical = self.camera.reference_to_optical(self.planes.corners_m(self.body, postures))
-        optical[..., 2] = np.maximum(optical[..., 2], NEAR_PLANE_M)
+        if not in_front(optical).all():
+            optical = _cut(optical)
         pixels = np.clip(self.camera.project(optical), -30_000, 30_000)
         return np.asarray(np.round(pixels * (1 << _SHIFT)), dtype=np.int32)
 
@@ -152,6 +156,22 @@ class PlaneObservation(SilhouetteObservation):
             cv2.bitwise_xor(model, seen, dst=differing)
             costs[i] = cv2.countNonZero(differing)
         return costs
+
+
+def _cut(corners_m: FloatArray) -> FloatArray:
+    """Cut planes (N, planes, 4, 3) at the near plane: (N, planes, 6, 3), the last corner repeated.
+
+    Of what is behind it all corners lie far aside, outside of any image.
+    """
+    cut = np.empty((*corners_m.shape[:-2], 6, 3))
+    for index in np.ndindex(corners_m.shape[:-2]):
+        polygon = clip_near(corners_m[index])
+        if len(polygon) < 3:
+            cut[index] = (1e3, 1e3, NEAR_PLANE_M)
+        else:
+            cut[index][: len(polygon)] = polygon
+            cut[index][len(polygon) :] = polygon[-1]
+    return cut
 
 
 def _fill(mask: NDArray[np.uint8], polygons: NDArray[np.int32]) -> None:

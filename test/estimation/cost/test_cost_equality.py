@@ -9,17 +9,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.body.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BodyParts, Part, body_parts
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
+from cardbox_tracker.estimation.cost import kernels
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
+from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import (
     ReferenceSilhouette,
     SilhouetteTerm,
     rows_above_hips,
 )
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import (
+    NEAR_PLANE_M,
+    clip_near,
+    fill_convex,
+    render,
+    snap,
+)
 
 SMALL = ((33, 57), (57, 33), (64, 48), (97, 41), (160, 120))
 LARGE = ((320, 240), (321, 241), (640, 480))
@@ -170,6 +182,52 @@ def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
     for posture in case.postures:
         expected = case.camera.reference_to_optical(keypoints_m(case.body, posture))
         np.testing.assert_allclose(compiled(posture), expected, atol=1e-12)
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES)
+def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
+    reference, compiled = case.terms()
+    parts, _ = shape_of(case.body.sizes, 0.6)
+    place, view = place_of(case.body), view_of(case.camera)
+    torsos = np.ascontiguousarray(case.postures[:, TORSO])
+    row_sums = np.zeros((compiled.rows, case.camera.width + 1), np.int32)
+    silhouette = case.silhouette[: compiled.rows]
+    silhouette_px = fill_row_sums(silhouette, np.zeros((1, 0), np.uint64), row_sums)
+    got = np.zeros(len(torsos), np.int64)
+    kernels.trunk_costs(torsos, parts, place, view, row_sums, silhouette_px, got)
+    for cost, posture in zip(got, case.postures, strict=True):
+        patches = cardbox_patches(case.body, posture, 0.6)
+        trunk = np.concatenate([patches[TORSO_PATCHES], patches[NECK_PATCHES]])
+        drawn = render(trunk, case.camera, reference.rows)
+        assert cost == np.count_nonzero(drawn ^ silhouette)
+
+
+def test_the_kernels_take_parts_and_lengths_in_their_order() -> None:
+    names = [f"_{name.removesuffix('_m').upper()}" for name in (*BodyParts._fields[:6],)]
+    assert [getattr(kernels, name) for name in names] == list(range(6))
+    names = [f"_{name.removesuffix('_m').upper()}" for name in Part._fields]
+    assert [getattr(kernels, name) for name in names] == list(range(6))
+    parts, shoulder = shape_of(DEFAULT_SIZES)
+    expected = body_parts(DEFAULT_SIZES)
+    np.testing.assert_array_equal(parts, expected[:6])
+    np.testing.assert_array_equal(shoulder, expected[6:])
+
+
+@pytest.mark.parametrize("kept", range(16))
+@pytest.mark.parametrize("beyond_m", [0.0, 1e-12, 0.05])
+def test_corners_on_the_near_plane_are_before_it(kept: int, beyond_m: float) -> None:
+    """Each set of corners exactly on the plane; the others ``beyond_m`` nearer than it."""
+    x, y = 0.03, 0.02
+    on = np.array([kept >> c & 1 for c in range(4)], bool)
+    depth = np.where(on, NEAR_PLANE_M, NEAR_PLANE_M - beyond_m)
+    corners = np.array([(-x, -y), (x, -y), (x, y), (-x, y)])
+    quad = np.column_stack([corners, depth])
+    seen = CompiledSilhouette(hand_body(), HAND_CAMERA).look(np.zeros((48, 64), np.uint8))
+    mask = np.zeros((seen.frame.rows, 64), np.uint8)
+    fill_convex(mask, snap(HAND_CAMERA.project(clip_near(quad))))
+    assert seen.polygons(quad[None, None]).tolist() == [np.count_nonzero(mask)]
+    assert mask.any() == (beyond_m == 0.0 or on.sum() > 2)
 
 
 # A body made of rectangles on whole pixels: 20 px a metre at 2 m, the torso's top at the height of

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, TORSO, clip_to_limits, reference_posture
 from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
 from cardbox_tracker.estimation.cost.terms import ARMS
@@ -15,6 +16,7 @@ from cardbox_tracker.evaluation.paper.models import (
     microseconds_a_particle,
 )
 from cardbox_tracker.evaluation.paper.sessions import Session
+from cardbox_tracker.vision.camera import Camera
 
 
 def postures(count: int) -> np.ndarray:
@@ -27,6 +29,18 @@ def test_the_paper_counts_fewer_planes_for_the_cardbox() -> None:
         "cardbox": 15,
         "volumetric": 42,
     }
+
+
+def test_planes_that_reach_behind_the_camera_are_cut_as_the_reference_cuts_them() -> None:
+    # Half a metre before the camera: an arm points past it, or the trunk is bent past it.
+    body, camera = BodyModel.of(distance_m=0.5), Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
+    some = np.zeros((2, N_JOINTS))
+    some[0, 3], some[0, 5] = -0.5, np.pi / 2
+    some[1, 2] = 0.8
+    nobody = np.zeros((120, 160), np.uint8)
+    drawn = make_silhouette_term("cardbox", body, camera).look(nobody).postures(some)
+    reference = ReferenceSilhouette(body, camera).look(nobody).postures(some)
+    np.testing.assert_allclose(drawn, reference, rtol=0.05)
 
 
 @pytest.mark.parametrize("name", MODELS)
