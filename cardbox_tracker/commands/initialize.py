@@ -74,14 +74,15 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
+    pitch_rad = math.radians(options.camera_pitch_deg)
+    # An impossible distance or pitch is refused by its own name, before anything follows from it.
+    BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
     config = InitializationConfig(
         distance_m=options.distance,
-        camera_pitch_rad=math.radians(options.camera_pitch_deg),
+        camera_pitch_rad=pitch_rad,
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    # An impossible distance or pitch is refused by its own name, before anything follows from it.
-    BodyModel.of(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
     _check_folder(options.output)
     spans = {name: getattr(options, name) for name in _REFERENCES}
     with BagReader(options.recording) as bag:

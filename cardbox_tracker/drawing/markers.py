@@ -31,8 +31,8 @@ class MarkerShape(NamedTuple):
         namespace: what it shows, ``patches`` or ``skeleton``.
         kind: ``TRIANGLE_LIST`` or ``LINE_LIST``.
         scale: of a marker: 1 for triangles, the width in metres for lines.
-        points_m: (n, 3), three corners per triangle or both ends of each line, metres in the optical
-            frame.
+        points_m: (n, 3), three corners per triangle or both ends of each line, metres in the
+            optical frame.
         rgba: colour of the whole, where ``colors`` is empty.
         colors: colour of each point, or none.
     """
