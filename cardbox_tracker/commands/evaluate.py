@@ -1,14 +1,14 @@
-"""``cardbox evaluate``: the paper's experiments."""
+"""``cardbox evaluate``: the paper's experiments, or recorded sessions with ground truth."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_seed, process_count, run_count
+from cardbox_tracker.commands.arguments import add_preset, add_seed, process_count, run_count
 
 NAME = "evaluate"
-HELP = "repeat the paper's experiments; continues where it was interrupted"
+HELP = "repeat the paper's experiments, or compare recorded sessions with their truth"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +32,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a recording with ground_truth.json instead of synthetic ones",
     )
     parser.add_argument(
+        "--sessions",
+        type=Path,
+        nargs="+",
+        default=None,
+        metavar="DIR",
+        help="recorded sessions (bag/, ground_truth.json) to initialize, track and compare instead "
+        "of the paper's experiments",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=run_count,
+        default=3,
+        metavar="N",
+        help="with --sessions: seeds, each a run of its own, from --seed on",
+    )
+    add_preset(parser, "default")
+    parser.add_argument(
         "--jobs",
         type=process_count,
         default=None,
@@ -50,6 +67,9 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.evaluation.paper.evaluate import evaluate
     from cardbox_tracker.evaluation.paper.runner import default_jobs
 
+    if options.sessions:
+        _sessions(options, options.jobs or default_jobs())
+        return
     evaluate(
         options.output,
         options.runs,
@@ -59,3 +79,13 @@ def run(options: argparse.Namespace) -> None:
         options.jobs or default_jobs(),
     )
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
+
+
+def _sessions(options: argparse.Namespace, jobs: int) -> None:
+    from cardbox_tracker.evaluation.recorded.evaluate import evaluate_sessions
+    from cardbox_tracker.progress import progress_bar
+
+    seeds = tuple(range(options.seed, options.seed + options.seeds))
+    with progress_bar("evaluate") as show:
+        evaluate_sessions(options.sessions, options.output, options.preset, seeds, jobs, show)
+    print(f"wrote {options.output}/sessions.md and {options.output}/sessions.json")

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,14 @@ class TrueFrame:
         keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
         posture: d1..d12 (12,), where the person has our model's joints.
         torso_rad: roll, pitch and yaw of the torso (3,), where they are known.
+        is_in_sight: the neck is in the image, so that the person can be tracked.
     """
 
     segment: str
     keypoints_m: FloatArray
     posture: FloatArray | None
     torso_rad: FloatArray | None
+    is_in_sight: bool = True
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,9 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
                 posture = np.array([entry["posture"][name] for name in JOINT_NAMES])
             if "torso_rpy_deg" in entry:
                 torso = np.radians(entry["torso_rpy_deg"])
-            frames[int(entry["stamp_ns"])] = TrueFrame(entry["segment"], points, posture, torso)
+            frames[int(entry["stamp_ns"])] = TrueFrame(
+                entry["segment"], points, posture, torso, _is_in_sight(entry, data["camera"])
+            )
         spans: dict[str, tuple[float, float]] = {}
         for segment in data["segments"]:
             spans.setdefault(segment["name"], (segment["start_s"], segment["end_s"]))
@@ -94,6 +99,13 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
         raise CardboxError(
             f"{path} is no ground truth: {error!r}; expected the ground_truth.json of a session"
         ) from None
+
+
+def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:
+    if "joints_px" not in entry:
+        return True
+    u, v = entry["joints_px"]["neck"]
+    return bool(0 <= u < camera["width"] and 0 <= v < camera["height"])
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ CAMERA = Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
 
 
 def test_a_patch_half_behind_the_camera_is_drawn_as_far_as_it_is_seen() -> None:
-    body = BodyModel(distance_m=0.5)
+    body = BodyModel.of(distance_m=0.5)
     posture = np.zeros(N_JOINTS)
     posture[2] = 0.8  # the trunk is bent past the camera
     drawn = np.any(draw_estimate(body, CAMERA, posture) != 255, axis=2)
