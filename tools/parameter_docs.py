@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.ros.nodes.node_parameters import NODES
-from cardbox_tracker.ros.runtime.parameters import NodeParameters, ParameterSpec
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, ParameterSpec
 
-_GENERATED = "made by 'python -m tools.parameter_docs'; edit ros/nodes/node_parameters.py"
+_GENERATED = (
+    "made by 'python -m tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"
+)
 _TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}
 
 
@@ -36,7 +38,11 @@ def default_of(kind: type[NodeParameters], name: str) -> Any:
 
 
 def _details(spec: ParameterSpec) -> str:
-    parts = [spec.unit, spec.range_text, "read-only" if spec.read_only else "live"]
+    parts = [
+        spec.unit,
+        spec.range_text,
+        "only at the start" if spec.read_only else f"live: {spec.effect}",
+    ]
     return "; ".join(part for part in parts if part)
 
 
@@ -72,9 +78,10 @@ def markdown_text() -> str:
         f"<!-- {_GENERATED} -->",
         "",
         "Set them in `config/<node>.yaml`, with `--ros-args -p name:=value`, or, where live, with",
-        "`ros2 param set`; a live change takes effect at the next image. A wrong value is",
-        "refused with the reason, and the old one stays. Every topic's QoS can be overridden at",
-        "the start with",
+        '`ros2 param set`; the column "live" says when a change takes effect, or "no" where a',
+        "parameter can only be given at the start. A wrong value is refused with the reason, and",
+        "the old one stays. A whole number is taken for a float. Every topic's QoS can be",
+        "overridden at the start with",
         "`qos_overrides.<topic>.<publisher|subscription>.<reliability|depth|history|durability>`.",
     ]
     for node, kind in NODES.items():
@@ -84,11 +91,14 @@ def markdown_text() -> str:
         types = kind.types()
         for name, spec in kind.specs().items():
             type_name = _TYPE_NAMES.get(types[name]) or types[name].__name__
-            live = "no" if spec.read_only else "yes"
+            live = "no" if spec.read_only else spec.effect
+            description = spec.description
+            if spec.was:
+                description += f" (was `{spec.was}`, which works in this version too)"
             allowed = spec.range_text.replace("|", "\\|")
             lines.append(
                 f"| `{name}` | {type_name} | `{yaml_value(default_of(kind, name))}` | {spec.unit} "
-                f"| {allowed} | {live} | {spec.description} |"
+                f"| {allowed} | {live} | {description} |"
             )
     return "\n".join(lines) + "\n"
 

@@ -82,16 +82,17 @@ class _CameraAndListener:
 
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         import rclpy
+        from diagnostic_msgs.msg import DiagnosticArray
         from sensor_msgs.msg import CameraInfo, Image, JointState
 
         from cardbox_tracker.ros.runtime import qos
-        from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+        from cardbox_tracker.ros.runtime.static_executor import make_executor
 
         self._nodes = nodes
         self._processes = processes
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_benchmark", enable_rosout=False)
-        self._executor = StaticExecutor()
+        self._executor = make_executor()
         self._executor.add_node(self._node)
         self._image = self._node.create_publisher(Image, "image_raw", qos.CAMERA)
         self._info = self._node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)
@@ -101,6 +102,13 @@ class _CameraAndListener:
             self._arrived,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
             qos.RESULT,
         )
+        self._node.create_subscription(
+            DiagnosticArray,
+            "/diagnostics",
+            self._note_nodes,  # type: ignore[arg-type]  # as above
+            qos.RESULT,
+        )
+        self._ready: set[str] = set()
         self._arrivals_ns: dict[int, tuple[int, int]] = {}
         self._listening = threading.Thread(target=partial(_listen, self._executor), daemon=True)
         self._listening.start()
@@ -111,14 +119,26 @@ class _CameraAndListener:
         now_ns = time.time_ns()
         self._arrivals_ns[stamp_ns(message.header.stamp)] = (now_ns, info["received_timestamp"])
 
+    def _note_nodes(self, message: Any, _: dict[str, Any]) -> None:
+        from cardbox_tracker.ros.runtime.diagnostics import STATUS, WAITING, WORKING
+
+        for status in message.status:
+            values = {entry.key: entry.value for entry in status.values}
+            if values.get(STATUS) in (WAITING, WORKING):
+                self._ready.add(status.name.rpartition(": ")[2])
+
     def start(self, name: str, model: Path) -> float:
-        """Start a process; return how long it took until its nodes said what they wait for, s."""
+        """Start a process; return how long it took until its nodes said that they are ready, s.
+
+        They say so once a second.
+        """
         began = time.monotonic()
         together = name in TOGETHER
         parameter = f"{'tracker:' * together}model_file:={model}"
         arguments = ("--ros-args", "-p", parameter) if together or name == "tracker" else ()
         self._nodes.start(name, *arguments)
-        while self._nodes.text(name).count("waiting for") < (len(SEPARATE) if together else 1):
+        expected = set(SEPARATE) if together else {name}
+        while not expected <= self._ready:
             time.sleep(0.01)
             self._nodes.check()
             if time.monotonic() - began > _START_S:

@@ -94,9 +94,9 @@ def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
     d = np.asarray(postures, dtype=np.float64)
     rotation = rotation_z(d[..., 3]) @ rotation_y(d[..., 2]) @ rotation_x(d[..., 1])
     hip = np.empty((*d.shape[:-1], 3))
-    hip[..., 0] = -body.distance_m
+    hip[..., 0] = -body.placement.distance_m
     hip[..., 1] = d[..., 0]
-    hip[..., 2] = body.hip_height_m
+    hip[..., 2] = body.placement.hip_height_m
 
     parts = body_parts(body.sizes)
     return BodyFrames(

@@ -8,28 +8,28 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
 
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.outputs import OUTPUTS, posture_from
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.ros.messages import results
+from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 
 _TOPICS = {
-    "body_model": (String, "std_msgs/msg/String", qos.LATCHED),
-    "robot_description": (String, "std_msgs/msg/String", qos.LATCHED),
-    "joint_states": (JointState, "sensor_msgs/msg/JointState", qos.REPLAY),
-    "keypoints": (PoseArray, "geometry_msgs/msg/PoseArray", qos.REPLAY),
-    "silhouette": (Image, "sensor_msgs/msg/Image", qos.REPLAY),
-    "markers": (MarkerArray, "visualization_msgs/msg/MarkerArray", qos.REPLAY),
+    "body_model": (String, qos.LATCHED),
+    "robot_description": (String, qos.LATCHED),
+    "silhouette": (Image, qos.REPLAY),
+    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
 }
 
 
@@ -38,6 +38,7 @@ class Client:
 
     Attributes:
         body_model: YAML text of the measured person, once it was published.
+        initialization_iou: mean fit of the references, once it was published.
         postures: joint positions (12,) by stamp, ns.
         keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
         silhouettes: (H, W) by stamp, ns.
@@ -47,6 +48,7 @@ class Client:
     def __init__(self, nodes: Nodes, bag: BagWriter) -> None:
         """Subscribe to everything the nodes publish."""
         self.body_model = ""
+        self.initialization_iou: float | None = None
         self.postures: dict[int, NDArray[np.float64]] = {}
         self.keypoints_m: dict[int, NDArray[np.float64]] = {}
         self.silhouettes: dict[int, NDArray[np.uint8]] = {}
@@ -59,13 +61,18 @@ class Client:
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
-        for topic, (kind, name, profile) in _TOPICS.items():
+        for topic, (kind, profile) in _TOPICS.items():
             self._node.create_subscription(
-                kind, topic, self._recorder(topic, kind, name), profile, raw=True
+                kind, topic, self._recorder(topic, kind), profile, raw=True
             )
         self._node.create_subscription(String, "play_bag/status", self._note_status, qos.LATCHED)
+        self._node.create_subscription(
+            DiagnosticStatus, "initializer/result", self._note_result, qos.LATCHED
+        )
 
-    def _recorder(self, topic: str, kind: Any, name: str) -> Callable[[bytes], None]:
+    def _recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+
         def record(raw: bytes) -> None:
             message = deserialize_message(raw, kind)
             if hasattr(message, "header"):
@@ -81,17 +88,21 @@ class Client:
         if topic == "body_model":
             self.body_model = message.data
         elif topic == "joint_states":
-            self.postures[stamp] = np.array(message.position)
+            self.postures[stamp] = posture_from(results.joint_values_of(message))
             self.arrivals_s.append(time.monotonic())
         elif topic == "keypoints":
-            points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
-            self.keypoints_m[stamp] = np.array(points)
+            self.keypoints_m[stamp] = results.points_of(message).points_m
         elif topic == "silhouette":
             pixels = np.frombuffer(message.data, np.uint8)
             self.silhouettes[stamp] = pixels.reshape(message.height, message.width)
 
     def _note_status(self, message: String) -> None:
         self._player_status = message.data
+
+    def _note_result(self, message: DiagnosticStatus) -> None:
+        # Where it failed, the service's answer says why.
+        if message.level == DiagnosticStatus.OK:
+            self.initialization_iou = mean_iou_of(message)
 
     def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
         """Serve topics until ``condition`` holds.

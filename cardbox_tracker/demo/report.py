@@ -6,22 +6,21 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-import cv2
 import matplotlib
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.tracker import TRACKING, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 matplotlib.use("Agg")
 
@@ -34,12 +33,12 @@ def write_report(
     """Write everything into ``output``, print the table, return what report.json holds."""
     with BagReader(session) as bag:
         height, width = next(iter(result.silhouettes.values())).shape
-        camera = bag.calibration().camera(width, height).with_pitch(result.body.camera_pitch_rad)
+        pitch_rad = result.body.camera_pose.pitch_rad
+        camera = bag.calibration().camera(width, height, pitch_rad)
     expected = [stamp for stamp in result.truth.frames if stamp >= result.start_ns]
     tracked = [stamp for stamp in expected if stamp in result.postures]
     estimates = rate(result, camera, tracked)
     error = tracking_error({s: result.keypoints_m[s] for s in tracked}, result.truth)
-    fits = initialization_fit(result.answer)
     report: dict[str, object] = {
         "preset": preset,
         "seed": seed,
@@ -54,7 +53,7 @@ def write_report(
         "mean_cost_px": float(np.mean([estimate.cost_px for estimate in estimates.values()])),
         "mean_iou": float(np.mean([estimate.iou for estimate in estimates.values()])),
         "fps": result.fps,
-        "initialization_iou": fits,
+        "initialization_iou": result.initialization_iou,
     }
     with atomic_path(output / "report.json") as path:
         path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
@@ -67,22 +66,17 @@ def write_report(
 
 def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int, Estimate]:
     """Cost and IoU of what was published, by stamp, from the silhouettes on the topic."""
-    cost = CompiledCost(result.body, camera)
+    term = CompiledSilhouette(result.body, camera)
     estimates = {}
     for stamp in stamps:
         if stamp not in result.silhouettes:
             continue
-        cost.observe(result.silhouettes[stamp])
-        cost_px, iou = cost.overlap(result.postures[stamp])
+        seen = term.look(result.silhouettes[stamp])
+        cost_px, iou = seen.overlap(result.postures[stamp])
         estimates[stamp] = Estimate(
             TRACKING, posture=result.postures[stamp], cost_px=cost_px, iou=iou
         )
     return estimates
-
-
-def initialization_fit(answer: str) -> float:
-    """Mean IoU out of the initializer's answer ("... mean 0.87; ...")."""
-    return float(answer.split("mean ")[1].split(";")[0])
 
 
 def plot_joint_states(result: DemoResult, stamps: list[int], path: Path) -> None:
@@ -119,16 +113,12 @@ def write_overlay(
     size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
     nothing = Estimate("not_tracked")
     with BagReader(session) as bag, video_file(path, size, 15.0) as write:
+        pipeline = SilhouettePipeline(bag.calibration(), (camera.width, camera.height))
         for image in bag.images():
             if image.stamp_ns >= result.start_ns:
-                small = _resize(image.grey, camera)
+                small = pipeline.prepare(image.grey)
                 estimate = estimates.get(image.stamp_ns, nothing)
                 write(draw_overlay(small, result.body, camera, estimate, _VIDEO_SCALE))
-
-
-def _resize(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
-    size = (camera.width, camera.height)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def print_table(report: dict[str, object], output: Path) -> None:

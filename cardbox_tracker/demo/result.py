@@ -23,7 +23,7 @@ class DemoResult:
         keypoints_m: (6, 3) by stamp, metres in the optical frame.
         silhouettes: (H, W) by stamp.
         fps: joint states that arrived in a second.
-        answer: what the initializer answered.
+        initialization_iou: mean fit of the references, as the initializer reported it.
     """
 
     body: BodyModel
@@ -33,4 +33,4 @@ class DemoResult:
     keypoints_m: dict[int, NDArray[np.float64]]
     silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
     fps: float
-    answer: str
+    initialization_iou: float

@@ -71,8 +71,11 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
                 client.call("play_bag/resume")
             client.wait_for_pause(start_s)
             print("initializer/initialize", flush=True)
-            answer = client.call("initializer/initialize")
-            client.wait(lambda: bool(client.body_model), "the body model")
+            client.call("initializer/initialize")
+            client.wait(
+                lambda: bool(client.body_model) and client.initialization_iou is not None,
+                "the body model and its fit",
+            )
             client.rest(1.0)
             client.call("tracker/reset")
             first = len(client.arrivals_s)
@@ -98,7 +101,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
         client.keypoints_m,
         client.silhouettes,
         (len(arrivals) - 1) / lasted_s,
-        answer,
+        client.initialization_iou or 0.0,
     )
 
 

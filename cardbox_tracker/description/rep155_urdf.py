@@ -118,7 +118,7 @@ def _seen_from_camera(
     body: BodyModel,
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Where the middle of the hips is in the optical frame when d1 is 0, as URDF has it."""
-    down = body.camera_pitch_rad
+    down = body.camera_pose.pitch_rad
     # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
     rotation = np.array(
         [
@@ -127,7 +127,7 @@ def _seen_from_camera(
             (-math.cos(down), 0.0, -math.sin(down)),
         ]
     )
-    x, y, z = (rotation @ (-body.distance_m, 0.0, body.hip_height_m)).tolist()
+    x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
     return (x, y, z), _rpy(rotation)
 
 

@@ -48,10 +48,10 @@ def urdf_from_body(
     if optical_frame:
         add_link(robot, optical_frame)
         # Level optical axes seen from REP-103 axes, then turned down by the pitch about X.
-        rpy = (-math.pi / 2 - body.camera_pitch_rad, 0.0, -math.pi / 2)
+        rpy = (-math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2)
         add_joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
     add_link(robot, "hips")
-    origin = (body.distance_m, 0.0, body.hip_height_m)
+    origin = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
     add_joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
     parts = body_parts(body.sizes)
     _trunk(robot, parts)

@@ -14,42 +14,61 @@ from cardbox_tracker.vision.camera import Camera
 
 Rgba = tuple[float, float, float, float]
 
-SKELETON_WIDTH_M = 0.02
-SKELETON_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
-TORSO_RGBA: Rgba = (0.25, 0.45, 0.75, 0.7)
+# As visualization_msgs/Marker numbers them.
+LINE_LIST, TRIANGLE_LIST = 5, 11
+
+_SKELETON_WIDTH_M = 0.02
+_SKELETON_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
+_TORSO_RGBA: Rgba = (0.25, 0.45, 0.75, 0.7)
 _SIDES: dict[str, Rgba] = {"left": (0.2, 0.7, 0.4, 0.7), "right": (0.85, 0.45, 0.2, 0.7)}
-PART_RGBA: tuple[Rgba, ...] = (TORSO_RGBA, *_SIDES.values())
 _TRIANGLES = (0, 1, 2, 0, 2, 3)
 
 
-class MarkerShapes(NamedTuple):
-    """Two triangles a patch, and a line a bone.
+class MarkerShape(NamedTuple):
+    """One marker.
 
     Attributes:
-        triangles_m: (90, 3), three corners a triangle, metres in the optical frame.
-        colors: colour of each corner, 90 of them.
-        bones_m: (16, 3), both ends of each bone.
+        namespace: what it shows, ``patches`` or ``skeleton``.
+        kind: ``TRIANGLE_LIST`` or ``LINE_LIST``.
+        scale: of a marker: 1 for triangles, the width in metres for lines.
+        points_m: (n, 3), three corners a triangle or both ends of each line, metres in the optical
+            frame.
+        rgba: colour of the whole, where ``colors`` is empty.
+        colors: colour of each point, or none.
     """
 
-    triangles_m: FloatArray
-    colors: list[Rgba]
-    bones_m: FloatArray
+    namespace: str
+    kind: int
+    scale: float
+    points_m: FloatArray
+    rgba: Rgba
+    colors: tuple[Rgba, ...] = ()
 
 
-def marker_shapes(body: BodyModel, camera: Camera, posture: FloatArray) -> MarkerShapes:
-    """Return the shapes of ``body`` in a posture (12,) before ``camera``."""
-    patches = camera.reference_to_optical(cardbox_patches(body, posture))
+def marker_shapes(
+    body: BodyModel, camera: Camera, posture: FloatArray
+) -> tuple[MarkerShape, MarkerShape]:
+    """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``."""
+    corners = camera.reference_to_optical(cardbox_patches(body, posture))
     colors = [
         color
         for name in PATCH_NAMES
-        for color in [_SIDES.get(name.split("_")[0], TORSO_RGBA)] * len(_TRIANGLES)
+        for color in [_SIDES.get(name.split("_")[0], _TORSO_RGBA)] * len(_TRIANGLES)
     ]
     frames = forward_kinematics(body, posture)
     bones = [(frames.hip, frames.neck), (frames.neck, frames.head)]
     for arm in (frames.left, frames.right):
         bones += [(frames.neck, arm.shoulder), (arm.shoulder, arm.elbow), (arm.elbow, arm.hand)]
-    return MarkerShapes(
-        patches[:, _TRIANGLES].reshape(-1, 3),
-        colors,
-        camera.reference_to_optical(np.array(bones)).reshape(-1, 3),
+    return (
+        MarkerShape(
+            *("patches", TRIANGLE_LIST, 1.0),
+            corners[:, _TRIANGLES].reshape(-1, 3),
+            _TORSO_RGBA,
+            tuple(colors),
+        ),
+        MarkerShape(
+            *("skeleton", LINE_LIST, _SKELETON_WIDTH_M),
+            camera.reference_to_optical(np.array(bones)).reshape(-1, 3),
+            _SKELETON_RGBA,
+        ),
     )

@@ -7,11 +7,10 @@ from types import TracebackType
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
-from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
-from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.outputs import JointValues, Markers, OutputStream, Points, Value
 from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import Frame
@@ -28,7 +27,7 @@ class ResultBag:
         self._body = body
         self._frame_id = frame_id
         self._is_first = True
-        self._is_shown = False
+        self._outputs = OutputStream()
 
     def __enter__(self) -> ResultBag:
         """Open the bag."""
@@ -63,18 +62,16 @@ class ResultBag:
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         overlay = draw_overlay(frame.brightness, body, camera, estimate)
         bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
-        if estimate.posture is None or estimate.keypoints_m is None:
-            if self._is_shown:
-                write_markers(bag, "/markers", stamp, optical, None)
-            self._is_shown = False
-            return
-        # The header is that of the image, as the node has it.
-        bag.write_joint_state("/joint_states", stamp, optical, JOINT_NAMES, estimate.posture)
-        if estimate.posture_stddev is not None:
-            bag.write_joint_state(
-                "/joint_states_stddev", stamp, optical, JOINT_NAMES, estimate.posture_stddev
-            )
-        bag.write_pose_array("/keypoints", stamp, optical, estimate.keypoints_m)
-        shapes = marker_shapes(body, camera, estimate.posture)
-        write_markers(bag, "/markers", stamp, optical, shapes)
-        self._is_shown = True
+        for output, value in self._outputs.values(estimate, tracker):
+            _write_value(bag, f"/{output.topic}", stamp, optical, value)
+
+
+def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value: Value) -> None:
+    """Write an output under the header of its image, as the node has it."""
+    match value:
+        case JointValues(names, values):
+            bag.write_joint_state(topic, stamp_ns, frame_id, names, values)
+        case Points(points_m):
+            bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
+        case Markers():
+            write_markers(bag, topic, stamp_ns, frame_id, value)

@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-)
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.resize import to_working_size
+from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
 
@@ -69,7 +64,12 @@ class Frame(NamedTuple):
 
 
 class SilhouetteSource:
-    """The images of one bag at the working resolution, after learning its background."""
+    """The images of one bag at the working resolution, after learning its background.
+
+    Attributes:
+        frame_id: name of the camera's optical frame.
+        camera: the camera of what :meth:`frames` yields.
+    """
 
     def __init__(
         self,
@@ -91,23 +91,22 @@ class SilhouetteSource:
             CameraError: the recording's camera is not calibrated.
         """
         self._bag = bag
-        self._size = size
         calibration = bag.calibration()
+        self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
-        self.camera: Camera = calibration.camera(*size)
-        self._rectifier = calibration.rectifier(*size)
-        learner = BackgroundLearner(config)
+        self.camera = self._pipeline.camera
         for _, time_s, brightness in self._images():
             if time_s > background.end_s:
                 break
             if background.contains(time_s):
-                learner.add(brightness)
-        if learner.count < 2:
+                self._pipeline.learn(brightness)
+        count = self._pipeline.learned_images
+        if count < 2:
             raise BagError(
-                f"{learner.count} images lie in the background span {background} s of a bag of "
+                f"{count} images lie in the background span {background} s of a bag of "
                 f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
             )
-        self._extractor = SilhouetteExtractor(learner.model(), config)
+        self._pipeline.finish_learning()
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
@@ -115,7 +114,8 @@ class SilhouetteSource:
             if time_s > end_s:
                 break
             if time_s >= start_s:
-                yield Frame(stamp_ns, time_s, brightness, self._extractor(brightness))
+                silhouette = self._pipeline.silhouette(brightness)
+                yield Frame(stamp_ns, time_s, brightness, silhouette)
 
     def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:
         """Return the silhouettes of a span.
@@ -133,7 +133,5 @@ class SilhouetteSource:
 
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
         for image in self._bag.images():
-            brightness = to_working_size(image.grey, *self._size)
-            if self._rectifier is not None:
-                brightness = self._rectifier(brightness)
+            brightness = self._pipeline.prepare(image.grey)
             yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness

@@ -12,22 +12,24 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.tracker import TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.files import atomic_path
+from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
 
+# Scripts read the columns by their place: further joints follow the last of them.
 CSV_HEADER = (
     "stamp",
     "state",
-    *JOINT_NAMES,
+    *JOINT_STATE_NAMES[:N_JOINTS],
     *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
-    "cost",
-    "iou",
+    *(figure.name for figure in FIGURES),
+    *JOINT_STATE_NAMES[N_JOINTS:],
 )
 
 _VIDEO_SCALE = 2
@@ -112,13 +114,15 @@ def _estimates(
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
     """Return the row of one image; what is not known is left empty."""
     stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
-    if estimate.state != TRACKING or estimate.posture is None or estimate.keypoints_m is None:
+    joints = joint_values(estimate)
+    if joints is None or estimate.keypoints_m is None:
         return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]
+    values = [f"{value:.6f}" for value in joints.values]
     return [
         stamp,
         estimate.state,
-        *(f"{value:.6f}" for value in estimate.posture),
+        *values[:N_JOINTS],
         *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
-        str(estimate.cost_px),
-        f"{estimate.iou:.4f}",
+        *(figure.text(estimate) for figure in FIGURES),
+        *values[N_JOINTS:],
     ]

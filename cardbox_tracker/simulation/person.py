@@ -64,9 +64,9 @@ def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
     """Return a person of random stature (1.55 to 1.9 m) and proportions."""
     stature = rng.uniform(0.9, 1.1)
     sizes = DEFAULT_SIZES * stature * rng.normal(1.0, 0.07, len(DEFAULT_SIZES))
-    return BodyModel(
+    return BodyModel.of(
         np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
-        distance_m,
+        distance_m=distance_m,
         hip_height_m=-0.51 * distance_m / 2.0,
     )
 

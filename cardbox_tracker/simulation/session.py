@@ -81,9 +81,9 @@ def synthesize_session(
         raise EncodingError(
             f"encoding '{encoding}' cannot be synthesized; expected {', '.join(_ENCODINGS)}"
         )
-    body = body or BodyModel(hip_height_m=-0.51)
+    body = body or BodyModel.of(hip_height_m=-0.51)
     segments = timeline(motion, body.side_turn)
-    camera = session_camera(width, height).with_pitch(body.camera_pitch_rad)
+    camera = session_camera(width, height).with_pitch(body.camera_pose.pitch_rad)
     rng = np.random.default_rng(seed)
     renderer = Renderer(camera, scene or Scene(), rng.spawn(1)[0])
     count = round(segments[-1].end_s * fps)
@@ -107,7 +107,7 @@ def synthesize_session(
                 # Nobody stands quite still: a slow random walk that is pulled back.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
-                posture[0] += body.lateral_m + sway
+                posture[0] += body.placement.lateral_m + sway
                 image, mask = renderer.image(body, posture)
                 entry |= _truth(body, camera, posture, mask)
                 bag.write_joint_state(TRUTH_TOPIC, stamp_ns, FRAME_ID, JOINT_NAMES, posture)
@@ -176,7 +176,7 @@ def _session(
             "frame_id": FRAME_ID,
         },
         "person": {
-            "distance_m": body.distance_m,
+            "distance_m": body.placement.distance_m,
             "upper_arm": size("upper_arm_length"),
             "forearm_to_hand": size("forearm_length"),
             "shoulder_breadth": size("shoulder_breadth"),

@@ -19,47 +19,88 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.settings import check, setting
 from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.regions import remove_small_regions
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-_KERNEL = np.ones((3, 3), np.uint8)
-_GRID_PX = 1000
+# The smallest kernel that closes a gap of one pixel, in all eight directions.
+_CLOSING_KERNEL = np.ones((3, 3), np.uint8)
+# Pixels whose median says how bright the scene is: its error is about 4 % of their spread.
+_BRIGHTNESS_SAMPLES = 1000
 
 
 @dataclass(frozen=True)
 class BackgroundConfig:
-    """How the scene is learned and how a silhouette is cut out of it.
+    """How the scene is learned and how a silhouette is cut out of it."""
 
-    Attributes:
-        learn_images: images of the empty scene to average.
-        threshold: foreground from this many standard deviations on, equation (1).
-        min_stddev: floor of the standard deviation, grey levels.
-        clean_up: False leaves the plain rule of equation (1), without all that follows.
-        smoothing_px: standard deviation of the Gaussian that averages the difference before the
-            threshold, px; it lowers the noise and with it the specks.
-        min_contrast: a smoothed difference below this many grey levels is never foreground.
-        shadow: a place darker by less than this fraction is a shadow, not the person; 0 is off.
-        edge: a pixel next to one that differs much more is foreground only if it differs by this
-            fraction of it, since smoothing spreads a strong contrast beyond the outline; 0 is off.
-        flicker: follow brightness changes of the whole scene by this fraction at most; 0 is off.
-        min_area: specks smaller than this fraction of the image are dropped.
-        max_hole: holes smaller than this fraction of the image are filled.
-    """
+    learn_images: int = setting(30, "images of the empty scene to learn from", limits=(2, 10000))
+    threshold: float = setting(
+        2.0,
+        "a pixel is foreground if it differs from the background by this many standard deviations "
+        "or more, equation (1)",
+        limits=(0.1, 50.0),
+    )
+    min_stddev: float = setting(
+        1.5,
+        "smallest standard deviation that is assumed of a pixel",
+        unit="grey levels",
+        limits=(0.0, 100.0),
+    )
+    clean_up: bool = setting(
+        True, "false applies equation (1) alone: all settings after this one have no effect"
+    )
+    smoothing_px: float = setting(
+        0.6,
+        "standard deviation of the Gaussian that smooths the difference before the threshold; "
+        "it lowers the noise and with it the specks",
+        unit="px",
+        limits=(0.0, 20.0),
+    )
+    min_contrast: float = setting(
+        7.0,
+        "a smoothed difference below this is never foreground",
+        unit="grey levels",
+        limits=(0.0, 255.0),
+    )
+    shadow: float = setting(
+        0.13,
+        "a pixel that is darker than the background by less than this fraction is a shadow, not "
+        "the person; 0 is off",
+        limits=(0.0, 1.0),
+    )
+    # Smoothing spreads a strong contrast beyond the outline.
+    edge: float = setting(
+        0.35,
+        "a pixel is dropped if its difference is less than this fraction of the largest among its "
+        "8 neighbours, so that smoothing does not widen the outline; 0 is off",
+        limits=(0.0, 1.0),
+    )
+    flicker: float = setting(
+        0.1,
+        "a brightness change of the whole scene up to this fraction is compensated; 0 is off",
+        limits=(0.0, 1.0),
+    )
+    min_area: float = setting(
+        0.004,
+        "foreground regions smaller than this fraction of the image are dropped",
+        limits=(0.0, 1.0),
+    )
+    max_hole: float = setting(
+        0.0008,
+        "holes smaller than this fraction of the image are filled",
+        limits=(0.0, 1.0),
+    )
 
-    learn_images: int = 30
-    threshold: float = 2.0
-    min_stddev: float = 1.5
-    clean_up: bool = True
-    smoothing_px: float = 0.6
-    min_contrast: float = 7.0
-    shadow: float = 0.13
-    edge: float = 0.35
-    flicker: float = 0.1
-    min_area: float = 0.004
-    max_hole: float = 0.0008
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of range; the text names it.
+        """
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -73,17 +114,11 @@ class BackgroundModel:
 class BackgroundLearner:
     """Averages images of the empty scene, one at a time (Welford's algorithm)."""
 
-    def __init__(self, config: BackgroundConfig | None = None) -> None:
+    def __init__(self) -> None:
         """Start with nothing learned."""
-        self.config = config or BackgroundConfig()
         self.count = 0
         self._mean: FloatImage | None = None
         self._squares: FloatImage | None = None
-
-    @property
-    def is_ready(self) -> bool:
-        """True once ``config.learn_images`` images were added."""
-        return self.count >= self.config.learn_images
 
     def add(self, brightness: NDArray[np.uint8] | FloatImage) -> None:
         """Learn from one image (H, W).
@@ -128,8 +163,7 @@ class SilhouetteExtractor:
         darker = np.maximum(brighter, config.shadow * model.mean)
         self._brighter = np.asarray(1.0 / brighter, dtype=np.float32)
         self._darker = np.asarray(-1.0 / darker, dtype=np.float32)
-        # A thousand pixels are enough for the one number that describes the scene's brightness.
-        step = max(1, math.isqrt(model.mean.size // _GRID_PX))
+        step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
         # Fresh memory costs more than the arithmetic on it.
@@ -189,7 +223,9 @@ def clean_silhouette(foreground: ImageArray, min_area: float, max_hole: float) -
         A new (H, W) image, 0 or 255.
     """
     # Closing, not opening: it joins what noise cut, and thin fingers survive it.
-    closed = np.ascontiguousarray(cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _KERNEL), np.uint8)
+    closed = np.ascontiguousarray(
+        cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8
+    )
     remove_small_regions(closed, 255, min_area * foreground.size)
     remove_small_regions(closed, 0, max_hole * foreground.size)
     return closed

@@ -22,13 +22,16 @@ def segment_foreground(
     edge: float,
     score: FloatImage,
 ) -> ImageArray:
-    """Return where the score of a difference reaches 1, and ``edge`` times that around it.
+    """Return the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
+
+    A difference times ``brighter`` or ``darker``, whichever is larger, is its score.
 
     Args:
         difference: image minus background, (H, W), grey levels.
         brighter: score of one grey level more than the background, (H, W).
         darker: negative score of one grey level less, (H, W).
-        edge: fraction of the highest score among a pixel and its 8 neighbours.
+        edge: smallest score of a foreground pixel, as a fraction of the highest score among it and
+            its 8 neighbours.
         score: scratch, (H, W).
 
     Returns:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,10 @@ import pytest
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.commands.main import main
+from cardbox_tracker.estimation.initialization.measure import (
+    InitializationResult,
+    initialize_body,
+)
 from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -23,7 +28,7 @@ MARGIN_S = 0.2
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["person_a", "person_b"])
 def test_a_recorded_session_is_measured_and_tracked_to_its_end(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not (DATA / name).is_dir():
         pytest.skip(f"no recorded session {name} in ../shared/data")
@@ -37,10 +42,17 @@ def test_a_recorded_session_is_measured_and_tracked_to_its_end(
     words = [word for n in ("front", "side", "arms") for word in (f"--{n}", spans[n])]
     words += ["--distance", f"{truth.distance_m}", "--camera-pitch-deg", f"{truth.pitch_deg}"]
     words += ["--side-turn", truth.side_turn, "--output", str(model)]
+    results: list[InitializationResult] = []
+
+    def measure(*args: Any) -> InitializationResult:
+        results.append(initialize_body(*args))
+        return results[-1]
+
+    monkeypatch.setattr("cardbox_tracker.recordings.initialize.initialize_body", measure)
     assert main(["initialize", *recording, *words]) == 0
-    iou = float(capsys.readouterr().out.split("mean ")[1].split()[0])
+    iou = results[0].mean_iou
     assert iou >= INITIALIZATION_IOU
-    assert load_body_model(model).distance_m == truth.distance_m
+    assert load_body_model(model).placement.distance_m == truth.distance_m
 
     start_s = truth.spans["neutral"][0]
     words = ["--model", str(model), "--start", f"{start_s}", "--csv", str(table)]

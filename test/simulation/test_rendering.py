@@ -18,7 +18,7 @@ from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.simulation.session import session_camera
 from cardbox_tracker.vision.camera import Camera
 
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = session_camera()
 PLAIN = Scene(texture=0.0, noise=0.0)
 

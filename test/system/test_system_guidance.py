@@ -9,12 +9,14 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
-from std_msgs.msg import Header, String  # noqa: E402
+from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from cardbox_tracker.drawing.guidance import WANTED_BGR  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
@@ -29,6 +31,8 @@ class Person:
         lines = qos.copy_of(qos.LATCHED)
         lines.depth = 1000
         self.statuses = graph.collect(String, "initializer/status", lines)
+        self.guiding = graph.collect(Bool, "initializer/guiding", lines)
+        self.results = graph.collect(DiagnosticStatus, "initializer/result", lines)
         self.images = graph.node.create_publisher(Image, "silhouette", qos.SILHOUETTE)
         self.infos = graph.node.create_publisher(
             CameraInfo, "silhouette/camera_info", qos.SILHOUETTE
@@ -59,6 +63,11 @@ def test_guidance_gives_up_with_the_reason_when_nobody_comes(person: Person) -> 
     assert not response.success and "nobody is in the image" in response.message
     lines = [status.data for status in person.statuses]
     assert any(line.startswith("front: not captured: ") for line in lines)
+    person.graph.wait(lambda: person.results, "the result")
+    assert person.results[-1].level == DiagnosticStatus.ERROR
+    assert person.results[-1].message == response.message
+    person.graph.wait(lambda: len(person.guiding) == 3, "the end of the guidance")
+    assert [message.data for message in person.guiding] == [False, True, False]
 
 
 def test_one_call_guides_captures_and_measures(person: Person) -> None:
@@ -77,7 +86,11 @@ def test_one_call_guides_captures_and_measures(person: Person) -> None:
 
     graph.wait(first.done, "the answer")
     assert first.result().success, first.result().message
-    assert "mean" in first.result().message
+    graph.wait(lambda: len(person.results) == 2, "the result")
+    fit = {entry.key: float(entry.value) for entry in person.results[-1].values}
+    assert set(fit) == {"mean iou", "iou front", "iou side", "iou arms"}
+    assert mean_iou_of(person.results[-1]) == fit["mean iou"] > 0.6
+    assert fit["mean iou"] == pytest.approx(sum(list(fit.values())[1:]) / 3, abs=1e-4)
     lines = [status.data for status in person.statuses]
     for name, words in (("front", "face the camera"), ("side", "left"), ("arms", "sideways")):
         assert any(line.startswith(f"{name}: ") and words in line for line in lines), lines

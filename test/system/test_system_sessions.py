@@ -11,11 +11,13 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
+from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 from cardbox_tracker.simulation.session import synthesize_session  # noqa: E402
 
@@ -72,6 +74,7 @@ def test_session_is_measured_and_tracked_to_its_end(
     keypoints = graph.collect(PoseArray, f"{eye}/keypoints", qos.REPLAY)
     silhouettes = graph.collect(Image, f"{eye}/silhouette", qos.REPLAY)
     statuses = graph.collect(String, f"{eye}/play_bag/status", qos.LATCHED)
+    fits = graph.collect(DiagnosticStatus, f"{eye}/initializer/result", qos.LATCHED)
     graph.wait(
         lambda: (
             graph.node.count_subscribers(topic) == 1
@@ -102,7 +105,8 @@ def test_session_is_measured_and_tracked_to_its_end(
         if reference == "arms":
             response = graph.call(f"{eye}/initializer/initialize", timeout_s=90)
             assert response.success, response.message
-            iou = float(response.message.split("mean ")[1].split(";")[0])
+            graph.wait(lambda: fits, "the fit")
+            iou = mean_iou_of(fits[-1])
             assert iou >= 0.80, response.message
             graph.diagnosis(f"{name}/tracker", "")
         assert graph.call(f"{eye}/play_bag/resume").success

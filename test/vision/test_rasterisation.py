@@ -243,7 +243,7 @@ def test_a_patch_half_behind_draws_only_its_part_in_front() -> None:
 
 
 def test_several_patches_are_drawn_together() -> None:
-    patches = cardbox_patches(BodyModel(distance_m=3.0), reference_posture("front"))
+    patches = cardbox_patches(BodyModel.of(distance_m=3.0), reference_posture("front"))
     together = render(patches, CAMERA)
     alone = [render(patch[None], CAMERA) for patch in patches]
     np.testing.assert_array_equal(together, np.bitwise_or.reduce(alone))

@@ -20,7 +20,7 @@ def view_of(camera: Camera) -> ViewTuple:
 
 def place_of(body: BodyModel) -> PlaceTuple:
     """Return the fields of :class:`~cardbox_tracker.estimation.cost.kernels.Place`."""
-    return float(body.distance_m), float(body.hip_height_m)
+    return float(body.placement.distance_m), float(body.placement.hip_height_m)
 
 
 def shape_of(sizes_m: FloatArray, neck_to_head: float = 0.0) -> tuple[FloatArray, FloatArray]:

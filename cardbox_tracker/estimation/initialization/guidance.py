@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.errors import InitializationError
 
 _TURN = {
@@ -30,20 +29,28 @@ def instruction(name: str, side_turn: str) -> str:
 
 
 class Step(NamedTuple):
-    """A line of the guidance: the reference (or ``measuring``), words, and the seconds left."""
+    """A moment of the guidance.
+
+    Attributes:
+        name: the reference, or ``measuring``.
+        words: what to do, or what happened.
+        left_s: seconds of the count-down that are left; None while nothing is counted.
+    """
 
     name: str
     words: str
-    left_s: int | None
+    left_s: int | None = None
+
+    @property
+    def text(self) -> str:
+        """The step as a line for a person."""
+        count = "" if self.left_s is None else f": {self.left_s}"
+        return f"{self.name}: {self.words}{count}"
 
 
-def step_of(status: str) -> Step | None:
-    """Return the step that a line of ``initializer/status`` belongs to; None outside a guidance."""
-    name, colon, words = status.partition(": ")
-    if not colon or name not in (*REFERENCE_NAMES, "measuring"):
-        return None
-    said, _, count = words.rpartition(": ")
-    return Step(name, said, int(count)) if count.isdigit() else Step(name, words, None)
+def measuring(fraction: float) -> Step:
+    """Return the step of the measurement after the last capture, done to ``fraction``."""
+    return Step("measuring", f"{100 * fraction:.0f} %")
 
 
 class Guidance:
@@ -51,18 +58,18 @@ class Guidance:
 
     def __init__(
         self,
-        say: Callable[[str], None],
+        show: Callable[[Step], None],
         capture: Callable[[str], str],
         wait: Callable[[float], None],
     ) -> None:
         """Keep the three functions.
 
         Args:
-            say: shows a line to the person.
+            show: shows a step to the person.
             capture: captures the reference of that name; raises InitializationError.
-            wait: waits so many seconds; raises whatever ends the guidance.
+            wait: waits that many seconds; raises whatever ends the guidance.
         """
-        self._say, self._capture, self._wait = say, capture, wait
+        self._show, self._capture, self._wait = show, capture, wait
 
     def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
         """Capture every reference in ``missing``.
@@ -74,16 +81,16 @@ class Guidance:
             todo = instruction(name, side_turn)
             for attempt in range(1, attempts + 1):
                 for left in range(count_down_s, 0, -1):
-                    self._say(f"{name}: {todo}: {left}")
+                    self._show(Step(name, todo, left))
                     self._wait(1.0)
-                self._say(f"{name}: hold still")
+                self._show(Step(name, "hold still"))
                 self._wait(_HOLD_S)
                 try:
-                    self._say(f"{name}: {self._capture(name)}")
+                    self._show(Step(name, self._capture(name)))
                     self._wait(_HOLD_S)
                     break
                 except InitializationError as error:
-                    self._say(f"{name}: not captured: {error}")
+                    self._show(Step(name, f"not captured: {error}"))
                     if attempt == attempts:
                         raise
                     self._wait(_READ_S)

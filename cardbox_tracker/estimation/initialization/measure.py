@@ -16,7 +16,7 @@ is reached. Beyond the paper:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from cardbox_tracker.body.posture import (
     LEFT_ARM,
     N_JOINTS,
     RIGHT_ARM,
+    SIDE_TURNS,
     reference_posture,
 )
 from cardbox_tracker.body.sizes import (
@@ -36,7 +37,7 @@ from cardbox_tracker.body.sizes import (
     FloatArray,
 )
 from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.initialization.references import (
     Silhouette,
     check_references,
@@ -47,7 +48,11 @@ from cardbox_tracker.estimation.initialization.stature import (
     height_of_row_m,
     stature_m,
 )
+from cardbox_tracker.settings import check, setting
 from cardbox_tracker.vision.camera import Camera
+
+MAX_PITCH_RAD = float(np.radians(80.0))
+"""A camera that looks further up or down does not see an upright person's outline."""
 
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
 """Subset and the reference that shows it, in the order of the paper."""
@@ -61,35 +66,60 @@ _ALONG_BONES = np.array(
 )
 # Which angles a person misses when asked for a reference posture, and by how much.
 _LOOSE_ANGLE_RAD = np.radians(5.0)
+# How far the place of a reference posture is searched from one round to the next.
+_PLACE_NOISE_M = 0.02
+# The noise of the sizes after a round that found nothing better, as a fraction of that before.
+_SHRINK = 0.7
 
 
 @dataclass(frozen=True)
 class InitializationConfig:
-    """Settings of the initialization.
+    """Settings of the initialization."""
 
-    Attributes:
-        distance_m: level distance from the camera to the person; a silhouette cannot tell it.
-        camera_pitch_rad: how far the camera looks down.
-        side_turn: the way the person turned for ``side``, ``left`` or ``right``.
-        hypotheses: M.
-        max_rounds: rounds a step takes at most.
-        sigma_alpha_m: initial noise of the sizes.
-        accuracy_m: a step ends when its noise has shrunk below this.
-        prior: cost of a size one standard deviation off, as a fraction of the silhouette's pixels.
-        min_iou: a mean IoU of the three references below this is refused.
-        seed: of the generator of the hypotheses.
-    """
+    distance_m: float = setting(
+        2.0,
+        "level distance from the camera to the person; a silhouette gives sizes only up to scale",
+        unit="m",
+        limits=(0.3, 20.0),
+    )
+    camera_pitch_rad: float = setting(
+        0.0,
+        "how far the camera looks down; travels to the tracker in the body model",
+        unit="rad",
+        limits=(-MAX_PITCH_RAD, MAX_PITCH_RAD),
+    )
+    side_turn: str = setting(
+        "left",
+        "which way the person turns for the side reference, as they see it",
+        choices=SIDE_TURNS,
+    )
+    hypotheses: int = setting(500, "hypotheses M of the estimation", limits=(10, 100000))
+    max_rounds: int = setting(100, "rounds of a step of the estimation at most", limits=(1, 10000))
+    sigma_alpha_m: float = setting(
+        0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
+    )
+    accuracy_m: float = setting(
+        0.002, "a step ends when its noise has shrunk below this", unit="m", limits=(1e-6, 1.0)
+    )
+    prior: float = setting(
+        0.003,
+        "cost of a size one standard deviation off, as a fraction of the silhouette's pixels",
+        limits=(0.0, 1.0),
+    )
+    min_iou: float = setting(
+        0.6,
+        "a measurement is refused if the mean fit (IoU) of the references is below this",
+        limits=(0.0, 1.0),
+    )
+    seed: int = setting(0, "seed of the random draws", limits=(0, 2**31 - 1))
 
-    distance_m: float = 2.0
-    camera_pitch_rad: float = 0.0
-    side_turn: str = "left"
-    hypotheses: int = 500
-    max_rounds: int = 100
-    sigma_alpha_m: float = 0.05
-    accuracy_m: float = 0.002
-    prior: float = 0.003
-    min_iou: float = 0.6
-    seed: int = 0
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of range; the text names it.
+        """
+        check(self)
 
 
 @dataclass(frozen=True)
@@ -173,20 +203,20 @@ class _Search:
             np.where(_ALONG_BONES, _LENGTH_SCATTER, _BREADTH_SCATTER) * self._initial,
             _LEAST_SCATTER_M,
         )
-        self._place = BodyModel(
+        self._start = BodyModel.of(
             self._sizes,
-            config.distance_m,
-            crown_m - CROWN_TO_HIP * stature,
-            lateral_m(references["front"], camera, config.distance_m),
-            config.camera_pitch_rad,
-            config.side_turn,
+            distance_m=config.distance_m,
+            hip_height_m=crown_m - CROWN_TO_HIP * stature,
+            lateral_m=lateral_m(references["front"], camera, config.distance_m),
+            camera_pitch_rad=config.camera_pitch_rad,
+            side_turn=config.side_turn,
         )
-        self._costs = {}
+        self._camera = camera
+        self._seen = {}
         self._asked = {}
         self._postures = {}
         for name, silhouette in references.items():
-            self._costs[name] = CompiledCost(self._place, camera)
-            self._costs[name].observe(silhouette)
+            self._seen[name] = CompiledSilhouette(self._start, camera).look(silhouette)
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
             self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
@@ -200,7 +230,7 @@ class _Search:
         size_mask[SUBSETS[subset]] = 1.0
         loose = _loose_joints(name)
         posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
-        posture_noise[0] = 0.02
+        posture_noise[0] = _PLACE_NOISE_M
         sizes, posture = self._sizes, self._postures[name]
         best = float(self._rate(name, sizes[None], posture[None])[0])
         scale = 1.0
@@ -220,7 +250,7 @@ class _Search:
             if costs[winner] < best:
                 best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
             else:
-                scale *= 0.7
+                scale *= _SHRINK
             history.append(best)
             if scale * config.sigma_alpha_m < config.accuracy_m:
                 break
@@ -228,28 +258,27 @@ class _Search:
         self._sizes, self._postures[name] = sizes, posture
 
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
-        cost = self._costs[name]
-        weight_px = self._config.prior * cost.silhouette_px
+        seen = self._seen[name]
+        weight_px = self._config.prior * seen.frame.foreground_px
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
-        rated: FloatArray = cost.bodies(sizes, postures) + weight_px * prior
+        rated: FloatArray = seen.bodies(sizes, postures) + weight_px * prior
         return rated
 
     def result(self) -> InitializationResult:
         """Return the sizes rounded to a tenth of a millimetre, and the fit."""
-        place = self._place
-        body = replace(
-            place,
+        start = self._start
+        body = start.with_values(
             sizes=np.round(self._sizes, 4),
-            hip_height_m=round(float(place.hip_height_m), 4),
+            hip_height_m=round(float(start.placement.hip_height_m), 4),
             lateral_m=round(float(self._postures["front"][0]), 4),
         )
-        iou = {}
-        for name, cost in self._costs.items():
-            fitted = CompiledCost(body, cost.camera)
-            fitted.observe(self._references[name])
-            iou[name] = fitted.overlap(self._postures[name])[1]
+        fitted = CompiledSilhouette(body, self._camera)
+        iou = {
+            name: fitted.look(silhouette).overlap(self._postures[name])[1]
+            for name, silhouette in self._references.items()
+        }
         return InitializationResult(body, iou, self._rounds, self._history)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,12 +31,12 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:
         return body
-    view = camera.with_pitch(body.camera_pitch_rad)
+    view = camera.with_pitch(body.camera_pose.pitch_rad)
     heights_m = np.linspace(_LOWEST_M, _HIGHEST_M, 200)
     tops = np.repeat(forward_kinematics(body, np.zeros(12)).head[None], len(heights_m), axis=0)
-    tops[:, 2] += body_parts(body.sizes).head.height_m / 2 + heights_m - body.hip_height_m
+    tops[:, 2] += body_parts(body.sizes).head.height_m / 2 + heights_m - body.placement.hip_height_m
     optical = view.reference_to_optical(tops)
     # Far above or below a pitched camera there is no row to compare.
     seen = in_front(optical)
     off_px = np.abs(view.project(optical[seen])[:, 1] - rows[0])
-    return replace(body, hip_height_m=float(heights_m[seen][np.argmin(off_px)]))
+    return body.with_values(hip_height_m=float(heights_m[seen][np.argmin(off_px)]))

@@ -1,94 +1,94 @@
-"""What the tracker found, as messages: joint states, keypoints, markers."""
+"""The tracker's outputs as messages, and back where somebody reads them."""
 
 from __future__ import annotations
 
 import array
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.markers import (
-    PART_RGBA,
-    SKELETON_RGBA,
-    SKELETON_WIDTH_M,
-    TORSO_RGBA,
-    marker_shapes,
-)
-from cardbox_tracker.vision.camera import Camera
-
-_JOINTS = list(JOINT_NAMES)
-_COLORS = {
-    rgba: ColorRGBA(r=rgba[0], g=rgba[1], b=rgba[2], a=rgba[3])
-    for rgba in (*PART_RGBA, SKELETON_RGBA)
-}
-# Corners kept when the person is lost would stay in the air.
-_DELETE_ALL = Marker(action=Marker.DELETEALL)
+from cardbox_tracker.drawing.markers import MarkerShape, Rgba
+from cardbox_tracker.outputs import JointValues, Markers, Points, Value
 
 
-def joint_state_message(
-    header: Header, values: FloatArray, names: list[str] | None = None
-) -> JointState:
-    """Return the joints in ``values`` (n,), rad and metres (or their deviations).
-
-    Without ``names`` they are the 12 of the posture.
-    """
+def joint_state_message(header: Header, joints: JointValues) -> JointState:
+    """Return joint values, rad and metres (or their deviations), as positions."""
     return JointState(
-        header=header, name=names or _JOINTS, position=array.array("d", values.tolist())
+        header=header,
+        name=list(joints.names),
+        position=array.array("d", joints.values.tolist()),
     )
 
 
-def keypoints_message(header: Header, points_m: FloatArray) -> PoseArray:
-    """Return the six keypoints (6, 3), metres in the frame of ``header``."""
+def joint_values_of(message: JointState) -> JointValues:
+    """Return the names and positions of a message."""
+    return JointValues(tuple(message.name), np.array(message.position))
+
+
+def points_message(header: Header, points: Points) -> PoseArray:
+    """Return points, metres in the frame of ``header``, as poses without rotation."""
     upright = Quaternion(w=1.0)
     return PoseArray(
         header=header,
-        poses=[
-            Pose(position=Point(x=x, y=y, z=z), orientation=upright)
-            for x, y, z in points_m.tolist()
-        ],
+        poses=[Pose(position=point, orientation=upright) for point in _points(points.points_m)],
     )
 
 
-def markers_message(
-    header: Header, body: BodyModel, camera: Camera, posture: FloatArray
-) -> MarkerArray:
-    """Return the patches (namespace ``patches``) and the bones (``skeleton``) of a posture (12,).
-
-    Points are in the optical frame of ``camera``, metres; ``header`` names that frame.
-    """
-    shapes = marker_shapes(body, camera, posture)
-    triangles = _marker(header, "patches", Marker.TRIANGLE_LIST, 1.0)
-    triangles.points = _points(shapes.triangles_m)
-    triangles.colors = [_COLORS[color] for color in shapes.colors]
-    skeleton = _marker(header, "skeleton", Marker.LINE_LIST, SKELETON_WIDTH_M)
-    skeleton.color = _COLORS[SKELETON_RGBA]
-    skeleton.points = _points(shapes.bones_m)
-    return MarkerArray(markers=[triangles, skeleton])
+def points_of(message: PoseArray) -> Points:
+    """Return the positions of a message."""
+    return Points(np.array([(p.position.x, p.position.y, p.position.z) for p in message.poses]))
 
 
-def no_markers_message(header: Header) -> MarkerArray:
-    """Return what removes every marker of a person who is no longer tracked."""
-    _DELETE_ALL.header = header
-    return MarkerArray(markers=[_DELETE_ALL])
+def markers_message(header: Header, markers: Markers) -> MarkerArray:
+    """Return the shapes, in the frame of ``header``; without any, what removes those before."""
+    if not markers.shapes:
+        return MarkerArray(markers=[Marker(header=header, action=Marker.DELETEALL)])
+    return MarkerArray(markers=[_marker(header, shape) for shape in markers.shapes])
+
+
+_ENCODERS: dict[type[Value], tuple[Any, Callable[[Header, Any], Any]]] = {
+    JointValues: (JointState, joint_state_message),
+    Points: (PoseArray, points_message),
+    Markers: (MarkerArray, markers_message),
+}
+
+
+def message_type(kind: type[Value]) -> Any:
+    """Return the class of the messages that carry values of ``kind``."""
+    return _ENCODERS[kind][0]
+
+
+def message_of(header: Header, value: Value) -> Any:
+    """Return the message that carries ``value``."""
+    return _ENCODERS[type(value)][1](header, value)
+
+
+def _marker(header: Header, shape: MarkerShape) -> Marker:
+    return Marker(
+        header=header,
+        ns=shape.namespace,
+        type=shape.kind,
+        action=Marker.ADD,
+        pose=Pose(orientation=Quaternion(w=1.0)),
+        scale=Vector3(x=shape.scale, y=shape.scale, z=shape.scale),
+        color=_color(shape.rgba),
+        points=_points(shape.points_m),
+        colors=[_color(rgba) for rgba in shape.colors],
+    )
 
 
 def _points(points_m: FloatArray) -> list[Point]:
     return [Point(x=x, y=y, z=z) for x, y, z in points_m.tolist()]
 
 
-def _marker(header: Header, namespace: str, kind: int, scale: float) -> Marker:
-    return Marker(
-        header=header,
-        ns=namespace,
-        type=kind,
-        action=Marker.ADD,
-        pose=Pose(orientation=Quaternion(w=1.0)),
-        scale=Vector3(x=scale, y=scale, z=scale),
-        color=_COLORS[TORSO_RGBA],
-        frame_locked=False,
-    )
+@lru_cache(maxsize=16)  # a handful of colours, ninety corners an image
+def _color(rgba: Rgba) -> ColorRGBA:
+    r, g, b, a = rgba
+    return ColorRGBA(r=r, g=g, b=b, a=a)

@@ -15,15 +15,17 @@ from cardbox_tracker.ros.nodes.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor, warm_up
-from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
+from cardbox_tracker.vision.background import warm_up
 from cardbox_tracker.vision.camera_info import calibration_from_info
-from cardbox_tracker.vision.resize import to_working_size
+from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
+# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
-_LOSS = 0.1
-_DRIFT_GREY_LEVELS = 12.0
-_COVERED = 0.6
+_LOSS_TO_WARN = 0.1
+# Well above the noise of a median over the image.
+_DRIFT_TO_WARN_GREY_LEVELS = 12.0
+# More of the image than a person who is wholly in view covers.
+_COVERAGE_TO_WARN = 0.6
 
 
 class BackgroundNode(CardboxNode):
@@ -35,14 +37,8 @@ class BackgroundNode(CardboxNode):
         warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
-        self._size = (settings.width, settings.height)
-        self._config = settings.config()
-        self._calibration: Calibration | None = None
         self._info_key: tuple[Any, ...] = ()
-        self._camera: Camera | None = None
-        self._rectifier: Rectifier | None = None
-        self._learner = BackgroundLearner(self._config)
-        self._extractor: SilhouetteExtractor | None = None
+        self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
         self._image_bytes = 0
         self._covered = 0.0
@@ -66,27 +62,21 @@ class BackgroundNode(CardboxNode):
         )
 
     def _changed(self, settings: BackgroundParameters) -> None:
-        self._config = settings.config()
-        if self._extractor is not None:
-            self._extractor = SilhouetteExtractor(self._extractor.model, self._config)
-        self._learner.config = self._config
+        if self._pipeline is not None:
+            self._pipeline.config = settings.config()
 
     def _learn(self) -> str:
-        if self._image is None:
+        if self._pipeline is None or self._image is None:
             raise CameraError(
                 f"no image was received yet on {self._image_topic}, so there is nothing to learn "
                 "from; is the camera running, and its CameraInfo on "
                 f"{self._info_topic}? See 'ros2 topic hz {self._image_topic}'"
             )
-        self._forget()
+        self._pipeline.relearn()
         return (
-            f"learning the background from the next {self._config.learn_images} images; "
+            f"learning the background from the next {self._pipeline.config.learn_images} images; "
             "nobody may be in view"
         )
-
-    def _forget(self) -> None:
-        self._learner = BackgroundLearner(self._config)
-        self._extractor = None
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         roi = message.roi
@@ -99,88 +89,86 @@ class BackgroundNode(CardboxNode):
             (roi.x_offset, roi.y_offset, roi.width, roi.height),
             (message.binning_x, message.binning_y),
         )
-        if key == self._info_key and self._camera is not None:
+        if key == self._info_key and self._pipeline is not None:
             return
-        self._info_key, self._camera = key, None
-        self._calibration = calibration_from_info(message, self._image_topic, self._info_topic)
+        self._info_key, self._pipeline, self._image = key, None, None
+        calibration = calibration_from_info(message, self._image_topic, self._info_topic)
+        settings = self.parameters.value
+        size = (settings.width, settings.height)
         try:
-            self._rectifier = self._calibration.rectifier(*self._size)
-            self._camera = self._calibration.camera(*self._size)
+            self._pipeline = SilhouettePipeline(calibration, size, settings.config())
         except CameraError as error:
             raise CameraError(
                 f"{self._info_topic}, of the images on {self._image_topic}: {error}"
             ) from None
-        self._forget()
         self.diagnostics.wait_for(f"images on {self._image_topic}")
 
     def _on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
         self._image_bytes = len(message.data)
-        if self._camera is None or self._calibration is None:
+        pipeline = self._pipeline
+        if pipeline is None:
             if not self._info_key:
                 self.diagnostics.wait_for(
                     f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
             return
         full = conversions.brightness_of(message)
-        conversions.check_shape(full, self._calibration, self._image_topic, self._info_topic)
-        image = to_working_size(full, *self._size)
-        if self._rectifier is not None:
-            image = self._rectifier(image)
-        self._image = image
-        if self._extractor is None:
-            self._add_to_background(message.header, image)
-        if self._extractor is not None:
-            self._publish(message.header, self._extractor, image)
+        conversions.check_shape(full, pipeline.calibration, self._image_topic, self._info_topic)
+        self._image = image = pipeline.prepare(full)
+        if not pipeline.is_ready:
+            self._learn_from(message.header, pipeline, image)
+        if pipeline.is_ready:
+            self._publish(message.header, pipeline, image)
             self.diagnostics.working(sent_ns)
 
-    def _add_to_background(self, header: Header, image: conversions.ImageArray) -> None:
-        self._learner.add(image)
-        if not self._learner.is_ready:
+    def _learn_from(
+        self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
+    ) -> None:
+        pipeline.learn(image)
+        if not pipeline.has_enough:
             self.diagnostics.wait_for(
-                f"{self._config.learn_images} images of the empty scene on {self._image_topic} "
+                f"{pipeline.config.learn_images} images of the empty scene on {self._image_topic} "
                 "(learning the background: nobody may be in view)"
             )
             return
-        model = self._learner.model()
-        self._extractor = SilhouetteExtractor(model, self._config)
+        model = pipeline.finish_learning()
         self._mean.publish(conversions.image_message(header, model.mean, "32FC1"))
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
-        self.get_logger().info(f"background learned from {self._learner.count} images")
+        self.get_logger().info(f"background learned from {pipeline.learned_images} images")
 
     def _publish(
-        self, header: Header, extractor: SilhouetteExtractor, image: conversions.ImageArray
+        self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
-        assert self._camera is not None
-        silhouette = extractor(image)
+        silhouette = pipeline.silhouette(image)
         # The image first: whoever tracks it need not wait for what hardly ever changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
-        self._infos.publish(conversions.camera_info_message(header, self._camera))
+        self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size
 
     def _values(self) -> dict[str, str]:
+        learned = 0 if self._pipeline is None else self._pipeline.learned_images
         return {
-            "background learned from": f"{self._learner.count}/{self._config.learn_images}",
+            "background learned from": f"{learned}/{self.parameters.value.learn_images}",
             "foreground (% of the image)": f"{100 * self._covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
         }
 
     def _drift(self) -> float:
-        """How much brighter the scene became; the person covers less than half of it."""
-        if self._extractor is None or self._image is None:
+        if self._pipeline is None or self._image is None:
             return 0.0
-        return float(np.median(self._image - self._extractor.model.mean))
+        return self._pipeline.drift(self._image)
 
     def _advice(self) -> list[str]:
         advice = []
-        if self.diagnostics.input.loss > _LOSS and self._image_bytes > _LARGE_IMAGE_BYTES:
+        if self.diagnostics.input.loss > _LOSS_TO_WARN and self._image_bytes > _LARGE_IMAGE_BYTES:
             advice.append(
                 f"{100 * self.diagnostics.input.loss:.0f} % of the images on {self._image_topic} "
                 f"({self._image_bytes // 1000} kB each) are lost on the way: start all nodes "
                 "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
                 "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
             )
-        if abs(self._drift()) > _DRIFT_GREY_LEVELS or self._covered > _COVERED:
+        if abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS or self._covered > _COVERAGE_TO_WARN:
             advice.append(
                 "the whole scene changed its brightness: switch the camera's automatic exposure "
                 "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "

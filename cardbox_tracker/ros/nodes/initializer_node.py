@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, Image
@@ -21,10 +22,11 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
-from cardbox_tracker.estimation.initialization.guidance import Guidance
+from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
 from cardbox_tracker.estimation.initialization.measure import InitializationResult, initialize_body
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.guide_overlay import GuideOverlay
+from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
+from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
 from cardbox_tracker.ros.runtime import qos
@@ -50,8 +52,8 @@ class InitializerNode(CardboxNode):
 
         self._model = self.advertise(String, "body_model", qos.LATCHED)
         self._description = self.advertise(String, "robot_description", qos.LATCHED)
-        self._status = self.advertise(String, "~/status", qos.LATCHED)
-        self._guide = GuideOverlay(self)
+        self._result = self.advertise(DiagnosticStatus, "~/result", qos.LATCHED)
+        self._guide = GuideOutputs(self)
         self._topic = self.resolve("silhouette")
         self._references = ReferenceCapture(self._topic)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
@@ -81,16 +83,12 @@ class InitializerNode(CardboxNode):
     def _on_silhouette(self, message: Image, sent_ns: int) -> None:
         self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
         self._references.add(message)
-        self._guide.show(message, self._camera, self.parameters.value)
+        self._guide.draw(message, self._camera, self.parameters.value)
         self.diagnostics.working(sent_ns)
         if message.header.frame_id != self._frame_id:
             self._frame_id = message.header.frame_id
             if self._body is not None:
                 self._describe(self._body)
-
-    def _say(self, text: str) -> None:
-        self._guide.status = text
-        self._status.publish(String(data=text))
 
     def _capture(self, name: str) -> str:
         return self._references.capture(name, self.parameters.value.capture_frames)
@@ -112,7 +110,9 @@ class InitializerNode(CardboxNode):
             response.success, response.message = await done
         finally:
             self._busy.release()
-        self._say(response.message)
+        if not response.success:
+            self._result.publish(refused_message(response.message))
+        self._guide.end(response.message)
         return response
 
     def _measure(self) -> str:
@@ -120,7 +120,7 @@ class InitializerNode(CardboxNode):
         references.check_running()
         before = dict(references.captured)
         try:
-            Guidance(self._say, self._capture, self._wait).run(
+            Guidance(self._guide.show, self._capture, self._wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
             )
             if self._camera is None:
@@ -135,18 +135,21 @@ class InitializerNode(CardboxNode):
             references.captured = before  # captured on request: stays, to be replaced singly
             raise
         references.captured = {}
+        answer = _answer(result)
+        self._result.publish(measured_message(result, answer))
         self._publish(result.body)
         path = self._path()
         if path is not None:
             save_body_model(result.body, path)
-        return _answer(result) + (f"; saved to {path}" if path is not None else "")
+            answer += f"; saved to {path}"
+        return answer
 
     def _wait(self, duration_s: float) -> None:
         if self._stop.wait(duration_s):
             raise InitializationError("the initializer was stopped")
 
     def _progress(self, fraction: float) -> None:
-        self._say(f"measuring: {100 * fraction:.0f} %")
+        self._guide.show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
         self._body = body

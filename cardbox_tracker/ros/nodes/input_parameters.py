@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.ros.runtime.parameters import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class CameraParameters(NodeParameters):
         "/dev/video0", "V4L2 device; not used when a file is given", read_only=True
     )
     file: str = parameter("", "video file to play instead of a device", read_only=True)
-    loop: bool = parameter(False, "play the file again and again")
+    loop: bool = parameter(False, "play the file again and again", effect="end of the file")
     width: int = parameter(
         640, "width to ask the device for", unit="px", limits=(32, 8192), read_only=True
     )
@@ -66,14 +66,22 @@ class PlayBagParameters(NodeParameters):
     """Play a recording."""
 
     bag: str = parameter("", "rosbag2 folder or .mcap file to play", read_only=True)
-    rate: float = parameter(1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0))
-    loop: bool = parameter(False, "play again and again; the stamps start over too")
+    rate: float = parameter(
+        1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0), effect="at once"
+    )
+    loop: bool = parameter(
+        False, "play again and again; the stamps start over too", effect="end of the bag"
+    )
     topics: list[str] = parameter([], "topics to play; all if empty", read_only=True)
     start_s: float = parameter(
-        0.0, "begin so long after the bag's start", unit="s", limits=(0.0, 1e6), read_only=True
+        0.0,
+        "play from this time on, from the bag's start",
+        unit="s",
+        limits=(0.0, 1e6),
+        read_only=True,
     )
     duration_s: float = parameter(
-        0.0, "play so much of the bag; 0 is all", unit="s", limits=(0.0, 1e6), read_only=True
+        0.0, "play this long; 0: to the end of the bag", unit="s", limits=(0.0, 1e6), read_only=True
     )
     pause_at: list[float] = parameter(
         [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
@@ -89,8 +97,8 @@ class PlayBagParameters(NodeParameters):
     )
     delay_s: float = parameter(
         0.5,
-        "wait so long before the first message, and as long again whenever somebody subscribes "
-        "meanwhile, so that nobody misses the beginning",
+        "the first message is sent when no subscriber has come or gone for this time, so that "
+        "none misses the beginning",
         unit="s",
         limits=(0.0, 600.0),
         read_only=True,

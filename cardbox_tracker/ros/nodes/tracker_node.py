@@ -15,12 +15,14 @@ from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
+from cardbox_tracker.outputs import FIGURES
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.node_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
 _REASONS = {
@@ -74,8 +76,14 @@ class TrackerNode(CardboxNode):
                 f"{self._info_topic} (is the background node running, and has it learned?)"
             )
 
-    def _changed(self, _: TrackerParameters) -> None:
-        self._build("parameters changed")
+    def _changed(self, settings: TrackerParameters) -> None:
+        if self._tracker is None:
+            return
+        config = settings.config()
+        if restarts(self._tracker.config, config):
+            self._build("other settings of the particles")
+        else:
+            self._tracker.configure(config)
 
     def _on_model(self, message: String, _: int) -> None:
         body = loads_body_model(message.data, source=self._model_topic)
@@ -94,12 +102,16 @@ class TrackerNode(CardboxNode):
             self._build("new camera")
 
     def _build(self, reason: str) -> None:
-        """Set the tracker up for the body, the camera and the parameters of now."""
+        """Set the tracker up for the body, the camera and the parameters of now.
+
+        The same seed and images then give the same results, also after a reset.
+        """
         if self._body is None or self._camera is None:
             return
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         self._tracker = Tracker(self._body, self._camera, settings.config(), rng)
+        self._state = ""
         self.get_logger().info(f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
@@ -108,15 +120,13 @@ class TrackerNode(CardboxNode):
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
             )
-        self._tracker.reset()
-        self._state = ""
+        self._build("reset")
         return "tracking starts again from the front reference posture"
 
     def _on_silhouette(self, message: Image, sent_ns: int) -> None:
         header = message.header
         if not self.diagnostics.input.add(conversions.stamp_ns(header.stamp)) and self._tracker:
-            self.get_logger().warning("the stamps went back (a bag that loops?): tracking restarts")
-            self._tracker.reset()
+            self._build("an image is older than the one before (a bag that loops?)")
         if self._tracker is None or self._body is None or self._camera is None:
             self._wait()
             self._outputs.waiting(message, "no body model yet: call initializer/initialize")
@@ -152,8 +162,7 @@ class TrackerNode(CardboxNode):
         values |= {f"images {state}": str(count) for state, count in self._counts.items()}
         estimate = self._estimate
         if estimate is not None and estimate.posture is not None:
-            values["cost (px)"] = f"{estimate.cost_px}"
-            values["iou"] = f"{estimate.iou:.3f}"
+            values |= {figure.label: figure.text(estimate) for figure in FIGURES}
             if estimate.posture_stddev is not None:
                 angles = estimate.posture_stddev[1:]
                 values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"

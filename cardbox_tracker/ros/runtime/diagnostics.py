@@ -22,11 +22,11 @@ PERIOD_S = 1.0
 _REPEAT_S = 10.0
 _WINDOW = 120
 _PAUSE_NS = 2_000_000_000
-_LEVELS = {
-    "ok": DiagnosticStatus.OK,
-    "warn": DiagnosticStatus.WARN,
-    "error": DiagnosticStatus.ERROR,
-}
+
+STATUS = "status"
+"""Key of the value that says whether a node is ``waiting``, ``working`` or has an ``error``."""
+
+WAITING, WORKING, ERROR = "waiting", "working", "error"
 
 
 class StreamStatistics:
@@ -36,21 +36,21 @@ class StreamStatistics:
         """Start with nothing received."""
         self.received = 0
         self.dropped = 0
-        self.went_back = 0
+        self.out_of_order = 0
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
         # The same in order: with every image the period is asked for.
         self._ordered_ns: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
-        """Count a message of that stamp; return False if its stamp went back or stayed."""
+        """Count a message of that stamp; return False if it is not later than the one before."""
         self.received += 1
         last_ns, self._last_ns = self._last_ns, stamp_ns
         if last_ns is None:
             return True
         spacing_ns = stamp_ns - last_ns
         if spacing_ns <= 0:
-            self.went_back += 1
+            self.out_of_order += 1
             self._spacings_ns.clear()
             self._ordered_ns.clear()
             return False
@@ -164,31 +164,32 @@ class NodeDiagnostics:
         before, received_before, published_before = self._before
         self._before = (now, received, published)
         span_s = max(now - before, 1e-3)
+        warnings = self._warnings + self.advice()
+        if self._problem:
+            state, level, text = ERROR, DiagnosticStatus.ERROR, self._problem
+        elif self._waiting:
+            state, level, text = WAITING, DiagnosticStatus.WARN, f"waiting for {self._waiting}"
+        elif warnings:
+            state, level, text = WORKING, DiagnosticStatus.WARN, warnings[-1]
+        else:
+            state, level, text = WORKING, DiagnosticStatus.OK, "working"
         values = {
+            STATUS: state,
             "rate in (Hz)": f"{(received - received_before) / span_s:.1f}",
             "rate out (Hz)": f"{(published - published_before) / span_s:.1f}",
             "received": str(received),
             "published": str(published),
             "dropped (by stamps)": str(self.input.dropped),
             "late": str(self._late),
-            "stamps that went back": str(self.input.went_back),
+            "out of order (by stamps)": str(self.input.out_of_order),
         }
         if self._latencies_ms:
             values["latency p95 (ms)"] = f"{np.percentile(self._latencies_ms, 95):.2f}"
         values |= self.extra()
-        warnings = self._warnings + self.advice()
-        if self._problem:
-            level, text = "error", self._problem
-        elif self._waiting:
-            level, text = "warn", f"waiting for {self._waiting}"
-        elif warnings:
-            level, text = "warn", warnings[-1]
-        else:
-            level, text = "ok", "working"
         values |= {f"warning {i}": warning for i, warning in enumerate(warnings, 1)}
         name = self._node.get_fully_qualified_name().lstrip("/")
         return DiagnosticStatus(
-            level=_LEVELS[level],
+            level=level,
             name=f"{name}: {self._node.get_name()}",
             message=text,
             hardware_id="cardbox_tracker",

@@ -1,105 +1,40 @@
 """Parameters of a node declared from one dataclass: the single source of types and defaults.
 
-A field made by :func:`parameter` carries its description, unit, range or choices, and whether it
-can change while it runs. :class:`LiveParameters` declares all of them on a node and keeps a
+:class:`LiveParameters` declares the fields of :mod:`.parameter_fields` on a node and keeps a
 validated instance: a wrong value is refused with the reason and the old one stays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Generic, TypeVar, get_type_hints
+from dataclasses import replace
+from typing import Any, Generic, TypeVar, get_args
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
+from cardbox_tracker.settings import check
 
-T = TypeVar("T", bound="NodeParameters")
+T = TypeVar("T", bound=NodeParameters)
 
 _LIST_TYPES = {
     list[float]: Parameter.Type.DOUBLE_ARRAY,
     list[int]: Parameter.Type.INTEGER_ARRAY,
     list[str]: Parameter.Type.STRING_ARRAY,
 }
-
-
-@dataclass(frozen=True)
-class ParameterSpec:
-    """What is known of one parameter besides its name, type and default.
-
-    Attributes:
-        description: what it does, one sentence.
-        unit: its unit; empty for a plain number or a text.
-        minimum: smallest allowed value; None without a limit.
-        maximum: largest allowed value; None without a limit.
-        choices: the allowed texts; empty if any text is.
-        read_only: True if it can only be given at the start.
-    """
-
-    description: str
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()
-    read_only: bool = False
-
-    @property
-    def range_text(self) -> str:
-        """The allowed values in words, or an empty text."""
-        if self.choices:
-            return " | ".join(choice or '""' for choice in self.choices)
-        if self.minimum is None or self.maximum is None:
-            return ""
-        return f"{_short(self.minimum)} to {_short(self.maximum)}"
-
-
-def _short(value: float) -> str:
-    return str(int(value)) if float(value).is_integer() else f"{value:g}"
-
-
-def parameter(
-    default: Any,
-    description: str,
-    *,
-    unit: str = "",
-    limits: tuple[float, float] | None = None,
-    choices: tuple[str, ...] = (),
-    read_only: bool = False,
-) -> Any:
-    """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
-    lowest, highest = limits or (None, None)
-    spec = ParameterSpec(description, unit, lowest, highest, choices, read_only)
-    if isinstance(default, list):
-        return field(default_factory=list, metadata={"spec": spec})
-    return field(default=default, metadata={"spec": spec})
-
-
-@dataclass(frozen=True)
-class NodeParameters:
-    """Base of the parameter dataclasses; every field is made by :func:`parameter`."""
-
-    def check(self) -> None:
-        """Raise ValueError where values do not go together; ranges are checked before."""
-
-    @classmethod
-    def specs(cls) -> dict[str, ParameterSpec]:
-        """Return the specification of every parameter by name, in order."""
-        return {entry.name: entry.metadata["spec"] for entry in fields(cls)}
-
-    @classmethod
-    def types(cls) -> dict[str, Any]:
-        """Return the Python type of every parameter by name."""
-        hints = get_type_hints(cls)
-        return {entry.name: hints[entry.name] for entry in fields(cls)}
+_TYPE_TEXTS = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    list[float]: "a list of numbers",
+    list[int]: "a list of whole numbers",
+    list[str]: "a list of texts",
+}
 
 
 class LiveParameters(Generic[T]):
@@ -117,33 +52,96 @@ class LiveParameters(Generic[T]):
         self._kind = kind
         self._on_change = on_change
         self._specs = kind.specs()
-        values = {name: self._declare(name, type_) for name, type_ in kind.types().items()}
+        self._types = kind.types()
+        self._new_names = {spec.was: name for name, spec in self._specs.items() if spec.was}
+        values = {name: self._declare(name) for name in self._specs}
         self.value: T = kind(**values)
         problem = self._problem(self.value)
         if problem:
-            raise CardboxError(f"parameters of node '{node.get_name()}': {problem}")
+            raise self._refusal(problem)
+        node.add_pre_set_parameters_callback(self._translate)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._apply)
 
-    def _declare(self, name: str, type_: Any) -> Any:
+    def _declare(self, name: str) -> Any:
+        spec, type_ = self._specs[name], self._types[name]
         default: Any = _LIST_TYPES.get(type_)
         if default is None:
             default = getattr(self._kind, name)
+        given = self._given(name)
+        if spec.was:
+            given = self._given_before(name, spec.was, given)
+        given = _as_type(type_, given)
+        if given is not None and not _is_of(type_, given):
+            raise self._refusal(
+                f"{name} is '{given}'; expected {_TYPE_TEXTS[type_]}. {name} is {spec.description}"
+            )
         try:
-            self._node.declare_parameter(name, default, descriptor(self._specs[name], type_))
+            self._node.declare_parameter(
+                name,
+                default if given is None else given,
+                descriptor(spec, type_),
+                ignore_override=True,
+            )
             return _plain(self._node.get_parameter(name).value)
         except ParameterUninitializedException:
             return []
         except Exception as error:
-            raise CardboxError(
-                f"parameters of node '{self._node.get_name()}': {error}. {name} is "
-                f"{self._specs[name].description}"
-            ) from None
+            raise self._refusal(f"{error}. {name} is {spec.description}") from None
+
+    def _given(self, name: str) -> Any:
+        """Return what the command line or a file gives for ``name``; None if nothing does."""
+        any_type = ParameterDescriptor(dynamic_typing=True)
+        value = self._node.declare_parameter(name, None, any_type).value
+        self._node.undeclare_parameter(name)
+        return value
+
+    def _given_before(self, name: str, was: str, given: Any) -> Any:
+        """Return the value given under the old or the new name, and keep the old one settable."""
+        old = self._given(was)
+        # So 'ros2 param dump' writes the old name, which has no value.
+        old = None if old == "null" else old
+        any_type = ParameterDescriptor(dynamic_typing=True, description=f"renamed to {name}")
+        self._node.declare_parameter(was, None, any_type, ignore_override=True)
+        if old is None:
+            return given
+        if given is not None:
+            raise self._refusal(_both_names(was, name))
+        self._warn_of(was, name)
+        return old
+
+    def _warn_of(self, was: str, name: str) -> None:
+        self._node.get_logger().warning(
+            f"the parameter '{was}' is now called '{name}'; the old name works in this version only"
+        )
+
+    def _refusal(self, problem: str) -> CardboxError:
+        return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
+
+    def _translate(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Before anything is checked: old names become new ones, integers numbers where asked."""
+        names = {p.name for p in parameters}
+        translated = []
+        for given in parameters:
+            name = self._new_names.get(given.name, given.name)
+            if name != given.name and name in names:
+                name = given.name  # both names: left for the check, which can refuse
+            elif name != given.name:
+                self._warn_of(given.name, name)
+            value = _as_type(self._types.get(name), given.value)
+            # An empty list keeps its type only in the original.
+            same = name == given.name and value is given.value
+            translated.append(given if same else Parameter(name, value=value))
+        return translated
 
     def _changed(self, parameters: list[Parameter]) -> dict[str, Any]:
         return {p.name: _plain(p.value) for p in parameters if p.name in self._specs}
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
+        for given in parameters:
+            if given.name in self._new_names:
+                reason = _both_names(given.name, self._new_names[given.name])
+                return SetParametersResult(successful=False, reason=reason)
         changed = self._changed(parameters)
         if not changed:
             return SetParametersResult(successful=True)
@@ -158,34 +156,36 @@ class LiveParameters(Generic[T]):
                 self._on_change(self.value)
 
     def _problem(self, value: T) -> str:
-        for name, spec in self._specs.items():
-            given = getattr(value, name)
-            if spec.choices and given not in spec.choices:
-                return f"{name} is '{given}'; expected one of {', '.join(spec.choices)}"
         try:
+            check(value)
             value.check()
         except (ValueError, CardboxError) as error:
             return str(error)
         return ""
 
 
-def descriptor(spec: ParameterSpec, type_: Any) -> ParameterDescriptor:
-    """Return the ROS descriptor of a parameter, so that tools can show and check it."""
-    unit = f" [{spec.unit}]" if spec.unit else ""
-    message = ParameterDescriptor(
-        description=f"{spec.description}{unit}",
-        read_only=spec.read_only,
-        additional_constraints=f"one of: {spec.range_text}" if spec.choices else "",
-    )
-    if spec.minimum is not None and spec.maximum is not None:
-        if type_ is int:
-            limits = IntegerRange(from_value=int(spec.minimum), to_value=int(spec.maximum))
-            message.integer_range = [limits]
-        else:
-            message.floating_point_range = [
-                FloatingPointRange(from_value=float(spec.minimum), to_value=float(spec.maximum))
-            ]
-    return message
+def _both_names(was: str, name: str) -> str:
+    return f"'{was}' and '{name}' are the old and the new name of one parameter; give '{name}' only"
+
+
+def _as_type(type_: Any, value: Any) -> Any:
+    """Return whole numbers as floats where a float is asked for; all else as it is."""
+    if type_ is float and _is_integer(value):
+        return float(value)
+    if type_ == list[float] and value and all(map(_is_integer, value)):
+        return [float(one) for one in value]
+    return value
+
+
+def _is_of(type_: Any, value: Any) -> bool:
+    plain = _plain(value)
+    if type_ in _LIST_TYPES:
+        return isinstance(plain, list) and all(type(one) is get_args(type_)[0] for one in plain)
+    return type(plain) is type_
+
+
+def _is_integer(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _plain(value: Any) -> Any:

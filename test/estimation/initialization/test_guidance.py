@@ -5,17 +5,26 @@ from __future__ import annotations
 import pytest
 
 from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.initialization.guidance import Guidance, instruction, step_of
+from cardbox_tracker.estimation.initialization.guidance import (
+    Guidance,
+    Step,
+    instruction,
+    measuring,
+)
 
 
 class Room:
     """A person whose first ``failures`` captures fail."""
 
     def __init__(self, failures: int = 0) -> None:
-        self.lines: list[str] = []
+        self.steps: list[Step] = []
         self.captured: list[str] = []
         self.waited_s = 0.0
         self.failures = failures
+
+    @property
+    def lines(self) -> list[str]:
+        return [step.text for step in self.steps]
 
     def capture(self, name: str) -> str:
         if self.failures:
@@ -28,7 +37,7 @@ class Room:
         self.waited_s += duration_s
 
     def guidance(self) -> Guidance:
-        return Guidance(self.lines.append, self.capture, self.wait)
+        return Guidance(self.steps.append, self.capture, self.wait)
 
 
 def test_only_missing_postures_are_guided_with_a_line_a_second() -> None:
@@ -59,14 +68,18 @@ def test_each_posture_has_an_instruction(name: str) -> None:
     assert instruction(name, "left")
 
 
-def test_every_line_of_the_guidance_is_a_step_and_no_other() -> None:
-    lines: list[str] = []
-    guidance = Guidance(lines.append, lambda name: f"captured '{name}'", lambda _: None)
-    guidance.run(["front", "side", "arms"], "left", 3, 1)
-    steps = [step_of(line) for line in lines]
-    assert {step.name for step in steps if step} == {"front", "side", "arms"}
-    assert [step.left_s for step in steps[:4] if step] == [3, 2, 1, None]
-    assert steps[0] and steps[0].words == instruction("front", "left")
-    assert step_of("measuring: 40 %") == ("measuring", "40 %", None)
-    for other in ("", "measured; fit (IoU) front 0.93", "nobody is in the image: come nearer"):
-        assert step_of(other) is None
+def test_steps_have_their_posture_words_and_count() -> None:
+    room = Room()
+    room.guidance().run(["front", "side", "arms"], "left", 3, 1)
+    assert {step.name for step in room.steps} == {"front", "side", "arms"}
+    assert room.steps[:5] == [
+        *(Step("front", instruction("front", "left"), left) for left in (3, 2, 1)),
+        Step("front", "hold still"),
+        Step("front", "captured"),
+    ]
+
+
+def test_steps_as_lines() -> None:
+    assert Step("side", "turn", 2).text == "side: turn: 2"
+    assert Step("side", "hold still").text == "side: hold still"
+    assert measuring(0.404).text == "measuring: 40 %"

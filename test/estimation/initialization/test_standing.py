@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -20,11 +18,11 @@ CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)
 @pytest.mark.parametrize("pitch_rad", [0.0, 0.2])
 @pytest.mark.parametrize("hip_height_m", [-0.6, -0.45, -0.35])
 def test_the_height_of_the_hips_is_found(hip_height_m: float, pitch_rad: float) -> None:
-    body = BodyModel(distance_m=2.4, hip_height_m=hip_height_m, camera_pitch_rad=pitch_rad)
+    body = BodyModel.of(distance_m=2.4, hip_height_m=hip_height_m, camera_pitch_rad=pitch_rad)
     patches = cardbox_patches(body, reference_posture("front"))
     silhouette = render(patches, CAMERA.with_pitch(pitch_rad))
-    guess = replace(body, hip_height_m=-0.5)
-    assert at_height_of(silhouette, guess, CAMERA).hip_height_m == pytest.approx(
+    guess = body.with_values(hip_height_m=-0.5)
+    assert at_height_of(silhouette, guess, CAMERA).placement.hip_height_m == pytest.approx(
         hip_height_m, abs=0.03
     )
 

@@ -14,7 +14,9 @@ from visualization_msgs.msg import Marker
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.errors import CameraError, EncodingError
+from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.camera_info import calibration_from_info
@@ -112,16 +114,21 @@ def test_distorted_silhouette_is_refused() -> None:
 
 def test_joint_state_has_names_positions_and_header() -> None:
     posture = reference_posture("arms")
-    message = results.joint_state_message(HEADER, posture)
+    message = results.joint_state_message(HEADER, JointValues(JOINT_NAMES, posture))
     assert tuple(message.name) == JOINT_NAMES
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
     assert len(message.velocity) == len(message.effort) == 0
+    names, values = results.joint_values_of(message)
+    assert names == JOINT_NAMES
+    np.testing.assert_array_equal(values, posture)
 
 
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
     body, posture = BodyModel(), reference_posture("front")
-    patches, skeleton = results.markers_message(HEADER, body, CAMERA, posture).markers
+    patches, skeleton = results.markers_message(
+        HEADER, Markers(marker_shapes(body, CAMERA, posture))
+    ).markers
     corners = CAMERA.reference_to_optical(cardbox_patches(body, posture))
     assert (patches.type, len(patches.points), len(patches.colors)) == (
         Marker.TRIANGLE_LIST,
@@ -136,7 +143,21 @@ def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None
 
 def test_keypoints_are_poses_of_the_optical_frame() -> None:
     points = np.arange(18.0).reshape(6, 3)
-    message = results.keypoints_message(HEADER, points)
+    message = results.points_message(HEADER, Points(points))
     got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
     np.testing.assert_array_equal(got, points)
     assert all(pose.orientation.w == 1.0 for pose in message.poses)
+    np.testing.assert_array_equal(results.points_of(message).points_m, points)
+
+
+def test_no_markers_remove_those_before() -> None:
+    (marker,) = results.markers_message(HEADER, Markers(())).markers
+    assert marker.action == Marker.DELETEALL
+
+
+def test_every_output_has_its_message() -> None:
+    values = (JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()))
+    for value in values:
+        message = results.message_of(HEADER, value)
+        assert isinstance(message, results.message_type(type(value)))
+    assert {output.kind for output in OUTPUTS} <= {type(value) for value in values}

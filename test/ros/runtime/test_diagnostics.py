@@ -8,7 +8,14 @@ from collections.abc import Callable
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics, StreamStatistics
+from cardbox_tracker.ros.runtime.diagnostics import (
+    ERROR,
+    STATUS,
+    WAITING,
+    WORKING,
+    NodeDiagnostics,
+    StreamStatistics,
+)
 
 PERIOD_NS = 66_666_667
 
@@ -57,7 +64,7 @@ def test_the_period_is_that_of_the_latest_stamps() -> None:
 def test_stamps_that_go_back_are_noticed() -> None:
     statistics = fed(list(range(20)))
     assert not statistics.add(0)
-    assert statistics.went_back == 1
+    assert statistics.out_of_order == 1
     assert statistics.add(PERIOD_NS)
 
 
@@ -80,6 +87,22 @@ def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callab
         "latency p95 (ms)",
         "dropped (by stamps)",
     }
+
+
+def test_programs_read_the_state_of_a_node_from_a_value(make_node: Callable) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+
+    def state() -> str:
+        return {v.key: v.value for v in diagnostics._status().values}[STATUS]
+
+    diagnostics.wait_for("images")
+    assert state() == WAITING
+    diagnostics.problem("no such encoding")
+    assert state() == ERROR
+    diagnostics.working()
+    assert state() == WORKING
+    diagnostics.warn("incompatible QoS")
+    assert state() == WORKING, "a warning does not keep it from working"
 
 
 def test_a_warning_stays_until_the_end(make_node: Callable) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import pytest
 from rcl_interfaces.msg import ParameterType
@@ -21,7 +21,14 @@ from cardbox_tracker.ros.nodes.node_parameters import (
     InitializerParameters,
     TrackerParameters,
 )
-from cardbox_tracker.ros.runtime.parameters import LiveParameters, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import (
+    NEXT_IMAGE,
+    RESTARTS,
+    NodeParameters,
+    parameter,
+)
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
 from tools import parameter_docs
 
@@ -38,6 +45,8 @@ class Sample(NodeParameters):
     kind: str = parameter("a", "a kind", choices=("a", "b"))
     fixed: bool = parameter(False, "only at the start", read_only=True)
     names: list[str] = parameter([], "some names")
+    times: list[float] = parameter([], "some times")
+    fresh: float = parameter(0.5, "a renamed one", limits=(0.0, 1.0), was="stale")
 
     def check(self) -> None:
         """The ends have an order."""
@@ -81,6 +90,8 @@ def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
         ({"kind": "c"}, "kind is 'c'; expected one of a, b"),
         ({"fixed": True}, "read-only"),
         ({"low": 3.0}, "low is 3, above high 2; lower it"),
+        ({"stale": 2.0}, "out of range"),
+        ({"stale": 0.1, "fresh": 0.2}, "'stale' and 'fresh' are the old and the new name"),
     ],
 )
 def test_wrong_value_is_refused_with_the_reason_and_the_old_one_stays(
@@ -120,6 +131,8 @@ def test_values_of_the_start_are_taken(make_node: Callable) -> None:
         ("low:=3.0", ("low is 3", "lower it")),
         ("kind:=c", ("kind is 'c'", "a, b")),
         ("count:=many", ("count", "a count")),
+        ("count:=2.0", ("count", "a count")),
+        ("stale:=much", ("fresh", "a renamed one")),
     ],
 )
 def test_wrong_value_at_the_start_says_which_and_why(
@@ -130,6 +143,80 @@ def test_wrong_value_at_the_start_says_which_and_why(
         LiveParameters(node, Sample)
     for word in ("tested", *words):
         assert word in str(caught.value)
+
+
+def test_a_whole_number_is_taken_for_a_float(make_node: Callable) -> None:
+    node = make_node("-p", "low:=1", "-p", "times:=[4, 9]")
+    live = LiveParameters(node, Sample)
+    assert live.value == Sample(low=1.0, times=[4.0, 9.0])
+    assert isinstance(live.value.low, float)
+    assert set_values(node, low=2, times=[3])[0]
+    assert live.value == Sample(low=2.0, times=[3.0])
+    assert node.get_parameter("low").type_ == Parameter.Type.DOUBLE
+    assert not set_values(node, low=True)[0]
+
+
+def test_the_old_name_works_at_the_start_and_live_with_a_hint(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node("-p", "stale:=1")
+    hints: list[str] = []
+    monkeypatch.setattr(node.get_logger(), "warning", hints.append)
+    live = LiveParameters(node, Sample)
+    assert live.value == Sample(fresh=1.0)
+    assert node.get_parameter("fresh").value == 1.0
+    assert set_values(node, stale=0.25, low=0.5) == (True, "")
+    assert live.value == Sample(low=0.5, fresh=0.25)
+    assert node.get_parameter("fresh").value == 0.25
+    assert (
+        hints
+        == ["the parameter 'stale' is now called 'fresh'; the old name works in this version only"]
+        * 2
+    )
+    assert set_values(node, fresh=0.75) == (True, "")
+    assert len(hints) == 2
+
+
+def test_the_old_name_beside_the_new_one_is_refused_at_the_start(make_node: Callable) -> None:
+    node = make_node("-p", "stale:=0.1", "-p", "fresh:=0.2")
+    with pytest.raises(CardboxError, match=r"tested.*'stale' and 'fresh'.*give 'fresh' only"):
+        LiveParameters(node, Sample)
+
+
+def test_a_dumped_file_has_an_old_name_without_value(make_node: Callable, tmp_path: Path) -> None:
+    dump = tmp_path / "dump.yaml"
+    dump.write_text("/**:\n  ros__parameters:\n    fresh: 0.2\n    stale: null\n")
+    node = make_node("--params-file", str(dump))
+    assert LiveParameters(node, Sample).value == Sample(fresh=0.2)
+
+
+def test_the_tracker_still_knows_recover(make_node: Callable) -> None:
+    live = LiveParameters(make_node("-p", "recover:=always"), TrackerParameters)
+    assert live.value == TrackerParameters(relocalize="always")
+    assert live.value.config().relocalize
+
+
+@pytest.mark.parametrize(
+    ("kind", "core"),
+    [(BackgroundParameters, BackgroundConfig), (InitializerParameters, InitializationConfig)],
+)
+def test_a_setting_of_the_core_keeps_its_text_range_and_type(kind: Any, core: Any) -> None:
+    types = get_type_hints(core)
+    shared_names = settings_of(core).keys() & kind.specs().keys()
+    assert len(shared_names) >= 4
+    for name in shared_names:
+        spec, setting = kind.specs()[name], settings_of(core)[name]
+        assert (spec.description, spec.unit) == (setting.description, setting.unit)
+        assert (spec.limits, spec.choices) == (setting.limits, setting.choices)
+        assert kind.types()[name] is types[name]
+
+
+def test_what_a_live_change_does_is_that_of_the_core() -> None:
+    effects = {name: spec.effect for name, spec in TrackerParameters.specs().items()}
+    for name in ("preset", "strategy", "particles", "average", "arm_survival_rate"):
+        assert effects[name] == RESTARTS
+    for name in ("cycles", "relocalize", "lost_iou", "lost_frames"):
+        assert effects[name] == NEXT_IMAGE
 
 
 @pytest.mark.parametrize("kind", NODES.values(), ids=NODES.keys())
@@ -204,10 +291,10 @@ def test_tracker_settings_override_the_preset() -> None:
         particles=50,
         arm_survival_rate=0.3,
         torso_translation_noise_m=0.05,
-        recover="always",
+        relocalize="always",
     ).config()
     assert isinstance(config, TrackerConfig)
-    assert config.strategy == "srs" and config.recover
+    assert config.strategy == "srs" and config.relocalize
     assert config.torso.particles == config.arm.particles == 50
     assert config.arm.survival_rate == 0.3
     assert config.torso.survival_rate == TrackerConfig().torso.survival_rate

@@ -1,0 +1,43 @@
+"""The outcome of an initialization as a message that programs can read, and back."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from cardbox_tracker.estimation.initialization.measure import InitializationResult
+
+_NAME = "initialization"
+_HARDWARE_ID = "cardbox_tracker"
+_MEAN_IOU = "mean iou"
+
+
+def measured_message(result: InitializationResult, text: str) -> DiagnosticStatus:
+    """Return level OK, ``text``, and the fit: ``mean iou``, and ``iou`` of each reference."""
+    values = {_MEAN_IOU: result.mean_iou}
+    values |= {f"iou {name}": iou for name, iou in result.iou.items()}
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=_NAME,
+        message=text,
+        hardware_id=_HARDWARE_ID,
+        values=[KeyValue(key=key, value=f"{value:.4f}") for key, value in values.items()],
+    )
+
+
+def refused_message(text: str) -> DiagnosticStatus:
+    """Return level ERROR and ``text``, what was wrong."""
+    return DiagnosticStatus(
+        level=DiagnosticStatus.ERROR, name=_NAME, message=text, hardware_id=_HARDWARE_ID
+    )
+
+
+def mean_iou_of(message: DiagnosticStatus) -> float:
+    """Return the mean fit of the references, 0 to 1.
+
+    Raises:
+        ValueError: the initialization failed; the text says why.
+    """
+    values = {entry.key: entry.value for entry in message.values}
+    if _MEAN_IOU not in values:
+        raise ValueError(message.message)
+    return float(values[_MEAN_IOU])

@@ -1,0 +1,110 @@
+"""The parameters of the tracker, in which 0 or ``preset`` means that the chosen preset decides."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
+from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+from cardbox_tracker.ros.runtime.parameter_fields import (
+    RESTARTS,
+    NodeParameters,
+    parameter,
+    shared,
+)
+from cardbox_tracker.settings import settings_of
+
+_NEXT_START = "next start of tracking"
+
+
+def _of_preset(kind: type[FilterConfig] | type[TrackerConfig], name: str, part: str = "") -> Any:
+    """Return a parameter for a setting of which 0 means that the preset decides."""
+    core = settings_of(kind)[name]
+    return shared(
+        kind,
+        name,
+        default=type(getattr(kind, name))(0),
+        description=f"{part}{core.description}; 0: preset",
+        limits=(0, core.maximum),
+    )
+
+
+@dataclass(frozen=True)
+class TrackerParameters(NodeParameters):
+    """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
+
+    preset: str = parameter(
+        "default",
+        "paper: its Table I; default: what tracks best",
+        choices=tuple(PRESETS),
+        effect=RESTARTS,
+    )
+    strategy: str = shared(
+        TrackerConfig, "strategy", default="preset", choices=("preset", *STRATEGIES)
+    )
+    particles: int = _of_preset(FilterConfig, "particles")
+    cycles: int = _of_preset(TrackerConfig, "cycles")
+    average: int = _of_preset(TrackerConfig, "average")
+    torso_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "torso: ")
+    arm_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "arms: ")
+    torso_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "torso: ")
+    torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
+    arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
+    relocalize: str = shared(
+        TrackerConfig,
+        "relocalize",
+        default="preset",
+        choices=("preset", "always", "never"),
+        was="recover",
+    )
+    lost_iou: float = shared(TrackerConfig, "lost_iou")
+    lost_frames: int = shared(TrackerConfig, "lost_frames")
+    seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1), effect=_NEXT_START)
+    model_file: str = parameter(
+        "",
+        "body model to start with; one that arrives on body_model replaces it; empty: none",
+        read_only=True,
+    )
+    rep155_id: str = parameter(
+        "",
+        "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
+        "this ID of letters, digits and underscores; empty: do not",
+        read_only=True,
+    )
+
+    def config(self) -> TrackerConfig:
+        """Return the settings of the core; raises ValueError where they do not go together."""
+        base = PRESETS[self.preset]()
+        if self.particles:
+            base = base.with_particles(self.particles)
+        return replace(
+            base,
+            torso=self._filter(base.torso, "torso"),
+            arm=self._filter(base.arm, "arm"),
+            strategy=base.strategy if self.strategy == "preset" else self.strategy,
+            cycles=self.cycles or base.cycles,
+            average=self.average or base.average,
+            relocalize=(
+                base.relocalize if self.relocalize == "preset" else self.relocalize == "always"
+            ),
+            lost_iou=self.lost_iou,
+            lost_frames=self.lost_frames,
+        )
+
+    def _filter(self, base: FilterConfig, part: str) -> FilterConfig:
+        given = {
+            entry.name: getattr(self, f"{part}_{entry.name}", 0) for entry in fields(FilterConfig)
+        }
+        chosen: dict[str, Any] = {name: value for name, value in given.items() if value}
+        return replace(base, **chosen)
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        self.config()
+        if self.rep155_id and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.rep155_id):
+            raise ValueError(
+                f"rep155_id is '{self.rep155_id}'; expected a letter, then letters, digits and "
+                "underscores, as topics need"
+            )

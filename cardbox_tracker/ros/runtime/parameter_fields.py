@@ -1,0 +1,110 @@
+"""Dataclass fields that become parameters of a node, and how ROS describes them.
+
+A field made by :func:`parameter` carries its description, unit, range or choices, and what a change
+does while the node runs; one made by :func:`shared` takes most of that from a setting of the core.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, get_type_hints
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
+from cardbox_tracker.settings import Setting, settings_of
+
+NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
+"""What a live change does: it holds from the next image on, or tracking starts again."""
+
+
+@dataclass(frozen=True)
+class ParameterSpec(Setting):
+    """What is known of one parameter besides its name, type and default.
+
+    Attributes:
+        read_only: True if it can only be given at the start.
+        effect: when a live change takes effect.
+        was: name of the version before, which still works; empty if it was not renamed.
+    """
+
+    read_only: bool = False
+    effect: str = NEXT_IMAGE
+    was: str = ""
+
+
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    limits: tuple[float, float] | None = None,
+    choices: tuple[str, ...] = (),
+    read_only: bool = False,
+    effect: str = NEXT_IMAGE,
+    was: str = "",
+) -> Any:
+    """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
+    lowest, highest = limits or (None, None)
+    spec = ParameterSpec(
+        *(description, unit, lowest, highest, choices, effect == RESTARTS),
+        *(read_only, effect, was),
+    )
+    if isinstance(default, list):
+        return field(default_factory=list, metadata={"setting": spec})
+    return field(default=default, metadata={"setting": spec})
+
+
+def shared(kind: Any, name: str, **changes: Any) -> Any:
+    """Return a field for the setting ``name`` of the core dataclass ``kind``.
+
+    Default, description, unit, range and choices are those of the core; ``changes`` are arguments
+    of :func:`parameter` that differ, such as a default.
+    """
+    core = settings_of(kind)[name]
+    given = {
+        "default": getattr(kind, name),
+        "description": core.description,
+        "unit": core.unit,
+        "limits": core.limits,
+        "choices": core.choices,
+        "effect": RESTARTS if core.restarts else NEXT_IMAGE,
+    }
+    return parameter(**(given | changes))
+
+
+@dataclass(frozen=True)
+class NodeParameters:
+    """Base of the parameter dataclasses; every field is made by :func:`parameter`."""
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together; ranges are checked before."""
+
+    @classmethod
+    def specs(cls) -> dict[str, ParameterSpec]:
+        """Return the specification of every parameter by name, in order."""
+        return {entry.name: entry.metadata["setting"] for entry in fields(cls)}
+
+    @classmethod
+    def types(cls) -> dict[str, Any]:
+        """Return the Python type of every parameter by name."""
+        hints = get_type_hints(cls)
+        return {entry.name: hints[entry.name] for entry in fields(cls)}
+
+
+def descriptor(spec: ParameterSpec, type_: Any) -> ParameterDescriptor:
+    """Return the ROS descriptor of a parameter, so that tools can show and check it."""
+    unit = f" [{spec.unit}]" if spec.unit else ""
+    message = ParameterDescriptor(
+        description=f"{spec.description}{unit}",
+        read_only=spec.read_only,
+        additional_constraints=f"one of: {spec.range_text}" if spec.choices else "",
+    )
+    if spec.minimum is not None and spec.maximum is not None:
+        if type_ is int:
+            limits = IntegerRange(from_value=int(spec.minimum), to_value=int(spec.maximum))
+            message.integer_range = [limits]
+        else:
+            message.floating_point_range = [
+                FloatingPointRange(from_value=float(spec.minimum), to_value=float(spec.maximum))
+            ]
+    return message

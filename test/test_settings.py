@@ -1,0 +1,86 @@
+"""A setting is declared once, with its text, unit and range, and checked by that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker import settings
+from cardbox_tracker.estimation.config import FilterConfig, TrackerConfig
+from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.settings import Setting, setting
+from cardbox_tracker.vision.background import BackgroundConfig
+
+CORE = (BackgroundConfig, InitializationConfig, FilterConfig, TrackerConfig)
+
+
+@dataclass(frozen=True)
+class Inner:
+    depth: int = setting(1, "a depth", limits=(0, 5))
+
+
+@dataclass(frozen=True)
+class Sample:
+    inner: Inner = Inner()
+    ratio: float = setting(0.5, "a ratio", unit="m", limits=(0.0, 1.0), restarts=True)
+    kind: str = setting("a", "a kind", choices=("a", "b"))
+    limit: int | None = setting(3, "a limit", limits=(0, 10))
+
+
+def test_settings_are_found_in_order_and_plain_fields_are_none() -> None:
+    found = settings.settings_of(Sample)
+    assert list(found) == ["ratio", "kind", "limit"]
+    assert found["ratio"] == Setting("a ratio", "m", 0.0, 1.0, (), True)
+    assert [one.range_text for one in found.values()] == ["0 to 1", "a | b", "0 to 10"]
+    assert Setting("any").range_text == ""
+
+
+@given(st.floats(allow_nan=True, allow_infinity=True))
+def test_exactly_what_lies_in_the_range_is_allowed(value: float) -> None:
+    sample = Sample(ratio=value)
+    if 0.0 <= value <= 1.0:
+        settings.check(sample)
+    else:
+        with pytest.raises(ValueError, match=r"ratio is .*; expected 0 to 1"):
+            settings.check(sample)
+
+
+def test_choices_and_values_that_are_not_set() -> None:
+    settings.check(Sample(limit=None))
+    with pytest.raises(ValueError, match="kind is 'c'; expected one of a, b"):
+        settings.check(Sample(kind="c"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, False),
+        ({"kind": "b", "limit": None}, False),
+        ({"ratio": 0.6}, True),
+        ({"inner": Inner(2)}, True),
+    ],
+)
+def test_only_what_must_restarts(changes: dict[str, Any], expected: bool) -> None:
+    assert settings.restarts(Sample(), replace(Sample(), **changes)) is expected
+
+
+@pytest.mark.parametrize("kind", CORE)
+def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
+    plain = {"torso", "arm"} if kind is TrackerConfig else set()
+    assert {f for f in kind.__dataclass_fields__ if f not in plain} == set(
+        settings.settings_of(kind)
+    )
+    for name, one in settings.settings_of(kind).items():
+        assert one.description and not one.description.endswith(".")
+        default = getattr(kind, name)
+        one.check(name, default)
+        if isinstance(default, float):
+            assert one.limits is not None, name
+        if one.limits is not None:
+            for wrong in (one.limits[0] - 1, one.limits[1] + 1):
+                with pytest.raises(ValueError, match=name):
+                    kind(**{name: type(default)(wrong)})
