@@ -105,7 +105,11 @@ class Place(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of one call for K patches and so many rows."""
+    """Scratch of one call for K patches and so many rows.
+
+    Functions that are inlined take all of it; the others take the arrays they need, for handing
+    over all of them makes a call dear.
+    """
 
     shape: Floats
     """(3, 4 K): corners in the frame of the part, metres."""
@@ -580,14 +584,20 @@ def _sum_four(
 
 @_compile
 def _sum_many(
-    work: Workspace, n: int, v: int, end_row: int, row_sums: RowSums
+    sides: Whole,
+    active: Counts,
+    n: int,
+    v: int,
+    end_row: int,
+    row_sums: RowSums,
+    starts: Whole,
+    ends: Whole,
 ) -> tuple[np.int64, np.int64]:
     """Sum (1 - 2 f) over the union of ``n`` patches in rows that all of them meet; also its area.
 
     The patches of one part come one after the other and overlap, so most rows need no more than
     joining each to the one before; what does not join is kept, in order, for a sweep.
     """
-    sides, active, starts, ends = work.sides, work.active, work.starts, work.ends
     total = np.int64(0)
     area = np.int64(0)
     for row in range(_index(v), _index(end_row)):
@@ -647,7 +657,9 @@ def _sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64
                     active[n_active] = k
                     n_active += 1
         if n_active > 4:
-            gain, covered = _sum_many(work, n_active, v, band_end, row_sums)
+            gain, covered = _sum_many(
+                sides, active, n_active, v, band_end, row_sums, work.starts, work.ends
+            )
             total += gain
             area += covered
         elif n_active > 2:
@@ -704,12 +716,11 @@ def trunk_costs(
 
 
 @_compile
-def _cover(work: Workspace, row_sums: RowSums, covered: RowSums) -> None:
+def _cover(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowSums) -> None:
     """Write the row sums without the gain of the pixels under the patches to ``covered``.
 
     Over a run they stay level, and behind it they are lower by what the run gave.
     """
-    sides, extent = work.sides, work.extent
     rows, columns = row_sums.shape
     for v in range(_index(rows)):
         for u in range(_index(columns)):
@@ -742,7 +753,7 @@ def cover_trunk(
     _torso_pose(torso, Place(*place), View(*view), work.torso, work.hip)
     _place_trunk(work)
     _draw(work, View(*view), rows, width)
-    _cover(work, row_sums, covered)
+    _cover(work.sides, work.extent, row_sums, covered)
     gain: np.int64 = _sum_union(work, TRUNK_PATCHES, row_sums)[0]
     return gain
 
@@ -766,7 +777,7 @@ def cover_arms(
         _shape_arm(parts, first, work.shape)
         _place_arm(work, first, _angles_of_arm(posture, arm), _side(arm), parts, shoulder)
     _draw(work, View(*view), rows, width)
-    _cover(work, row_sums, covered)
+    _cover(work.sides, work.extent, row_sums, covered)
     gain: np.int64 = _sum_union(work, 2 * ARM_PATCHES, row_sums)[0]
     return gain
 
