@@ -1,4 +1,4 @@
-"""Draw what a person shall do, to be read from two metres away: an outline and large text."""
+"""Draw what a person has to do, to be read from two metres away: an outline and large text."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class AllNodes:
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:
-            # It keeps the time of the recording, whatever the others do.
+            # In a thread of its own, so that it keeps the time of the recording.
             self._playing = threading.Thread(target=partial(_play, self._player), daemon=True)
             self._playing.start()
         executor.spin()
@@ -75,7 +75,7 @@ class AllNodes:
     def close(self) -> None:
         """Release what the nodes hold, the source first."""
         if self._playing is not None:
-            # It notices the end of ROS; a thread that still used it would abort the process.
+            # The player ends with ROS; a thread that used ROS afterwards would abort the process.
             try_shutdown()
             self._playing.join(timeout=_STOP_S)
         if self._player is not None:
@@ -92,7 +92,7 @@ def _play(player: PlayBagNode) -> None:
     except ExternalShutdownException:
         pass
     except Exception:
-        # As in every node: what fails because ROS ends is no error.
+        # As in every node, exceptions while ROS shuts down are expected.
         if player.context.ok():
             raise
 

@@ -78,7 +78,7 @@ class CardboxNode(Node):
     ) -> None:
         """Take the messages of a topic, handed over where a node of this process offers it.
 
-        What ``callback`` raises is reported and the node goes on.
+        An exception in ``callback`` is reported, and the node continues.
         """
 
         def guarded(message: Any, info: dict[str, Any]) -> None:
@@ -130,7 +130,7 @@ class CardboxNode(Node):
 
     def _unexpected(self, where: str, error: Exception) -> None:
         if not self.context.ok():
-            return  # a signal ended the node in the middle of it
+            return  # a signal is ending the node
         self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
         self.get_logger().debug(traceback.format_exc())
 
@@ -157,8 +157,8 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
     node: N | None = None
     try:
         node = create()
-        # What was made so far stays, compiled code above all; looking through it for garbage in the
-        # middle of an image takes a tenth of a second.
+        # Objects made so far stay as long as the process, compiled code above all; a garbage
+        # collection that visits them takes a tenth of a second.
         gc.collect()
         gc.freeze()
         work(node)
@@ -168,7 +168,7 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except Exception:
-        # A signal ends ROS in the midst of whatever runs; what then fails is no error.
+        # A signal shuts ROS down at any point; exceptions that follow from it are expected.
         if ok():
             raise
     finally:
