@@ -6,10 +6,12 @@ from setuptools import find_packages, setup
 
 NAME = "cardbox_tracker"
 SHARE = f"share/{NAME}"
+HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # On a ROS installation these come with it, so pip installs them only when asked to.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 TEST = [
+    "catkin_pkg>=1.0",
     "hypothesis>=6.100",
     "mcap>=1.2",
     "mcap-ros2-support>=0.5.4",
@@ -31,6 +33,20 @@ setup(
     maintainer="cardbox_tracker maintainers",
     maintainer_email="maintainers@cardbox-tracker.invalid",
     license="Apache-2.0",
+    url=HOME,
+    project_urls={"Source": HOME, "Tracker": f"{HOME}/issues"},
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Developers",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        "Programming Language :: Python :: 3.11",
+        "Programming Language :: Python :: 3.12",
+        "Programming Language :: Python :: 3.13",
+        "Topic :: Scientific/Engineering :: Image Recognition",
+        "Typing :: Typed",
+    ],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
     zip_safe=False,

@@ -2,6 +2,117 @@
 
 The folders follow the data: :mod:`.body` is what a person is, :mod:`.vision` what the camera sees,
 :mod:`.estimation` how a posture is found, :mod:`.ros` the nodes around it.
+
+The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported when it is
+first used, so that ``import cardbox_tracker`` costs nothing.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.body.model_file import load_body_model, save_body_model
+    from cardbox_tracker.body.posture import JOINT_NAMES
+    from cardbox_tracker.errors import (
+        BagError,
+        BodyModelError,
+        CameraError,
+        CardboxError,
+        EncodingError,
+        InitializationError,
+        RosMissingError,
+    )
+    from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
+    from cardbox_tracker.estimation.initialization.measure import (
+        InitializationConfig,
+        InitializationResult,
+        initialize_body,
+    )
+    from cardbox_tracker.estimation.tracker import Estimate, Tracker
+    from cardbox_tracker.vision.background import (
+        BackgroundConfig,
+        BackgroundLearner,
+        BackgroundModel,
+        SilhouetteExtractor,
+    )
+    from cardbox_tracker.vision.camera import Calibration, Camera, load_calibration
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "JOINT_NAMES",
+    "KEYPOINT_NAMES",
+    "PRESETS",
+    "BackgroundConfig",
+    "BackgroundLearner",
+    "BackgroundModel",
+    "BagError",
+    "BodyModel",
+    "BodyModelError",
+    "Calibration",
+    "Camera",
+    "CameraError",
+    "CardboxError",
+    "EncodingError",
+    "Estimate",
+    "InitializationConfig",
+    "InitializationError",
+    "InitializationResult",
+    "RosMissingError",
+    "SilhouetteExtractor",
+    "Tracker",
+    "TrackerConfig",
+    "initialize_body",
+    "load_body_model",
+    "load_calibration",
+    "save_body_model",
+]
+
+_MODULES = {
+    "body.kinematics": ("KEYPOINT_NAMES",),
+    "body.model": ("BodyModel",),
+    "body.model_file": ("load_body_model", "save_body_model"),
+    "body.posture": ("JOINT_NAMES",),
+    "errors": (
+        "BagError",
+        "BodyModelError",
+        "CameraError",
+        "CardboxError",
+        "EncodingError",
+        "InitializationError",
+        "RosMissingError",
+    ),
+    "estimation.config": ("PRESETS", "TrackerConfig"),
+    "estimation.initialization.measure": (
+        "InitializationConfig",
+        "InitializationResult",
+        "initialize_body",
+    ),
+    "estimation.tracker": ("Estimate", "Tracker"),
+    "vision.background": (
+        "BackgroundConfig",
+        "BackgroundLearner",
+        "BackgroundModel",
+        "SilhouetteExtractor",
+    ),
+    "vision.camera": ("Calibration", "Camera", "load_calibration"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of ``__all__`` when it is first used (PEP 562)."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the Python interface, also before it is imported."""
+    return sorted({*globals(), *__all__})

@@ -6,6 +6,7 @@ CardboxError
     EncodingError        an image's encoding or its bytes
     InitializationError  the reference silhouettes cannot give a body
     BagError             a recording that cannot be read or written
+    RosMissingError      ROS 2 is not installed
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -121,3 +123,15 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
     known = modules(tmp_path)
     with pytest.raises(CycleError):
         TopologicalSorter({m: imports(p, known) for m, p in known.items()}).prepare()
+
+
+def test_the_document_has_the_layers_in_this_order() -> None:
+    text = (SOURCES.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = text.split("| layer | what |")[1].split("\n\n")[0]
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    named = [name for row in rows for name in re.findall(r"`(\w+)(?:/|\.py)`", row)]
+    written = list(dict.fromkeys(named))
+    layers = [name for layer in LAYERS for name in layer]
+    assert sorted(written) == sorted(layers)
+    for name, other in pairwise(written):
+        assert rank(name, LAYERS, 0) <= rank(other, LAYERS, 0), f"{other} stands below {name}"

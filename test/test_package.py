@@ -37,9 +37,9 @@ MESSAGES = (
 ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
 
 # One concept a module. Beyond it: the compiled inner loop, which would only be longer in parts, and
-# two that are lists, of options and of a report's paragraphs.
+# one that is a list, of a report's paragraphs.
 MAX_LINES = 310
-LONGER = ("estimation/cost/kernels.py", "evaluation/paper/report.py", "commands/main.py")
+LONGER = ("estimation/cost/kernels.py", "evaluation/paper/report.py")
 MAX_NODE_LINES = 200
 
 
@@ -83,10 +83,41 @@ def test_versions_agree() -> None:
     assert re.fullmatch(r"\d+\.\d+\.\d+", version)
     assert setup_arguments()["version"] == version
     assert package_xml().findtext("version") == version
-    headings = re.findall(
-        r"^(\S+)\n-+$", (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8"), re.MULTILINE
-    )
-    assert headings[0] == version
+    released = [heading.split()[0] for heading in changelog_headings() if heading != FORTHCOMING]
+    assert released[0] == version
+
+
+FORTHCOMING = "Forthcoming"
+
+
+def changelog_headings() -> list[str]:
+    text = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    return [
+        heading
+        for heading, line in re.findall(r"^(\S.*)\n(-+)$", text, re.MULTILINE)
+        if len(heading) == len(line)
+    ]
+
+
+def test_the_changelog_has_the_form_of_rep_132() -> None:
+    first, *rest = changelog_headings()
+    assert rest, "no version was released"
+    for heading in [first, *rest] if first != FORTHCOMING else rest:
+        assert re.fullmatch(r"\d+\.\d+\.\d+ \(\d{4}-\d{2}-\d{2}\)", heading)
+
+
+@pytest.mark.filterwarnings("ignore:nodes.Node.traverse:DeprecationWarning")
+def test_catkin_reads_changelog_and_manifest() -> None:
+    changelog = pytest.importorskip("catkin_pkg.changelog", reason="catkin_pkg is not installed")
+    package = pytest.importorskip("catkin_pkg.package", reason="catkin_pkg is not installed")
+    versions = list(changelog.get_changelog_from_path(str(ROOT)).foreach_version())
+    # What is forthcoming is no version yet.
+    headings = [heading.split()[0] for heading in changelog_headings() if heading != FORTHCOMING]
+    assert [version for version, _, _ in versions] == headings
+    assert all(content for _, _, content in versions)
+    warnings: list[str] = []
+    assert package.parse_package(str(ROOT / "package.xml"), warnings=warnings).name
+    assert warnings == []
 
 
 def test_names_and_licence_agree() -> None:
@@ -101,6 +132,10 @@ def test_names_and_licence_agree() -> None:
     assert arguments["maintainer"] == maintainer.text
     assert arguments["maintainer_email"] == maintainer.get("email")
     assert xml.findtext("export/build_type") == "ament_python"
+    urls = {url.get("type"): url.text for url in xml.findall("url")}
+    assert set(urls) == {"website", "repository", "bugtracker"}
+    assert arguments["url"] == urls["website"]
+    assert set(arguments["project_urls"].values()) == {urls["repository"], urls["bugtracker"]}
 
 
 @pytest.mark.parametrize(
@@ -187,18 +222,40 @@ def test_modules_are_short_and_say_what_they_are(path: Path) -> None:
         assert len(text.splitlines()) <= MAX_LINES
 
 
+def outside(folder: Path) -> set[str]:
+    """Return the packages that the Python files of a folder import from elsewhere."""
+    files = folder.rglob("*.py")
+    names = {name.split(".")[0] for path in files for name in imported_by(path)}
+    return names - set(sys.stdlib_module_names) - {"cardbox_tracker", "tools"}
+
+
 def test_what_is_imported_is_declared() -> None:
     distributions = {"cv2": "opencv-python-headless", "yaml": "pyyaml"}
-    imports = {
-        name.split(".")[0] for path in SOURCES.rglob("*.py") for name in imported_by(path)
-    } - set(sys.stdlib_module_names)
-    imports -= {"cardbox_tracker", "ament_index_python", "launch", "launch_ros"}
+    from_ros = {"rclpy", "ament_index_python", "launch", "launch_ros", *MESSAGES}
     in_xml = {element.text for element in package_xml().findall("exec_depend")}
-    for name in sorted(imports):
-        if name in ("rclpy", *MESSAGES):
+    for name in sorted(outside(SOURCES) | outside(ROOT / "launch") | outside(ROOT / "tools")):
+        if name in from_ros:
             assert name in in_xml, f"{name} is not in package.xml"
         else:
             assert distributions.get(name, name).lower() in declared(), f"{name} is not in setup.py"
+
+
+def test_what_launch_files_start_is_declared() -> None:
+    in_xml = {element.text for element in package_xml().findall("exec_depend")}
+    for path in (ROOT / "launch").glob("*.py"):
+        started = set(re.findall(r'package="(\w+)"', path.read_text(encoding="utf-8")))
+        assert started <= in_xml | {"cardbox_tracker"}, path.name
+
+
+def test_what_tests_import_is_declared() -> None:
+    keys = {"setuptools": "python3-setuptools", "yaml": "python3-yaml", "cv2": "python3-opencv"}
+    in_xml = {
+        element.text
+        for kind in ("exec_depend", "test_depend")
+        for element in package_xml().findall(kind)
+    }
+    for name in sorted(outside(ROOT / "test")):
+        assert in_xml & {name, keys.get(name, f"python3-{name}")}, f"{name} is not in package.xml"
 
 
 def test_what_pip_requires_rosdep_requires() -> None:

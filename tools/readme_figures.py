@@ -24,12 +24,18 @@ BENCHMARKS = Path("docs/benchmarks.json")
 
 
 def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the text between the marks, from ``results.json`` of all and of each session."""
+    """Return the text between the marks.
+
+    Args:
+        results: ``results.json`` of the synthetic motions.
+        recorded: the same of each recorded session, by name.
+    """
     quick = " (a quick run)" if results["quick"] else ""
     lines = [
         *_wrapped(
-            f"Mean over {results['runs']} runs{quick} with the paper's parameters on a synthetic "
-            "person, exact truth; DRS is the paper's resampling, SRS what it is compared with:"
+            f"Means over {results['runs']} runs{quick} with the paper's settings on images of a "
+            "synthetic person, whose posture is known exactly. DRS is the paper's resampling, SRS "
+            "the one it is compared with:"
         ),
         "",
         "| motion | 3D error DRS | SRS | hands DRS | SRS | cost DRS | SRS |",
@@ -40,12 +46,18 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
         lines += [_row(f"{m} ({name})", session[m]) for m in motions_in(session)]
     variants = results["experiments"]["variants"]
     error = {name: _cm(variants[name]["mean"]["mpjpe_m"]) for name in ("paper", "default")}
-    text = "3D error: mean distance of shoulders, elbows and hands. "
+    text = (
+        "3D error: mean distance of the estimated shoulders, elbows and hands from the true ones. "
+    )
     if recorded:
-        text += "Rows with a session's name are recordings of a realistic body. "
+        runs = " and ".join(sorted({str(session["runs"]) for session in recorded.values()}))
+        text += (
+            f"{_listed(list(recorded))} are images of rendered, realistically shaped bodies, not "
+            f"films of people ({runs} runs). "
+        )
     text += (
-        "With the preset `default` instead of the paper's the error on the synthetic motions is "
-        f"{error['default']} instead of {error['paper']}."
+        "With the preset `default` the 3D error over the three synthetic motions is "
+        f"{error['default']}; with the preset `paper`, run equally often, {error['paper']}."
     )
     lines += ["", *_wrapped(text)]
     return "\n".join(lines)
@@ -91,6 +103,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, 100, break_long_words=False, break_on_hyphens=False)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the names as part of a sentence."""
+    return " and ".join(f"`{name}`" for name in names)
 
 
 def _row(name: str, motion: Mapping[str, Any]) -> str:

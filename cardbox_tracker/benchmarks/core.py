@@ -29,9 +29,9 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.posture import N_JOINTS, clip_to_limits, reference_posture
 from cardbox_tracker.body.volumetric import volumetric_faces
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.evaluation.paper.models import make_cost
+from cardbox_tracker.evaluation.paper.models import make_silhouette_term
 
 RESOLUTIONS = ((160, 120), (320, 240), (640, 480), (1280, 960))
 PARTICLES = (60, 300, 600, 3000, 6000, 12_000, 20_001, 30_000, 60_000)
@@ -45,8 +45,8 @@ def follow(
     scene: BenchmarkScene, config: TrackerConfig, cost: str = "compiled"
 ) -> Callable[[int], object]:
     """Return what tracks the ``i``-th silhouette of ``scene``, the arms one after the other."""
-    made = make_cost(cost, scene.body, scene.camera)
-    tracker = Tracker(scene.body, scene.camera, one_core(config), cost=made)
+    made = make_silhouette_term(cost, scene.body, scene.camera)
+    tracker = Tracker(scene.body, scene.camera, one_core(config), silhouette=made)
     return partial(_track, tracker, scene)
 
 
@@ -148,14 +148,13 @@ def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30
         name: np.ascontiguousarray(scene.camera.reference_to_optical(make(scene.body, postures)))
         for name, make in (("cardbox", cardbox_patches), ("volumetric", volumetric_faces))
     }
-    cost = CompiledCost(scene.body, scene.camera)
-    cost.observe(scene.silhouettes[0])
+    seen = CompiledSilhouette(scene.body, scene.camera).look(scene.silhouettes[0])
     ratios = []
     for turn in range(rounds + 1):
         seconds = {}
         for name, planes in corners.items():
             start = time.perf_counter()
-            cost.polygons(planes)
+            seen.polygons(planes)
             seconds[name] = time.perf_counter() - start
         if turn > 0:
             ratios.append(seconds["volumetric"] / seconds["cardbox"])

@@ -86,13 +86,13 @@ class _CameraAndListener:
         from sensor_msgs.msg import CameraInfo, Image, JointState
 
         from cardbox_tracker.ros.runtime import qos
-        from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+        from cardbox_tracker.ros.runtime.static_executor import make_executor
 
         self._nodes = nodes
         self._processes = processes
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_benchmark", enable_rosout=False)
-        self._executor = StaticExecutor()
+        self._executor = make_executor()
         self._executor.add_node(self._node)
         self._image = self._node.create_publisher(Image, "image_raw", qos.CAMERA)
         self._info = self._node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)

@@ -36,33 +36,33 @@ def report(results: Mapping[str, Any]) -> str:
         "# Benchmarks",
         f"Made by `{COMMAND}` on {results['cpu']} with {results['cores']} cores; {versions}; "
         f"commit {results['commit']}. Numbers: [benchmarks.json](benchmarks.json).",
-        "Everything in the first four tables is pinned to one core unless it says otherwise, and "
-        f"what is compared takes turns of ten images, {results['measured_frames']} in all: a "
-        "synthetic person who waves, 320x240. p95 is the 95th percentile.",
-        "## A frame",
+        "The first four tables were measured on one core unless they say otherwise, on "
+        f"{results['measured_frames']} images (320x240) of a synthetic person who waves. What is "
+        "compared takes turns of ten images. p95 is the 95th percentile.",
+        "## One image",
         _table(
             ("600 particles unless the preset says otherwise", "median", "p95"),
             [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
         ),
-        f"The compiled cost makes a frame {results['ratio_opencv']:.0f} times faster than "
-        "`fillConvexPoly`, XOR and `countNonZero` do. With equal, compiled tools the box model of "
-        f"42 planes takes {results['ratio_volumetric']:.1f} times as long as the cardbox with its "
-        f"15. {_mediapipe(results)} The process holds {results['rss_mb']:.0f} MB.",
+        f"The compiled cost makes an image {results['ratio_opencv']:.0f} times faster than "
+        "`fillConvexPoly`, XOR and `countNonZero` do. Drawn by the same compiled code, the "
+        f"volumetric model of 42 planes takes {results['ratio_volumetric']:.1f} times as long as "
+        f"the cardbox model of 15. {_mediapipe(results)} The process holds "
+        f"{results['rss_mb']:.0f} MB.",
         "## Stages",
         _table(
-            ("step of a frame", "median", "p95"),
+            ("step", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["stages"].items()],
         ),
         "## Resolution",
-        "A particle costs the rows of its outline, not its area: twice the width and height cost "
-        f"{results['ratio_double_resolution']:.2f} times as much.",
+        "The time of a particle grows with the rows of its outline, not with its area: twice the "
+        f"width and height take {results['ratio_double_resolution']:.2f} times as long.",
         _table(
             ("image", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
         "## Particles",
-        f"{results['particles_at_30hz']:,} particles a frame fit into a thirtieth of a second on "
-        "two cores.",
+        f"Two cores manage {results['particles_at_30hz']:,} particles per image at 30 Hz.",
         _table(
             ("particles in all filters", "one core", "two cores"),
             [
@@ -72,11 +72,11 @@ def report(results: Mapping[str, Any]) -> str:
         ),
         _parallel(results["parallel_arms"]),
         *_nodes(results["nodes"]),
-        "A live node waits between images, and meanwhile the processor slows down and its caches "
-        "are given away: from image to posture, preset `default`, one frame takes "
-        f"{results['after_pauses']['without_ms']:.1f} ms right after the other and "
-        f"{results['after_pauses']['with_ms']:.1f} ms after a pause of a thirtieth of a second, on "
-        "the same core. The rest of a latency is DDS and the waking of processes.",
+        "A live node waits between images; meanwhile the processor slows down and its caches lose "
+        "the node's data. Image to posture, preset `default`, takes "
+        f"{results['after_pauses']['without_ms']:.1f} ms if images follow each other without a "
+        f"pause, and {results['after_pauses']['with_ms']:.1f} ms after a pause of a thirtieth of a "
+        "second, on the same core. The rest of the latency is DDS and the waking of processes.",
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -85,24 +85,30 @@ def readme_section(results: Mapping[str, Any]) -> str:
     """Return the README's table of speed."""
     rows = [
         (
-            "a frame, silhouette to posture, 600 particles, one core",
+            "silhouette to posture, 600 particles, one core",
             _ms(results["frames"]["paper"])[0],
         ),
         (
-            "faster than drawing the same patches with OpenCV",
-            f"{results['ratio_opencv']:.0f} times",
+            "the same with OpenCV drawing the patches takes",
+            f"{results['ratio_opencv']:.0f} times as long",
         ),
     ]
     if results["ratio_mediapipe"] is not None:
         measured = results["mediapipe"]
         rows += [
-            ("faster than MediaPipe Pose (full), one core", f"{measured['ratio']:.0f} times"),
             (
-                "the same with our silhouette's time counted too",
-                f"{measured['ratio_from_image']:.1f} times",
+                "MediaPipe Pose (full) on the same synthetic images, one core, takes (it finds a "
+                f"person in {100 * measured['found']:.0f} % of them)",
+                f"{measured['ratio']:.0f} times as long",
+            ),
+            (
+                "the same, compared with image to posture",
+                f"{measured['ratio_from_image']:.1f} times as long",
             ),
         ]
-    rows.append(("particles a frame at 30 Hz, two cores", f"{results['particles_at_30hz']:,}"))
+    rows.append(
+        ("particles per image that two cores manage at 30 Hz", f"{results['particles_at_30hz']:,}")
+    )
     nodes = results["nodes"]
     for words, measured in (
         (("all nodes in one process", nodes["single_process"]), ("each in its own", nodes))
@@ -120,10 +126,10 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
         return ["## Nodes", "Not measured: ROS 2 was not installed."]
     return [
         "## Nodes",
-        "From the image's stamp until a subscriber's callback, in Python, has the JointState, over "
-        "DDS, preset `default`; in brackets until it had arrived in the subscriber's process. The "
-        "publisher shares the machine. Large images use `config/fastdds_large_images.xml`. "
-        "Processor time is in percent of one core.",
+        "Time from the image's stamp until the callback of a Python subscriber has the JointState, "
+        "over DDS, preset `default`; in brackets until the message is in the subscriber's process. "
+        "The publisher runs on the same machine. Large images use "
+        "`config/fastdds_large_images.xml`. Processor time is in percent of one core.",
         "### Each node a process of its own",
         *_streams(nodes),
         "### All nodes in one process (`cardbox_nodes`)",
@@ -164,9 +170,9 @@ def _parallel(times: Mapping[str, Any]) -> str:
         for count, measured in times["particles"].items()
     ]
     return (
-        f"With both arms at the same time on {times['cores']} cores a frame takes "
-        f"{' and '.join(parts)}; the trackers do so from {TrackerConfig().parallel_from} particles "
-        "an arm on."
+        f"With both arms at the same time on {times['cores']} cores an image takes "
+        f"{' and '.join(parts)}. The tracker does so from {TrackerConfig().parallel_from} "
+        "particles per arm on."
     )
 
 
@@ -175,10 +181,11 @@ def _mediapipe(results: Mapping[str, Any]) -> str:
     if measured is None:
         return "MediaPipe was not installed."
     return (
-        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms for the same images "
-        f"(it finds somebody in {100 * measured['found']:.0f} % of them): "
-        f"{measured['ratio']:.0f} times as long as a frame from silhouette to posture, "
-        f"{measured['ratio_from_image']:.1f} times as long as one from the image."
+        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms per image: "
+        f"{measured['ratio']:.0f} times as long as silhouette to posture, "
+        f"{measured['ratio_from_image']:.1f} times as long as image to posture. It finds a person "
+        f"in {100 * measured['found']:.0f} % of these synthetic images, and its time depends on "
+        "whether it does."
     )
 
 

@@ -37,7 +37,7 @@ class BenchmarkScene:
 
 def make_scene(width: int, height: int, count: int, empty: int = 30) -> BenchmarkScene:
     """Draw ``count`` images of the motion ``wave``, from its beginning on."""
-    body = BodyModel(hip_height_m=-0.51)
+    body = BodyModel.of(hip_height_m=-0.51)
     camera = session_camera(width, height)
     renderer = Renderer(camera, Scene(), np.random.default_rng(0))
     background = np.array([renderer.image()[0] for _ in range(empty)])

@@ -7,10 +7,13 @@ trapezoid, a sagittal rectangle, and a horizontal one at its top.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
+from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import Part, parts_of_bodies
 from cardbox_tracker.body.sizes import FloatArray
 
 PATCH_NAMES: tuple[str, ...] = (
@@ -34,69 +37,105 @@ N_PATCHES = len(PATCH_NAMES)
 TORSO_PATCHES = slice(0, 7)
 LEFT_ARM_PATCHES = slice(7, 11)
 RIGHT_ARM_PATCHES = slice(11, 15)
+NECK_PATCHES = slice(15, 16)
+"""The patch of an extended model with a neck; none of the paper's 15."""
 
 
-def cardbox_patches(body: BodyModel, postures: FloatArray) -> FloatArray:
+class PartPatches(NamedTuple):
+    """Corners of the patches, metres, each in the frame of its part; see ``body/parts.py``.
+
+    The corners of a patch are in order around it.
+    """
+
+    trunk: FloatArray
+    """Shape (..., 7, 4, 3): torso, waist and head, in the torso's frame."""
+    neck: FloatArray
+    """Shape (..., 1, 4, 3), in the torso's frame; (..., 0, 4, 3) without a neck."""
+    upper_arm: FloatArray
+    """Shape (..., 2, 4, 3), below the shoulder joint."""
+    forearm: FloatArray
+    """Shape (..., 2, 4, 3), below the elbow joint."""
+
+
+def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
+    """Return the patches of one or many bodies before any posture.
+
+    Args:
+        sizes_m: shape (..., 18).
+        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
+    """
+    parts = parts_of_bodies(sizes_m, neck_to_head)
+    trunk = [_frontal(parts.torso), _sagittal(parts.torso), _lid(parts.torso)]
+    for part in (parts.waist, parts.head):
+        trunk += [_frontal(part), _sagittal(part)]
+    neck = _frontal(parts.neck)[..., None, :, :]
+    upper_arm, forearm = (
+        np.stack([_frontal(part), _sagittal(part)], axis=-3)
+        for part in (parts.upper_arm, parts.forearm)
+    )
+    has_neck = neck_to_head > 0
+    return PartPatches(
+        np.stack(trunk, axis=-3), neck if has_neck else neck[..., :0, :, :], upper_arm, forearm
+    )
+
+
+def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float = 0.0) -> FloatArray:
     """Return the corners of the 15 patches in each posture.
 
     Args:
         body: the measured person.
         postures: shape (..., 12), rad and metres.
+        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
 
     Returns:
         Shape (..., 15, 4, 3), metres in the reference frame; the corners of a patch are in order
-        around it, the patches ordered as ``PATCH_NAMES``.
+        around it, the patches ordered as ``PATCH_NAMES``. With a neck its patch follows as the
+        16th, ``NECK_PATCHES``.
     """
     frames = forward_kinematics(body, postures)
-    size = body.size
-    waist_m, top_m = size("waist_height"), size("waist_height") + size("torso_height")
-    chin_m = top_m + size("neck_length")
-    crown_m = chin_m + size("head_height")
-    depth = size("torso_depth")
-    trunk = np.stack(
-        [
-            _upright(1, size("torso_bottom_width"), size("torso_top_width"), waist_m, top_m),
-            _upright(0, depth, depth, waist_m, top_m),
-            _flat(depth, size("torso_top_width"), top_m),
-            _upright(1, size("waist_width"), size("waist_width"), 0.0, waist_m),
-            _upright(0, size("waist_depth"), size("waist_depth"), 0.0, waist_m),
-            _upright(1, size("head_width"), size("head_width"), chin_m, crown_m),
-            _upright(0, size("head_depth"), size("head_depth"), chin_m, crown_m),
-        ]
-    )
-    trunk[5:, :, 0] += size("head_offset")
+    patches = part_patches(body.sizes, neck_to_head)
     return np.concatenate(
-        [_place(trunk, frames.torso_rotation, frames.hip), *_arm_patches(body, frames)], axis=-3
+        [
+            _place(patches.trunk, frames.torso_rotation, frames.hip),
+            _place(patches.upper_arm, frames.left.upper_arm_rotation, frames.left.shoulder),
+            _place(patches.forearm, frames.left.forearm_rotation, frames.left.elbow),
+            _place(patches.upper_arm, frames.right.upper_arm_rotation, frames.right.shoulder),
+            _place(patches.forearm, frames.right.forearm_rotation, frames.right.elbow),
+            _place(patches.neck, frames.torso_rotation, frames.hip),
+        ],
+        axis=-3,
     )
 
 
-def _arm_patches(body: BodyModel, frames: BodyFrames) -> list[FloatArray]:
-    def limb(length_m: float, width_m: float) -> FloatArray:
-        return np.stack([_upright(axis, width_m, width_m, -length_m, 0.0) for axis in (1, 0)])
-
-    upper_arm = limb(body.size("upper_arm_length"), body.size("upper_arm_width"))
-    forearm = limb(body.size("forearm_length"), body.size("forearm_width"))
-    patches = []
-    for arm in (frames.left, frames.right):
-        patches.append(_place(upper_arm, arm.upper_arm_rotation, arm.shoulder))
-        patches.append(_place(forearm, arm.forearm_rotation, arm.elbow))
-    return patches
+def _frontal(part: Part[FloatArray]) -> FloatArray:
+    """Trapezoid (..., 4, 3) in the plane of Y and Z, through the part's axis."""
+    below, above = part.bottom_width_m / 2, part.top_width_m / 2
+    return _quadrilateral(
+        [part.forward_m] * 4,
+        [-below, below, above, -above],
+        [part.bottom_m, part.bottom_m, part.top_m, part.top_m],
+    )
 
 
-def _upright(
-    axis: int, bottom_width_m: float, top_width_m: float, bottom_m: float, top_m: float
-) -> FloatArray:
-    """Trapezoid (4, 3) through the Z axis, spreading along X (``axis`` 0) or Y (1)."""
-    corners = np.zeros((4, 3))
-    corners[:, axis] = (-bottom_width_m / 2, bottom_width_m / 2, top_width_m / 2, -top_width_m / 2)
-    corners[:, 2] = (bottom_m, bottom_m, top_m, top_m)
-    return corners
+def _sagittal(part: Part[FloatArray]) -> FloatArray:
+    """Rectangle (..., 4, 3) in the plane of X and Z."""
+    half, forward = part.depth_m / 2, part.forward_m
+    return _quadrilateral(
+        [-half + forward, half + forward, half + forward, -half + forward],
+        [0.0 * half] * 4,
+        [part.bottom_m, part.bottom_m, part.top_m, part.top_m],
+    )
 
 
-def _flat(depth_m: float, width_m: float, height_m: float) -> FloatArray:
-    """Horizontal rectangle (4, 3) around the Z axis."""
-    x, y = depth_m / 2, width_m / 2
-    return np.array([(-x, -y, height_m), (x, -y, height_m), (x, y, height_m), (-x, y, height_m)])
+def _lid(part: Part[FloatArray]) -> FloatArray:
+    """Horizontal rectangle (..., 4, 3) at the part's top."""
+    x, y = part.depth_m / 2, part.top_width_m / 2
+    return _quadrilateral([-x, x, x, -x], [-y, -y, y, y], [part.top_m] * 4)
+
+
+def _quadrilateral(x: list[FloatArray], y: list[FloatArray], z: list[FloatArray]) -> FloatArray:
+    """Corners (..., 4, 3) from four coordinates (...) each."""
+    return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-1)
 
 
 def _place(corners: FloatArray, rotation: FloatArray, origin: FloatArray) -> FloatArray:

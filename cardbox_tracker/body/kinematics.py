@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.body.sizes import FloatArray
 
@@ -93,32 +94,30 @@ def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
     d = np.asarray(postures, dtype=np.float64)
     rotation = rotation_z(d[..., 3]) @ rotation_y(d[..., 2]) @ rotation_x(d[..., 1])
     hip = np.empty((*d.shape[:-1], 3))
-    hip[..., 0] = -body.distance_m
+    hip[..., 0] = -body.placement.distance_m
     hip[..., 1] = d[..., 0]
-    hip[..., 2] = body.hip_height_m
+    hip[..., 2] = body.placement.hip_height_m
 
-    top_m = body.size("waist_height") + body.size("torso_height")
-    head_m = top_m + body.size("neck_length") + body.size("head_height") / 2
+    parts = body_parts(body.sizes)
     return BodyFrames(
         rotation,
         hip,
-        hip + rotation @ (0.0, 0.0, top_m),
-        hip + rotation @ (body.size("head_offset"), 0.0, head_m),
-        _arm(body, rotation, hip, d[..., LEFT_ARM], +1.0),
-        _arm(body, rotation, hip, d[..., RIGHT_ARM], -1.0),
+        hip + rotation @ (0.0, 0.0, parts.torso.top_m),
+        hip + rotation @ (parts.head.forward_m, 0.0, parts.head.middle_m),
+        _arm(parts, rotation, hip, d[..., LEFT_ARM], +1.0),
+        _arm(parts, rotation, hip, d[..., RIGHT_ARM], -1.0),
     )
 
 
 def _arm(
-    body: BodyModel, torso: FloatArray, hip: FloatArray, angles: FloatArray, side: float
+    parts: BodyParts[float], torso: FloatArray, hip: FloatArray, angles: FloatArray, side: float
 ) -> Arm:
     """``side`` is +1 for the left arm, -1 for the right."""
     upper_arm = torso @ rotation_x(side * angles[..., 0]) @ rotation_y(-angles[..., 1])
     forearm = upper_arm @ rotation_x(side * angles[..., 2]) @ rotation_y(-angles[..., 3])
-    height_m = body.size("waist_height") + body.size("torso_height") - body.size("shoulder_drop")
-    shoulder = hip + torso @ (0.0, side * body.size("shoulder_breadth") / 2, height_m)
-    elbow = shoulder - body.size("upper_arm_length") * upper_arm[..., 2]
-    hand = elbow - body.size("forearm_length") * forearm[..., 2]
+    shoulder = hip + torso @ (0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m)
+    elbow = shoulder - parts.upper_arm.height_m * upper_arm[..., 2]
+    hand = elbow - parts.forearm.height_m * forearm[..., 2]
     return Arm(shoulder, elbow, hand, upper_arm, forearm)
 
 

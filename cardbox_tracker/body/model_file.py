@@ -30,7 +30,7 @@ def dumps_body_model(model: BodyModel) -> str:
         "units: {length: m, angle: rad}",
     ]
     for name, (_, _, _, meaning) in CONSTANTS.items():
-        lines.append(f"{name}: {_yaml_number(getattr(model, name))}  # {meaning}")
+        lines.append(f"{name}: {_yaml_number(model.constants[name])}  # {meaning}")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
@@ -141,7 +141,7 @@ def _from_mapping(data: object) -> BodyModel:
     if not isinstance(sizes, dict):
         raise BodyModelError(f"sizes is {sizes!r}; expected a mapping of the {len(SIZES)} sizes")
     _check_keys(sizes, SIZE_NAMES, "sizes.")
-    return BodyModel(
+    return BodyModel.of(
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
         **{name: _number(data[name], name) for name in CONSTANTS},
         side_turn=data["side_turn"],

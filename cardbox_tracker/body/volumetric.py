@@ -10,6 +10,7 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import Part, body_parts
 from cardbox_tracker.body.sizes import FloatArray
 
 PART_NAMES: tuple[str, ...] = (
@@ -44,23 +45,14 @@ def volumetric_faces(body: BodyModel, postures: FloatArray) -> FloatArray:
         ``PART_NAMES``.
     """
     frames = forward_kinematics(body, postures)
-    size = body.size
-    waist_m, top_m = size("waist_height"), size("waist_height") + size("torso_height")
-    chin_m = top_m + size("neck_length")
-    depth = size("torso_depth")
-    torso = _box(depth, depth, size("torso_bottom_width"), size("torso_top_width"), waist_m, top_m)
-    waist = _prism(size("waist_depth"), size("waist_width"), 0.0, waist_m)
-    head = _prism(size("head_depth"), size("head_width"), chin_m, chin_m + size("head_height"))
-    head[:, 0] += size("head_offset")
-    upper_arm = _prism(
-        size("upper_arm_width"), size("upper_arm_width"), -size("upper_arm_length"), 0.0
-    )
-    forearm = _prism(size("forearm_width"), size("forearm_width"), -size("forearm_length"), 0.0)
-
-    placed = [(box, frames.torso_rotation, frames.hip) for box in (torso, waist, head)]
+    parts = body_parts(body.sizes)
+    placed = [
+        (_box(part), frames.torso_rotation, frames.hip)
+        for part in (parts.torso, parts.waist, parts.head)
+    ]
     for arm in (frames.left, frames.right):
-        placed.append((upper_arm, arm.upper_arm_rotation, arm.shoulder))
-        placed.append((forearm, arm.forearm_rotation, arm.elbow))
+        placed.append((_box(parts.upper_arm), arm.upper_arm_rotation, arm.shoulder))
+        placed.append((_box(parts.forearm), arm.forearm_rotation, arm.elbow))
     return np.concatenate(
         [
             np.einsum("...ij,fcj->...fci", rotation, box[_FACES]) + origin[..., None, None, :]
@@ -70,24 +62,12 @@ def volumetric_faces(body: BodyModel, postures: FloatArray) -> FloatArray:
     )
 
 
-def _box(
-    bottom_depth_m: float,
-    top_depth_m: float,
-    bottom_width_m: float,
-    top_width_m: float,
-    bottom_m: float,
-    top_m: float,
-) -> FloatArray:
-    """Corners (8, 3) of a frustum around the Z axis."""
+def _box(part: Part[float]) -> FloatArray:
+    """Corners (8, 3) of a part in its frame."""
     corners = []
-    for depth_m, width_m, z_m in (
-        (bottom_depth_m, bottom_width_m, bottom_m),
-        (top_depth_m, top_width_m, top_m),
-    ):
-        x, y = depth_m / 2, width_m / 2
-        corners += [(-x, -y, z_m), (x, -y, z_m), (x, y, z_m), (-x, y, z_m)]
+    x, forward = part.depth_m / 2, part.forward_m
+    for width_m, z in ((part.bottom_width_m, part.bottom_m), (part.top_width_m, part.top_m)):
+        y = width_m / 2
+        corners += [(-x + forward, -y, z), (x + forward, -y, z)]
+        corners += [(x + forward, y, z), (-x + forward, y, z)]
     return np.array(corners)
-
-
-def _prism(depth_m: float, width_m: float, bottom_m: float, top_m: float) -> FloatArray:
-    return _box(depth_m, depth_m, width_m, width_m, bottom_m, top_m)

@@ -1,1 +1,1 @@
-"""The ``cardbox`` command."""
+"""The ``cardbox`` command: one module per subcommand, and what they share."""

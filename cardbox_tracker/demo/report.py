@@ -14,7 +14,7 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.tracker import TRACKING, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
 from cardbox_tracker.files import atomic_path
@@ -33,7 +33,8 @@ def write_report(
     """Write everything into ``output``, print the table, return what report.json holds."""
     with BagReader(session) as bag:
         height, width = next(iter(result.silhouettes.values())).shape
-        camera = bag.calibration().camera(width, height).with_pitch(result.body.camera_pitch_rad)
+        pitch_rad = result.body.camera_pose.pitch_rad
+        camera = bag.calibration().camera(width, height, pitch_rad)
     expected = [stamp for stamp in result.truth.frames if stamp >= result.start_ns]
     tracked = [stamp for stamp in expected if stamp in result.postures]
     estimates = rate(result, camera, tracked)
@@ -65,13 +66,13 @@ def write_report(
 
 def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int, Estimate]:
     """Cost and IoU of what was published, by stamp, from the silhouettes on the topic."""
-    cost = CompiledCost(result.body, camera)
+    term = CompiledSilhouette(result.body, camera)
     estimates = {}
     for stamp in stamps:
         if stamp not in result.silhouettes:
             continue
-        cost.observe(result.silhouettes[stamp])
-        cost_px, iou = cost.overlap(result.postures[stamp])
+        seen = term.look(result.silhouettes[stamp])
+        cost_px, iou = seen.overlap(result.postures[stamp])
         estimates[stamp] = Estimate(
             TRACKING, posture=result.postures[stamp], cost_px=cost_px, iou=iou
         )

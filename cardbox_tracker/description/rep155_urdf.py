@@ -18,18 +18,18 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import JOINT_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
-    add_box,
     add_joint,
     add_link,
+    add_patches,
     add_robot,
     xml_text,
 )
 
-_THIN_M = 0.004
 _FULL = (-2 * math.pi, 2 * math.pi)
 
 
@@ -44,9 +44,8 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str) -> str:
     robot = add_robot(f"human_{body_id}")
     end = f"_{body_id}"
     add_link(robot, optical_frame)
-    size = body.size
-    neck_m = size("waist_height") + size("torso_height")
-    shoulders_m = neck_m - size("shoulder_drop")
+    parts = body_parts(body.sizes)
+    shoulders_m = parts.shoulder_height_m
     origin, rpy = _seen_from_camera(body)
     parent = optical_frame
     for index, (name, kind, axis) in enumerate(
@@ -65,34 +64,26 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str) -> str:
             limits=(lowest, highest),
         )
         parent, origin, rpy = name + end, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    middle = _up(size("waist_height") / 2)
-    add_box(link, "torso", (_THIN_M, size("waist_width"), size("waist_height")), middle)
-    add_box(link, "torso", (size("waist_depth"), _THIN_M, size("waist_height")), middle)
+    add_patches(link, "torso", parts.waist, _up(parts.waist.middle_m))
     torso = add_link(robot, "torso" + end)
     add_joint(robot, "torso" + end, "fixed", parent, "torso" + end, _up(shoulders_m))
-    middle = _up(size("shoulder_drop") - size("torso_height") / 2)
-    width_m = (size("torso_top_width") + size("torso_bottom_width")) / 2
-    add_box(torso, "torso", (_THIN_M, width_m, size("torso_height")), middle)
-    add_box(torso, "torso", (size("torso_depth"), _THIN_M, size("torso_height")), middle)
+    add_patches(torso, "torso", parts.torso, _up(parts.torso.middle_m - shoulders_m))
     head = add_link(robot, "head" + end)
-    head_m = neck_m - shoulders_m + size("neck_length") + size("head_height") / 2
     add_joint(
         *(robot, "head" + end, "fixed", "torso" + end, "head" + end),
-        (size("head_offset"), 0.0, head_m),
+        (parts.head.forward_m, 0.0, parts.head.middle_m - shoulders_m),
     )
-    add_box(head, "torso", (_THIN_M, size("head_width"), size("head_height")), _up(0.0))
-    add_box(head, "torso", (size("head_depth"), _THIN_M, size("head_height")), _up(0.0))
-    _arm(robot, body, "l", "left", 1.0, end)
-    _arm(robot, body, "r", "right", -1.0, end)
+    add_patches(head, "torso", parts.head, _up(0.0))
+    _arm(robot, parts, "l", "left", 1.0, end)
+    _arm(robot, parts, "r", "right", -1.0, end)
     return xml_text(robot)
 
 
 def _arm(
-    robot: Xml.Element, body: BodyModel, prefix: str, material: str, side: float, end: str
+    robot: Xml.Element, parts: BodyParts[float], prefix: str, material: str, side: float, end: str
 ) -> None:
     """``side`` is +1 for the left arm, -1 for the right."""
-    size = body.size
-    parent, origin = "torso" + end, (0.0, side * size("shoulder_breadth") / 2, 0.0)
+    parent, origin = "torso" + end, (0.0, side * parts.shoulder_aside_m, 0.0)
     for joint, child, axis, limits in (
         ("y_shoulder", "y_shoulder", (0, 0, -side), _FULL),
         ("p_shoulder", "p_shoulder", (side, 0, 0), (LOWEST_RAISE_RAD, math.pi)),
@@ -101,7 +92,7 @@ def _arm(
     ):
         name = f"{prefix}_{child}{end}"
         if joint == "elbow":
-            origin = (0.0, 0.0, -size("upper_arm_length"))
+            origin = _up(parts.upper_arm.bottom_m)
         link = add_link(robot, name)
         add_joint(
             *(robot, f"{prefix}_{joint}{end}", "revolute", parent, name, origin),
@@ -109,15 +100,13 @@ def _arm(
             limits=limits,
         )
         parent, origin = name, (0.0, 0.0, 0.0)
-        part = {"shoulder": "upper_arm", "elbow": "forearm"}.get(child)
+        part = {"shoulder": parts.upper_arm, "elbow": parts.forearm}.get(child)
         if part:
-            length_m, width_m = size(f"{part}_length"), size(f"{part}_width")
-            add_box(link, material, (_THIN_M, width_m, length_m), _up(-length_m / 2))
-            add_box(link, material, (width_m, _THIN_M, length_m), _up(-length_m / 2))
+            add_patches(link, material, part, _up(part.middle_m))
     add_link(robot, f"{prefix}_wrist{end}")
     add_joint(
         *(robot, f"{prefix}_wrist{end}", "fixed", parent, f"{prefix}_wrist{end}"),
-        _up(-size("forearm_length")),
+        _up(parts.forearm.bottom_m),
     )
 
 
@@ -129,7 +118,7 @@ def _seen_from_camera(
     body: BodyModel,
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Where the middle of the hips is in the optical frame when d1 is 0, as URDF has it."""
-    down = body.camera_pitch_rad
+    down = body.camera_pose.pitch_rad
     # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
     rotation = np.array(
         [
@@ -138,7 +127,7 @@ def _seen_from_camera(
             (-math.cos(down), 0.0, -math.sin(down)),
         ]
     )
-    x, y, z = (rotation @ (-body.distance_m, 0.0, body.hip_height_m)).tolist()
+    x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
     return (x, y, z), _rpy(rotation)
 
 

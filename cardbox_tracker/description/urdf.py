@@ -17,17 +17,19 @@ import math
 from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
 from cardbox_tracker.description.urdf_elements import (
+    PATCH_THICKNESS_M,
     add_box,
     add_joint,
     add_link,
+    add_patches,
     add_robot,
     xml_text,
 )
 
 ROOT_LINK = "camera_level"
-PATCH_THICKNESS_M = 0.004
 
 
 def urdf_from_body(
@@ -46,19 +48,19 @@ def urdf_from_body(
     if optical_frame:
         add_link(robot, optical_frame)
         # Level optical axes seen from REP-103 axes, then turned down by the pitch about X.
-        rpy = (-math.pi / 2 - body.camera_pitch_rad, 0.0, -math.pi / 2)
+        rpy = (-math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2)
         add_joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
     add_link(robot, "hips")
-    origin = (body.distance_m, 0.0, body.hip_height_m)
+    origin = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
     add_joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
-    _trunk(robot, body)
-    _arm(robot, body, "left", 1.0)
-    _arm(robot, body, "right", -1.0)
+    parts = body_parts(body.sizes)
+    _trunk(robot, parts)
+    _arm(robot, parts, "left", 1.0)
+    _arm(robot, parts, "right", -1.0)
     return xml_text(robot)
 
 
-def _trunk(robot: Xml.Element, body: BodyModel) -> None:
-    size = body.size
+def _trunk(robot: Xml.Element, parts: BodyParts[float]) -> None:
     parent = "hips"
     for joint, axis in (
         ("torso_y", (0, 1, 0)),
@@ -71,31 +73,26 @@ def _trunk(robot: Xml.Element, body: BodyModel) -> None:
         link = add_link(robot, child)
         add_joint(robot, joint, kind, parent, child, axis=axis, limits=_limits(joint))
         parent = child
-    waist_m, torso_m = size("waist_height"), size("torso_height")
-    top_m = waist_m + torso_m
-    # URDF has no trapezoid: the torso's frontal patch is drawn with its mean width.
-    width_m = (size("torso_top_width") + size("torso_bottom_width")) / 2
-    thin = PATCH_THICKNESS_M
-    middle_m = waist_m + torso_m / 2
-    add_box(link, "torso", (thin, width_m, torso_m), (0, 0, middle_m))
-    add_box(link, "torso", (size("torso_depth"), thin, torso_m), (0, 0, middle_m))
-    add_box(link, "torso", (size("torso_depth"), size("torso_top_width"), thin), (0, 0, top_m))
-    add_box(link, "torso", (thin, size("waist_width"), waist_m), (0, 0, waist_m / 2))
-    add_box(link, "torso", (size("waist_depth"), thin, waist_m), (0, 0, waist_m / 2))
+    torso, waist = parts.torso, parts.waist
+    add_patches(link, "torso", torso, (0.0, 0.0, torso.middle_m))
+    lid = (torso.depth_m, torso.top_width_m, PATCH_THICKNESS_M)
+    add_box(link, "torso", lid, (0.0, 0.0, torso.top_m))
+    add_patches(link, "torso", waist, (0.0, 0.0, waist.middle_m))
     head = add_link(robot, "head")
-    height_m = top_m + size("neck_length") + size("head_height") / 2
-    add_joint(robot, "neck", "fixed", "torso", "head", (size("head_offset"), 0.0, height_m))
-    add_box(head, "torso", (thin, size("head_width"), size("head_height")), (0, 0, 0))
-    add_box(head, "torso", (size("head_depth"), thin, size("head_height")), (0, 0, 0))
+    origin = (parts.head.forward_m, 0.0, parts.head.middle_m)
+    add_joint(robot, "neck", "fixed", "torso", "head", origin)
+    add_patches(head, "torso", parts.head, (0.0, 0.0, 0.0))
 
 
-def _arm(robot: Xml.Element, body: BodyModel, name: str, side: float) -> None:
+def _arm(robot: Xml.Element, parts: BodyParts[float], name: str, side: float) -> None:
     """``side`` is +1 for the left arm, -1 for the right: abduction is mirrored, flexion is not."""
-    size = body.size
-    height_m = size("waist_height") + size("torso_height") - size("shoulder_drop")
-    parent, origin = "torso", (0.0, side * size("shoulder_breadth") / 2, height_m)
-    for joint, part in (("shoulder", "upper_arm"), ("elbow", "forearm")):
-        turned, limb = f"{name}_{joint}_link", f"{name}_{part}"
+    shoulder = (0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m)
+    parent, origin = "torso", shoulder
+    for joint, limb, part in (
+        ("shoulder", f"{name}_upper_arm", parts.upper_arm),
+        ("elbow", f"{name}_forearm", parts.forearm),
+    ):
+        turned = f"{name}_{joint}_link"
         add_link(robot, turned)
         abduction, flexion = f"{name}_{joint}_abduction", f"{name}_{joint}_flexion"
         add_joint(
@@ -109,10 +106,8 @@ def _arm(robot: Xml.Element, body: BodyModel, name: str, side: float) -> None:
             axis=(0, -1, 0),
             limits=_limits(flexion),
         )
-        length_m, width_m = size(f"{part}_length"), size(f"{part}_width")
-        add_box(link, name, (PATCH_THICKNESS_M, width_m, length_m), (0, 0, -length_m / 2))
-        add_box(link, name, (width_m, PATCH_THICKNESS_M, length_m), (0, 0, -length_m / 2))
-        parent, origin = limb, (0.0, 0.0, -length_m)
+        add_patches(link, name, part, (0.0, 0.0, part.middle_m))
+        parent, origin = limb, (0.0, 0.0, part.bottom_m)
     add_link(robot, f"{name}_hand")
     add_joint(robot, f"{name}_wrist", "fixed", parent, f"{name}_hand", origin)
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree as Xml
 
+from cardbox_tracker.body.parts import Part
+
 Vector = Sequence[float]
+
+PATCH_THICKNESS_M = 0.004
+"""A patch is shown as a box of this thickness."""
 
 COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
 """Colour of each material."""
@@ -32,6 +37,16 @@ def add_box(link: Xml.Element, material: str, extent_m: Vector, centre_m: Vector
     Xml.SubElement(visual, "origin", xyz=_text(centre_m), rpy="0 0 0")
     Xml.SubElement(Xml.SubElement(visual, "geometry"), "box", size=_text(extent_m))
     Xml.SubElement(visual, "material", name=material)
+
+
+def add_patches(link: Xml.Element, material: str, part: Part[float], centre_m: Vector) -> None:
+    """Add the frontal and the sagittal patch of ``part`` around a centre, as thin boxes.
+
+    URDF has no trapezoid: the torso's frontal patch is drawn with its mean width.
+    """
+    thin = PATCH_THICKNESS_M
+    add_box(link, material, (thin, part.mean_width_m, part.height_m), centre_m)
+    add_box(link, material, (part.depth_m, thin, part.height_m), centre_m)
 
 
 def add_joint(

@@ -14,7 +14,7 @@ from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near
+from cardbox_tracker.vision.rasterisation import clip_near, in_front
 
 ImageArray = NDArray[np.uint8]
 
@@ -130,7 +130,7 @@ def _draw_skeleton(
     joints = []
     for chain in chains:
         points = camera.reference_to_optical(np.array(chain))
-        if np.any(points[:, 2] < NEAR_PLANE_M):
+        if not in_front(points).all():
             continue
         pixels = _subpixels(camera.project(points))
         cv2.polylines(canvas, [pixels], False, SKELETON_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)

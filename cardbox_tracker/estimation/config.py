@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from cardbox_tracker.estimation.cost.prior import RestPrior
+from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.settings import check, setting
 
@@ -59,6 +61,7 @@ class TrackerConfig:
     Attributes:
         torso: filter of d1..d4 (Table I).
         arm: filter of each arm (Table I).
+        terms: settings of the cost's terms beside that of the silhouette (``estimation/cost``).
     """
 
     torso: FilterConfig = FilterConfig(200, 0.2, 0.1, 0.02, 8000.0)
@@ -70,13 +73,7 @@ class TrackerConfig:
     noise_decay: float = setting(
         1.0, "factor on the noise from one cycle of an image to the next", limits=(0.0, 1.0)
     )
-    prior: float = setting(
-        0.0,
-        "cost of an angle one unit from rest (see filtering/hierarchy.py), as a fraction of the "
-        "silhouette's pixels",
-        limits=(0.0, 1.0),
-        restarts=True,
-    )
+    terms: tuple[TermSettings, ...] = ()
     average: int = setting(
         1,
         "best particles whose weighted mean is the result; 1: the best one",
@@ -149,7 +146,7 @@ def default_preset() -> TrackerConfig:
     return TrackerConfig(
         cycles=2,
         noise_decay=0.5,
-        prior=0.012,
+        terms=(RestPrior(0.012),),
         average=20,
         explore=0.2,
         relocalize=True,

@@ -6,6 +6,7 @@ there, but the model has not fitted for several frames). Only ``tracking`` has a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,17 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import clip_to_limits, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.compiled import CompiledCost, CompiledKeypoints
-from cardbox_tracker.estimation.cost.silhouette import Silhouette, SilhouetteCost
+from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import (
+    Image,
+    Silhouette,
+    SumOfTerms,
+    Term,
+    TermObservation,
+)
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.filtering.pose_filter import PoseFilter
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -52,6 +61,10 @@ class Estimate:
     iou: float | None = None
 
 
+MakeFilter = Callable[[TrackerConfig, int, np.random.Generator], PoseFilter]
+"""Takes settings, pixels of an image and the source of random numbers; returns a new filter."""
+
+
 class Tracker:
     """Tracks one measured person before one camera (paper, algorithm "Online Motion Tracking")."""
 
@@ -61,7 +74,8 @@ class Tracker:
         camera: Camera,
         config: TrackerConfig | None = None,
         rng: np.random.Generator | None = None,
-        cost: SilhouetteCost | None = None,
+        silhouette: SilhouetteTerm | None = None,
+        make_filter: MakeFilter = HierarchicalFilter,
     ) -> None:
         """Set up for ``body``; the camera is pitched as the body model says.
 
@@ -70,25 +84,30 @@ class Tracker:
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
-            cost: another implementation of the cost, for comparison.
+            silhouette: another implementation of the silhouette's term, for comparison.
+            make_filter: another filter than the hierarchical one.
         """
         self.body = body
-        self.camera = camera.with_pitch(body.camera_pitch_rad)
+        self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._cost = cost or CompiledCost(body, self.camera)
+        self._silhouette = silhouette or CompiledSilhouette(body, self.camera)
+        self._terms = self._built(self.config)
+        self._make_filter = make_filter
         self._keypoints = CompiledKeypoints(body, self.camera)
         self._reference = reference_posture("front")
-        self._reference[0] = body.lateral_m
-        model = render(cardbox_patches(body, self._reference), self.camera, self._cost.rows)
+        self._reference[0] = body.placement.lateral_m
+        model = render(cardbox_patches(body, self._reference), self.camera, self._silhouette.rows)
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self.reset()
 
+    def _built(self, config: TrackerConfig) -> list[Term]:
+        return [settings.build(self.body, self.camera) for settings in config.terms]
+
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
-        self._filter = HierarchicalFilter(
-            self._cost, self.config, self.camera.width * self.camera.height, self._rng.spawn(1)[0]
-        )
+        image_px = self.camera.width * self.camera.height
+        self._filter = self._make_filter(self.config, image_px, self._rng.spawn(1)[0])
         self._started = False
         self._poor_frames = 0
 
@@ -100,59 +119,67 @@ class Tracker:
             :meth:`reset`.
         """
         is_new_start = restarts(self.config, config)
+        if config.terms != self.config.terms:
+            self._terms = self._built(config)
         self.config = config
         if is_new_start:
             self.reset()
         return is_new_start
 
-    def track(self, silhouette: Silhouette) -> Estimate:
-        """Estimate the posture behind ``silhouette`` (H, W), 0 or 255.
+    def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
+        """Estimate the posture behind a silhouette.
+
+        Args:
+            silhouette: (H, W), 0 or 255, of the camera's size.
+            image: (H, W) grey or (H, W, 3) bgr of the same frame, for terms that use it.
 
         Raises:
-            ValueError: the silhouette has not the camera's size.
+            ValueError: silhouette or image has not the camera's size.
         """
-        self._cost.observe(silhouette)
-        if self._cost.silhouette_px < self._min_person_px:
+        frame = self._silhouette.frame(silhouette, image)
+        if frame.foreground_px < self._min_person_px:
             if self.config.relocalize and self._started:
-                # Whoever comes back may stand elsewhere: begin again when somebody is there.
+                # The person may come back elsewhere: search anew as soon as there is one.
                 self._started = False
             return Estimate(NO_PERSON)
-        posture = self._start(silhouette) if not self._started else self._follow()
-        cost_px, iou = self._cost.overlap(posture)
+        seen = self._silhouette.observe(frame)
+        observation = SumOfTerms((seen, *(term.observe(frame) for term in self._terms)))
+        if self._started:
+            self._follow(observation)
+        else:
+            self._start(observation, silhouette)
+        posture = self._filter.estimate()
+        cost_px, iou = seen.overlap(posture)
         self._poor_frames = self._poor_frames + 1 if iou < self.config.lost_iou else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:
                 self._started = False
             return Estimate(LOST)
         return Estimate(
-            TRACKING,
-            posture,
-            self._filter.stddev(posture),
-            self._keypoints(posture),
-            cost_px,
-            iou,
+            TRACKING, posture, self._filter.stddev(), self._keypoints(posture), cost_px, iou
         )
 
-    def _follow(self) -> FloatArray:
+    def _follow(self, observation: TermObservation) -> None:
+        """Run the cycles of one frame, with falling noise; the first one explores."""
         for cycle in range(self.config.cycles):
             explore = self.config.explore if cycle == 0 else 0.0
-            posture = self._filter.cycle(self.config.noise_decay**cycle, explore)
-        return posture
+            self._filter.iterate(observation, self.config.noise_decay**cycle, explore)
 
-    def _start(self, silhouette: Silhouette) -> FloatArray:
-        """Scatter around the front reference where the person stands, then settle."""
+    def _start(self, observation: TermObservation, silhouette: Silhouette) -> None:
+        """Start around the front reference where the person stands, then settle."""
         self._started = True
         reference = self._reference.copy()
         if self.config.relocalize:
             reference[0] = self._lateral_m(silhouette)
-        posture = self._filter.scatter(clip_to_limits(reference))
+        self._filter.initialize(observation, clip_to_limits(reference))
         if self.config.relocalize:
             for cycle in range(_RECOVERY_CYCLES):
-                posture = self._filter.cycle(_RECOVERY_NOISE * self.config.noise_decay**cycle)
-        return posture
+                noise_scale = _RECOVERY_NOISE * self.config.noise_decay**cycle
+                self._filter.iterate(observation, noise_scale)
 
     def _lateral_m(self, silhouette: Silhouette) -> float:
         """``torso_y`` under which the silhouette's median column lies."""
-        columns = np.count_nonzero(silhouette[: self._cost.rows], axis=0).cumsum()
+        columns = np.count_nonzero(silhouette[: self._silhouette.rows], axis=0).cumsum()
         middle = int(np.searchsorted(columns, columns[-1] / 2))
-        return float((middle - self.camera.cx) / self.camera.fx * self.body.distance_m)
+        offset_m = (middle - self.camera.cx) / self.camera.fx * self.body.placement.distance_m
+        return float(offset_m)

@@ -33,10 +33,12 @@ def initialize_from_recording(
 
 def describe(result: InitializationResult) -> str:
     """Return the sizes and the fit, as text for a person."""
-    body = result.body
+    body, placement = result.body, result.body.placement
     fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
     return (
         f"{body}\n"
-        f"mid-hip {100 * body.hip_height_m:+.1f} cm above the camera, at {body.distance_m:g} m\n"
+        f"mid-hip {100 * abs(placement.hip_height_m):.1f} cm "
+        f"{'above' if placement.hip_height_m > 0 else 'below'} the camera, "
+        f"{placement.distance_m:g} m away from it\n"
         f"fit (IoU): {fits}, mean {result.mean_iou:.3f}"
     )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
 
 FloatArray = NDArray[np.float64]
@@ -32,39 +33,30 @@ SKIN, SHIRT, TROUSERS = 125, 70, 45
 """Brightness of the parts, grey levels."""
 
 
-class Part(NamedTuple):
+class VolumePart(NamedTuple):
     """Rings (n, 16, 3) in the reference frame, metres, and a brightness."""
 
     rings: FloatArray
     brightness: int
 
 
-def person_parts(body: BodyModel, posture: FloatArray) -> list[Part]:
+def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
     """Return the parts of ``body`` in ``posture`` (12,)."""
     frames = forward_kinematics(body, posture)
+    shapes = body_parts(body.sizes)
     parts = [*_legs(body, frames)]
     parts += [_trunk(body, frames), _neck(body, frames), _head(body, frames)]
     for arm in (frames.left, frames.right):
-        upper = body.size("upper_arm_width") / 2
-        fore = body.size("forearm_width") / 2
         parts.append(
             _tube(
                 arm.shoulder,
                 arm.elbow,
                 [(-0.12, 0.5), (-0.06, 0.95), (0.1, 1.12), (0.5, 1.0), (1.0, 0.88), (1.06, 0.6)],
-                upper,
+                shapes.upper_arm.top_width_m / 2,
                 SHIRT,
             )
         )
-        parts.append(
-            _tube(
-                arm.elbow,
-                arm.hand,
-                _FOREARM,
-                fore,
-                SKIN,
-            )
-        )
+        parts.append(_tube(arm.elbow, arm.hand, _FOREARM, shapes.forearm.top_width_m / 2, SKIN))
     return parts
 
 
@@ -72,62 +64,63 @@ def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
     """Return a person of random stature (1.55 to 1.9 m) and proportions."""
     stature = rng.uniform(0.9, 1.1)
     sizes = DEFAULT_SIZES * stature * rng.normal(1.0, 0.07, len(DEFAULT_SIZES))
-    return BodyModel(
+    return BodyModel.of(
         np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
-        distance_m,
+        distance_m=distance_m,
         hip_height_m=-0.51 * distance_m / 2.0,
     )
 
 
-def _trunk(body: BodyModel, frames: BodyFrames) -> Part:
-    size = body.size
-    waist = size("waist_height")
-    top = waist + size("torso_height")
+def _trunk(body: BodyModel, frames: BodyFrames) -> VolumePart:
+    parts = body_parts(body.sizes)
+    waist, torso = parts.waist, parts.torso
+    height = torso.top_m - torso.bottom_m
+    wide, deep = torso.top_width_m, torso.depth_m
     # Height, half width and half depth of each ring.
     profile = [
-        (-0.06, 0.5 * size("waist_width"), 0.46 * size("waist_depth")),
-        (0.3 * waist, 0.51 * size("waist_width"), 0.5 * size("waist_depth")),
-        (waist, 0.49 * size("torso_bottom_width"), 0.48 * size("torso_depth")),
-        (waist + 0.55 * (top - waist), 0.48 * size("torso_top_width"), 0.5 * size("torso_depth")),
-        (waist + 0.85 * (top - waist), 0.5 * size("torso_top_width"), 0.44 * size("torso_depth")),
-        (top, 0.4 * size("torso_top_width"), 0.3 * size("torso_depth")),
-        (
-            top + 0.3 * size("neck_length"),
-            0.2 * size("torso_top_width"),
-            0.25 * size("torso_depth"),
-        ),
+        (-0.06, 0.5 * waist.top_width_m, 0.46 * waist.depth_m),
+        (0.3 * waist.top_m, 0.51 * waist.top_width_m, 0.5 * waist.depth_m),
+        (torso.bottom_m, 0.49 * torso.bottom_width_m, 0.48 * deep),
+        (torso.bottom_m + 0.55 * height, 0.48 * wide, 0.5 * deep),
+        (torso.bottom_m + 0.85 * height, 0.5 * wide, 0.44 * deep),
+        (torso.top_m, 0.4 * wide, 0.3 * deep),
+        (torso.top_m + 0.3 * parts.neck.height_m, 0.2 * wide, 0.25 * deep),
     ]
-    return Part(_rings(profile, frames.torso_rotation, frames.hip), SHIRT)
+    return VolumePart(_rings(profile, frames.torso_rotation, frames.hip), SHIRT)
 
 
-def _neck(body: BodyModel, frames: BodyFrames) -> Part:
-    radius = 0.34 * body.size("head_width")
-    top = body.size("waist_height") + body.size("torso_height")
-    chin = top + body.size("neck_length")
-    profile = [(top - 0.03, radius, radius), (chin + 0.05, radius, radius)]
-    origin = frames.hip + frames.torso_rotation @ (0.5 * body.size("head_offset"), 0.0, 0.0)
-    return Part(_rings(profile, frames.torso_rotation, origin), SKIN)
+def _neck(body: BodyModel, frames: BodyFrames) -> VolumePart:
+    parts = body_parts(body.sizes)
+    radius = 0.34 * parts.head.top_width_m
+    profile = [
+        (parts.torso.top_m - 0.03, radius, radius),
+        (parts.head.bottom_m + 0.05, radius, radius),
+    ]
+    origin = frames.hip + frames.torso_rotation @ (parts.neck.forward_m, 0.0, 0.0)
+    return VolumePart(_rings(profile, frames.torso_rotation, origin), SKIN)
 
 
-def _head(body: BodyModel, frames: BodyFrames) -> Part:
-    half = body.size("head_height") / 2
+def _head(body: BodyModel, frames: BodyFrames) -> VolumePart:
+    head = body_parts(body.sizes).head
+    half = head.height_m / 2
     angles = np.radians([-80, -55, -25, 5, 35, 60, 80])
     profile = [
         (
             half * np.sin(angle),
-            np.cos(angle) * body.size("head_width") / 2,
-            np.cos(angle) * body.size("head_depth") / 2,
+            np.cos(angle) * head.top_width_m / 2,
+            np.cos(angle) * head.depth_m / 2,
         )
         for angle in angles
     ]
-    return Part(_rings(profile, frames.torso_rotation, frames.head), SKIN)
+    return VolumePart(_rings(profile, frames.torso_rotation, frames.head), SKIN)
 
 
-def _legs(body: BodyModel, frames: BodyFrames) -> list[Part]:
+def _legs(body: BodyModel, frames: BodyFrames) -> list[VolumePart]:
     """Two legs that stand straight below the hips and only turn with them."""
-    aside = body.size("waist_width") / 4
+    parts = body_parts(body.sizes)
+    aside = parts.waist.bottom_width_m / 4
     radius = 0.98 * aside
-    length = 1.6 * (body.size("waist_height") + body.size("torso_height"))
+    length = 1.6 * parts.torso.top_m
     across = frames.torso_rotation[:, 1] * (1.0, 1.0, 0.0)
     across /= np.linalg.norm(across)
     down = np.array([0.0, 0.0, -length])
@@ -147,7 +140,7 @@ def _tube(
     profile: list[tuple[float, float]],
     radius_m: float,
     brightness: int,
-) -> Part:
+) -> VolumePart:
     """Round part from ``start`` to ``end``; ``profile`` has (place along it, factor on radius)."""
     axis = end - start
     length = float(np.linalg.norm(axis))
@@ -157,17 +150,17 @@ def _tube(
     y /= np.linalg.norm(y)
     rotation = np.column_stack([np.cross(y, z), y, z])
     rings = [(t * length, f * radius_m, f * radius_m) for t, f in profile]
-    return Part(_rings(rings, rotation, start), brightness)
+    return VolumePart(_rings(rings, rotation, start), brightness)
 
 
 def _rings(
     profile: list[tuple[float, float, float]], rotation: FloatArray, origin: FloatArray
 ) -> FloatArray:
     """Rings (n, 16, 3) from (height along Z, half extent along Y, half extent along X)."""
-    table = np.array(profile)
-    rings = np.empty((len(table), _RING_POINTS, 3))
-    rings[..., 0] = table[:, 2:3] * np.cos(_ANGLES)
-    rings[..., 1] = table[:, 1:2] * np.sin(_ANGLES)
-    rings[..., 2] = table[:, 0:1]
+    height, half_y, half_x = np.array(profile).T[..., None]
+    rings = np.empty((len(height), _RING_POINTS, 3))
+    rings[..., 0] = half_x * np.cos(_ANGLES)
+    rings[..., 1] = half_y * np.sin(_ANGLES)
+    rings[..., 2] = height
     placed: FloatArray = rings @ rotation.T + origin
     return placed

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.simulation.person import person_parts
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import in_front
 
 ImageArray = NDArray[np.uint8]
 
@@ -90,7 +91,8 @@ class Renderer:
         parts = sorted(person_parts(body, posture), key=lambda part: part.rings[..., 0].mean())
         for part in parts:
             points = camera.reference_to_optical(part.rings)
-            if np.any(points[..., 2] < 0.1):
+            # Nobody synthetic comes so near; hulls of rings are left out instead of being cut.
+            if not in_front(points).all():
                 continue
             pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
             for i, pair in enumerate(pairwise(pixels)):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.recordings.bag_writer import BagWriter
@@ -39,18 +40,6 @@ def session_camera(width: int = 320, height: int = 240) -> Camera:
     """Return the level camera of a session, f = 330 px at a width of 320."""
     focal = _FOCAL_OF_WIDTH * width
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
-
-
-def random_camera(rng: np.random.Generator, width: int = 320, height: int = 240) -> Camera:
-    """Return a camera with another lens: f = 290 to 370 px at a width of 320, up to 5 degrees down.
-
-    At 2 m it keeps a person of :func:`~cardbox_tracker.simulation.person.random_body` with hanging
-    arms in the image.
-    """
-    focal = rng.uniform(290.0, 370.0) / 320.0 * width
-    pitch_rad = np.radians(rng.uniform(0.0, 5.0))
-    cx, cy = (width - 1) / 2, (height - 1) / 2
-    return Camera(width, height, focal, focal, cx, cy, float(pitch_rad))
 
 
 def synthesize_session(
@@ -92,9 +81,9 @@ def synthesize_session(
         raise EncodingError(
             f"encoding '{encoding}' cannot be synthesized; expected {', '.join(_ENCODINGS)}"
         )
-    body = body or BodyModel(hip_height_m=-0.51)
+    body = body or BodyModel.of(hip_height_m=-0.51)
     segments = timeline(motion, body.side_turn)
-    camera = session_camera(width, height).with_pitch(body.camera_pitch_rad)
+    camera = session_camera(width, height).with_pitch(body.camera_pose.pitch_rad)
     rng = np.random.default_rng(seed)
     renderer = Renderer(camera, scene or Scene(), rng.spawn(1)[0])
     count = round(segments[-1].end_s * fps)
@@ -118,7 +107,7 @@ def synthesize_session(
                 # Nobody stands quite still: a slow random walk that is pulled back.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
-                posture[0] += body.lateral_m + sway
+                posture[0] += body.placement.lateral_m + sway
                 image, mask = renderer.image(body, posture)
                 entry |= _truth(body, camera, posture, mask)
                 bag.write_joint_state(TRUTH_TOPIC, stamp_ns, FRAME_ID, JOINT_NAMES, posture)
@@ -175,7 +164,6 @@ def _session(
     seed: int,
 ) -> dict[str, Any]:
     size = body.size
-    hips_to_neck = size("waist_height") + size("torso_height")
     return {
         "format": 1,
         "camera": {
@@ -188,11 +176,11 @@ def _session(
             "frame_id": FRAME_ID,
         },
         "person": {
-            "distance_m": body.distance_m,
+            "distance_m": body.placement.distance_m,
             "upper_arm": size("upper_arm_length"),
             "forearm_to_hand": size("forearm_length"),
             "shoulder_breadth": size("shoulder_breadth"),
-            "hips_to_neck": hips_to_neck,
+            "hips_to_neck": body_parts(body.sizes).torso.top_m,
         },
         "side_posture_turns_to": body.side_turn,
         "fps": fps,

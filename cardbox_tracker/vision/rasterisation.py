@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.vision.camera import Camera, FloatArray
 
 NEAR_PLANE_M = 0.1
-"""What is nearer to the camera's plane than this is cut off, and what lies behind it, too."""
+"""What is nearer to the camera's plane than this, or behind it, is cut off; see ``in_front``."""
 
 SUBPIXELS = 256.0
 """Corners are rounded to a grid of this many points a pixel."""
@@ -35,17 +35,27 @@ FARTHEST_PX = 16000.0
 """Corners beyond this, in either direction, are moved to it."""
 
 
+def in_front(points_m: FloatArray) -> NDArray[np.bool_]:
+    """Which points (..., 3) of the optical frame, metres, are drawn: on the near plane or beyond.
+
+    The rule of everything that draws: polygons are cut by :func:`clip_near`, which keeps just these
+    points; what cannot be cut, such as a skeleton's lines, is left out unless all its points are.
+    """
+    visible: NDArray[np.bool_] = np.asarray(points_m)[..., 2] >= NEAR_PLANE_M
+    return visible
+
+
 def clip_near(corners_m: FloatArray) -> FloatArray:
     """Cut a polygon (n, 3) of the optical frame at the near plane (Sutherland-Hodgman).
 
     Returns:
-        Shape (m, 3) with m from 0 to n + 1, metres.
+        Shape (m, 3), metres; m is 0 to n + 1 for a plane convex polygon.
     """
     kept = []
     for start, end in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
-        if start[2] >= NEAR_PLANE_M:
+        if in_front(start):
             kept.append(start)
-        if (start[2] >= NEAR_PLANE_M) != (end[2] >= NEAR_PLANE_M):
+        if in_front(start) != in_front(end):
             t = (NEAR_PLANE_M - start[2]) / (end[2] - start[2])
             kept.append(np.array([*(start[:2] + t * (end[:2] - start[:2])), NEAR_PLANE_M]))
     return np.array(kept).reshape(-1, 3)

@@ -57,7 +57,7 @@ def test_the_rest_posture_by_hand() -> None:
 
 
 def test_the_constants_place_the_hips() -> None:
-    body = BodyModel(distance_m=3.0, hip_height_m=0.25, lateral_m=0.7, camera_pitch_rad=0.3)
+    body = BodyModel.of(distance_m=3.0, hip_height_m=0.25, lateral_m=0.7, camera_pitch_rad=0.3)
     # lateral_m is where tracking starts, not an offset of torso_y; the frame is level.
     np.testing.assert_allclose(
         forward_kinematics(body, posture(torso_y=0.4)).hip, (-3, 0.4, 0.25), **NEAR

@@ -18,10 +18,12 @@ from cardbox_tracker.body.model_file import (
     loads_body_model,
     save_body_model,
 )
+from cardbox_tracker.body.person import Person
+from cardbox_tracker.body.placement import CameraPose, Placement
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
 from cardbox_tracker.errors import BodyModelError
 
-MODEL = BodyModel(
+MODEL = BodyModel.of(
     sizes=DEFAULT_SIZES * 1.07,
     distance_m=2.34,
     hip_height_m=-0.61,
@@ -54,14 +56,14 @@ def test_any_body_is_read_back_to_the_last_bit(
 ) -> None:
     low, high = SIZE_LIMITS.T
     sizes = np.clip(low + np.array(share) * (high - low), low, high)
-    model = BodyModel(sizes, distance, height, lateral, pitch, turn)
+    model = BodyModel(Person(sizes), Placement(distance, height, lateral), CameraPose(pitch), turn)
     assert loads_body_model(dumps_body_model(model)) == model
 
 
 @pytest.mark.parametrize("name", ["lateral_m", "camera_pitch_rad", "hip_height_m"])
 @pytest.mark.parametrize("value", [1e-05, -2e-17])
 def test_a_body_with_a_tiny_value_is_read_back(name: str, value: float) -> None:
-    model = BodyModel(**{name: value})
+    model = BodyModel.of(**{name: value})
     assert loads_body_model(dumps_body_model(model)) == model
 
 
@@ -82,7 +84,7 @@ def test_the_file_explains_itself() -> None:
 
 
 def test_whole_numbers_are_numbers_too() -> None:
-    assert loads_body_model(replaced("distance_m", "distance_m: 3")).distance_m == 3.0
+    assert loads_body_model(replaced("distance_m", "distance_m: 3")).placement.distance_m == 3.0
 
 
 FOREARM = "forearm_length:"

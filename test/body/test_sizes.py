@@ -65,7 +65,7 @@ def test_shared_arrays_cannot_be_changed(array: np.ndarray) -> None:
 
 def test_a_body_keeps_its_sizes_when_the_array_it_came_from_changes() -> None:
     sizes = DEFAULT_SIZES.copy()
-    model = BodyModel(sizes=sizes)
+    model = BodyModel.of(sizes=sizes)
     sizes[0] = 0.5
     assert model.size("torso_top_width") == 0.34
 
@@ -76,25 +76,25 @@ def test_every_size_is_checked_and_named(name: str) -> None:
         sizes = DEFAULT_SIZES.copy()
         sizes[SIZE_INDEX[name]] = bad
         with pytest.raises(BodyModelError, match=f"^{name} is"):
-            BodyModel(sizes=sizes)
+            BodyModel.of(sizes=sizes)
 
 
 @pytest.mark.parametrize("name", CONSTANTS)
 def test_every_constant_is_checked_and_named(name: str) -> None:
     for bad in (float("nan"), -100.0, 100.0):
         with pytest.raises(BodyModelError, match=f"^{name} is"):
-            BodyModel(**{name: bad})
+            BodyModel.of(**{name: bad})
 
 
 @pytest.mark.parametrize("shape", [(17,), (18, 1), (0,)])
 def test_a_size_vector_of_another_shape_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(BodyModelError, match=r"expected \(18,\)"):
-        BodyModel(sizes=np.full(shape, 0.2))
+        BodyModel.of(sizes=np.full(shape, 0.2))
 
 
 def test_a_side_turn_is_left_or_right() -> None:
     with pytest.raises(BodyModelError, match="side_turn is 'back'"):
-        BodyModel(side_turn="back")
+        BodyModel.of(side_turn="back")
 
 
 def test_a_size_in_centimetres_or_millimetres_gets_a_hint() -> None:
@@ -102,19 +102,19 @@ def test_a_size_in_centimetres_or_millimetres_gets_a_hint() -> None:
         sizes = DEFAULT_SIZES.copy()
         sizes[SIZE_INDEX["upper_arm_length"]] = value
         with pytest.raises(BodyModelError, match=hint):
-            BodyModel(sizes=sizes)
+            BodyModel.of(sizes=sizes)
 
 
 def test_equality_and_hash_see_every_number() -> None:
     base = BodyModel()
     assert base == BodyModel()
     assert hash(base) == hash(BodyModel())
-    changed = [BodyModel(side_turn="right")]
-    changed += [BodyModel(**{name: getattr(base, name) + 0.01}) for name in CONSTANTS]
+    changed = [BodyModel.of(side_turn="right")]
+    changed += [BodyModel.of(**{name: base.constants[name] + 0.01}) for name in CONSTANTS]
     for i in range(N_SIZES):
         sizes = DEFAULT_SIZES.copy()
         sizes[i] += 0.001
-        changed.append(BodyModel(sizes=sizes))
+        changed.append(BodyModel.of(sizes=sizes))
     assert base not in changed
     assert len({base, *changed}) == 1 + len(changed)
     assert base != "a body"
@@ -124,3 +124,14 @@ def test_a_body_is_printed_in_centimetres() -> None:
     lines = str(BodyModel()).splitlines()
     assert len(lines) == 18
     assert lines[0].split() == ["torso_top_width", "34.0", "cm"]
+
+
+def test_values_change_their_own_part_alone() -> None:
+    body = BodyModel.of(distance_m=2.5, camera_pitch_rad=0.1)
+    moved = body.with_values(hip_height_m=-0.3, side_turn="right")
+    assert moved.person is body.person
+    assert moved.camera_pose == body.camera_pose
+    assert (moved.placement.distance_m, moved.placement.hip_height_m) == (2.5, -0.3)
+    assert moved.side_turn == "right"
+    with pytest.raises(TypeError, match="stature"):
+        body.with_values(stature=1.8)

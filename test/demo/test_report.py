@@ -17,7 +17,7 @@ from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.evaluation.truth import load_ground_truth
 from cardbox_tracker.simulation.session import synthesize_session
 
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 LAST = 24
 """So many images of the session's end were tracked."""
 

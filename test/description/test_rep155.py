@@ -19,7 +19,7 @@ from cardbox_tracker.vision.camera import Camera
 
 yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
 
-BODY = BodyModel(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1, camera_pitch_rad=0.15)
+BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1, camera_pitch_rad=0.15)
 LINKS = ("l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist")
 
 
@@ -41,7 +41,7 @@ def places(robot: yourdfpy.URDF, values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def assert_agrees(posture: np.ndarray, values: np.ndarray) -> None:
-    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pitch_rad)
+    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pose.pitch_rad)
     frames = forward_kinematics(BODY, posture)
     found = places(ROBOT, values)
     expected = dict(zip(LINKS, keypoints_m(BODY, posture), strict=True))
@@ -153,12 +153,12 @@ def test_every_name_but_the_sensors_has_the_suffix() -> None:
 
 @pytest.mark.parametrize("pitch", [0.0, 1e-9, 0.2, -0.7])
 def test_the_body_is_upright_before_any_camera(pitch: float) -> None:
-    body = BodyModel(camera_pitch_rad=pitch)
+    body = BodyModel.of(camera_pitch_rad=pitch)
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=pitch)
     robot = load(body)
     robot.update_cfg(dict.fromkeys(joint_names("p1"), 0.0))
     matrix = robot.get_transform("body_p1", "eye")
-    hip = np.array([-body.distance_m, 0.0, body.hip_height_m])
+    hip = np.array([-body.placement.distance_m, 0.0, body.placement.hip_height_m])
     for axis in np.eye(3):
         expected = camera.reference_to_optical(hip + axis)
         np.testing.assert_allclose(matrix[:3, :3] @ axis + matrix[:3, 3], expected, atol=1e-8)

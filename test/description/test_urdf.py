@@ -86,7 +86,7 @@ def random_postures(count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("posture", random_postures(8))
 def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -> None:
-    body = BodyModel(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
+    body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
     poses = link_poses(urdf_from_body(body), dict(zip(JOINT_NAMES, posture, strict=True)))
 
     frames = forward_kinematics(body, posture)
@@ -97,7 +97,7 @@ def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -
 
 
 def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
-    body = BodyModel(camera_pitch_rad=0.2)
+    body = BodyModel.of(camera_pitch_rad=0.2)
     xml = urdf_from_body(body, optical_frame="cam_optical")
     poses = link_poses(xml, dict.fromkeys(JOINT_NAMES, 0.0))
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.2)
@@ -132,7 +132,7 @@ def test_visuals_are_the_fifteen_patches() -> None:
 
 def test_yourdfpy_loads_it_and_agrees() -> None:
     yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
-    body = BodyModel(distance_m=2.3)
+    body = BodyModel.of(distance_m=2.3)
     posture = random_postures(1)[0]
     robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
     assert robot.validate()

@@ -12,7 +12,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.cost import kernels, row_sums
 from cardbox_tracker.estimation.filtering import particle_kernels
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
@@ -27,7 +27,7 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (kernels, particle_kernels, contrast, regions)
+    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels, contrast, regions)
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules

@@ -18,8 +18,9 @@ from cardbox_tracker.estimation.config import (
     default_preset,
     paper_preset,
 )
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
-from cardbox_tracker.estimation.cost.silhouette import ReferenceCost
+from cardbox_tracker.estimation.cost.compiled import CompiledObservation, CompiledSilhouette
+from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
+from cardbox_tracker.estimation.cost.terms import Frame, TorsoCosts
 from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Estimate, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -27,7 +28,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 NOBODY = np.zeros((120, 160), np.uint8)
 STILL = TrackerConfig(
     torso=FilterConfig(rotation_noise_rad=0.0), arm=FilterConfig(rotation_noise_rad=0.0)
@@ -42,7 +43,7 @@ def front(torso_y_m: float = 0.0) -> np.ndarray:
 
 def seen(posture: np.ndarray, body: BodyModel = BODY) -> np.ndarray:
     """The model's own silhouette."""
-    camera = CAMERA.with_pitch(body.camera_pitch_rad)
+    camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
     return render(cardbox_patches(body, posture), camera)
 
 
@@ -70,7 +71,7 @@ def assert_same(first: Estimate, second: Estimate) -> None:
 @pytest.mark.parametrize("make_config", [paper_preset, default_preset])
 def test_an_estimate_says_where_it_is_and_how_well_it_fits(make_config: Any) -> None:
     tracker = make(make_config())
-    reference = ReferenceCost(BODY, CAMERA)
+    reference = ReferenceSilhouette(BODY, CAMERA)
     for silhouette in waving(20):
         estimate = tracker.track(silhouette)
         assert estimate.state == TRACKING
@@ -78,8 +79,7 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits(make_config: Any) -> 
         assert np.all((posture >= JOINT_LIMITS[:, 0]) & (posture <= JOINT_LIMITS[:, 1]))
         expected = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
         np.testing.assert_allclose(estimate.keypoints_m, expected, atol=1e-9)
-        reference.observe(silhouette)
-        cost_px, iou = reference.overlap(posture)
+        cost_px, iou = reference.look(silhouette).overlap(posture)
         assert estimate.cost_px == cost_px
         assert estimate.iou == pytest.approx(iou)
         assert estimate.iou > 0.7
@@ -107,8 +107,8 @@ def test_without_a_generator_runs_repeat_themselves() -> None:
 
 def test_the_reference_cost_gives_the_same_estimates() -> None:
     config = default_preset().with_particles(8)
-    compiled = make(config, 1, cost=CompiledCost(BODY, CAMERA))
-    reference = make(config, 1, cost=ReferenceCost(BODY, CAMERA))
+    compiled = make(config, 1, silhouette=CompiledSilhouette(BODY, CAMERA))
+    reference = make(config, 1, silhouette=ReferenceSilhouette(BODY, CAMERA))
     for silhouette in waving(2):
         assert_same(compiled.track(silhouette), reference.track(silhouette))
 
@@ -126,7 +126,7 @@ def test_before_an_empty_scene_there_is_no_person_and_no_number(make_config: Any
 
 def test_a_quarter_of_the_person_is_needed() -> None:
     tracker = make()
-    whole = seen(front())[: tracker._cost.rows]
+    whole = seen(front())[: tracker._silhouette.rows]
     count = int(0.25 * np.count_nonzero(whole))
     pixels = np.flatnonzero(whole)
     few, enough = NOBODY.copy(), NOBODY.copy()
@@ -139,7 +139,7 @@ def test_a_quarter_of_the_person_is_needed() -> None:
 def test_what_is_below_the_hips_is_nobody() -> None:
     tracker = make()
     legs = NOBODY.copy()
-    legs[tracker._cost.rows :] = 255
+    legs[tracker._silhouette.rows :] = 255
     assert tracker.track(legs).state == NO_PERSON
 
 
@@ -203,7 +203,7 @@ def test_the_papers_tracker_goes_on_from_where_the_person_was() -> None:
 
 
 def test_reset_begins_from_the_front_reference() -> None:
-    body = replace(BODY, lateral_m=0.1)
+    body = BODY.with_values(lateral_m=0.1)
     tracker = Tracker(body, CAMERA, STILL)
     start = reference_posture("front")
     start[0] = 0.1
@@ -211,7 +211,8 @@ def test_reset_begins_from_the_front_reference() -> None:
     raised[4] = raised[8] = 1.2
     # Without noise the first particle is all there is.
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
-    tracker._filter.scatter(raised)
+    observation = CompiledSilhouette(body, CAMERA).look(seen(raised, body))
+    tracker._filter.initialize(observation, raised)
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, raised)
     tracker.reset()
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
@@ -226,7 +227,7 @@ def test_reset_forgets_the_images_that_did_not_fit() -> None:
 
 
 def test_the_camera_is_pitched_as_the_body_model_says() -> None:
-    body = replace(BODY, camera_pitch_rad=0.15)
+    body = BODY.with_values(camera_pitch_rad=0.15)
     estimate = Tracker(body, CAMERA, STILL).track(seen(front(), body))
     assert estimate.cost_px == 0
     assert estimate.iou == 1.0
@@ -247,17 +248,28 @@ def test_a_read_only_silhouette_is_taken() -> None:
     assert make().track(silhouette).state == TRACKING
 
 
-class CountingCost(CompiledCost):
+class CountingSilhouette(CompiledSilhouette):
     """How often torsos were rated, and where they were."""
 
     def __init__(self) -> None:
-        super().__init__(BODY, CAMERA)
         self.torsos: list[np.ndarray] = []
+        super().__init__(BODY, CAMERA)
 
-    def torso(self, torso_postures: np.ndarray) -> np.ndarray:
-        if len(torso_postures) > 1:  # the first is the compiler's
-            self.torsos.append(torso_postures.copy())
-        return super().torso(torso_postures)
+    def observe(self, frame: Frame) -> CompiledObservation:
+        counted = self.torsos
+
+        class Counting(CompiledObservation):
+            def torsos_beside(self, arms: np.ndarray | None) -> TorsoCosts:
+                rate = super().torsos_beside(arms)
+
+                def costs(torsos: np.ndarray) -> np.ndarray:
+                    counted.append(torsos.copy())
+                    return rate(torsos)
+
+                return costs
+
+        seen = super().observe(frame)
+        return Counting(**vars(seen))
 
 
 @pytest.mark.parametrize("cycles", [1, 3])
@@ -265,14 +277,15 @@ def test_an_image_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
     config = replace(paper_preset(), cycles=cycles, noise_decay=0.1).with_particles(2000)
     # One survivor, so that particles lie around it by the noise of one cycle.
     config = replace(config, torso=replace(config.torso, survival_rate=1e-9))
-    cost = CountingCost()
-    tracker = make(config, cost=cost)
+    counting = CountingSilhouette()
+    tracker = make(config, silhouette=counting)
+    counting.torsos.clear()  # the first are the compiler's
     tracker.track(seen(front()))
-    assert len(cost.torsos) == 1
-    cost.torsos.clear()
+    assert len(counting.torsos) == 1
+    counting.torsos.clear()
     tracker.track(seen(front()))
-    assert len(cost.torsos) == cycles
-    for cycle, torsos in enumerate(cost.torsos):
+    assert len(counting.torsos) == cycles
+    for cycle, torsos in enumerate(counting.torsos):
         np.testing.assert_allclose(
             torsos.std(axis=0), np.array([0.02, 0.1, 0.1, 0.1]) * 0.1**cycle, rtol=0.1
         )
@@ -292,6 +305,42 @@ def test_the_mean_of_the_best_is_steadier_than_the_best() -> None:
         return float(np.std(found, axis=0)[1:].sum())
 
     assert spread(20) < spread(1)
+
+
+class StandingStill:
+    """A filter that always finds the posture it started from."""
+
+    def __init__(self, config: TrackerConfig, image_px: int, rng: np.random.Generator) -> None:
+        self.calls: list[tuple[str, float]] = []
+
+    def initialize(self, observation: Any, posture: np.ndarray, noise_scale: float = 1.0) -> None:
+        self.posture = posture
+        self.calls.append(("initialize", noise_scale))
+
+    def iterate(self, observation: Any, noise_scale: float = 1.0, explore: float = 0.0) -> None:
+        self.calls.append(("iterate", noise_scale))
+
+    def estimate(self) -> np.ndarray:
+        return self.posture
+
+    def stddev(self) -> np.ndarray:
+        return np.full(12, 0.5)
+
+
+def test_the_tracker_works_with_any_filter() -> None:
+    config = replace(paper_preset(), cycles=2, noise_decay=0.5)
+    tracker = make(config, make_filter=StandingStill)
+    estimates = [tracker.track(seen(front())) for _ in range(2)]
+    for estimate in estimates:
+        assert (estimate.state, estimate.cost_px, estimate.iou) == (TRACKING, 0, 1.0)
+        np.testing.assert_array_equal(estimate.posture, front())
+        np.testing.assert_array_equal(estimate.posture_stddev, np.full(12, 0.5))
+    assert tracker._filter.calls == [("initialize", 1.0), ("iterate", 1.0), ("iterate", 0.5)]
+
+
+def test_an_image_of_another_size_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"image has shape \(60, 80, 3\); the camera's is"):
+        make().track(seen(front()), np.zeros((60, 80, 3), np.uint8))
 
 
 def test_settings_without_other_particles_hold_from_the_next_silhouette_on() -> None:

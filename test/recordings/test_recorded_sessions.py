@@ -52,7 +52,7 @@ def test_a_recorded_session_is_measured_and_tracked_to_its_end(
     assert main(["initialize", *recording, *words]) == 0
     iou = results[0].mean_iou
     assert iou >= INITIALIZATION_IOU
-    assert load_body_model(model).distance_m == truth.distance_m
+    assert load_body_model(model).placement.distance_m == truth.distance_m
 
     start_s = truth.spans["neutral"][0]
     words = ["--model", str(model), "--start", f"{start_s}", "--csv", str(table)]

@@ -72,7 +72,7 @@ def test_markers_follow_the_person_and_go_with_them(
 ) -> None:
     shown = [array for array in decoded["/markers"] if array.markers[0].action == 0]
     assert len(shown) == len(decoded["/joint_states"])
-    camera = source.camera.with_pitch(recording.body.camera_pitch_rad)
+    camera = source.camera.with_pitch(recording.body.camera_pose.pitch_rad)
     for array, state in zip(shown[:5], decoded["/joint_states"], strict=False):
         triangles, bones = array.markers
         assert (triangles.ns, triangles.type, len(triangles.points)) == ("patches", 11, 90)

@@ -57,7 +57,13 @@ def test_the_person_of_a_recording_is_measured(recording: Any) -> None:
 
 def test_the_measures_are_described_for_a_person(recording: Any) -> None:
     text = describe(recording.result)
-    for part in ("upper_arm_length", " cm", "at 2 m", "fit (IoU): front 0.", "mean 0."):
+    for part in (
+        "upper_arm_length",
+        " cm",
+        "below the camera, 2 m away",
+        "fit (IoU): front 0.",
+        "mean 0.",
+    ):
         assert part in text
 
 

@@ -80,7 +80,7 @@ def test_arms_stay_beside_the_torso(motion: str) -> None:
     sagittal_half = BODY.size("torso_top_width") / 2
     for patch_range, side in ((LEFT_ARM_PATCHES, 1.0), (RIGHT_ARM_PATCHES, -1.0)):
         middle = patches[:, patch_range].mean(axis=(1, 2))
-        hip = np.array([-BODY.distance_m, 0.0, BODY.hip_height_m])
+        hip = np.array([-BODY.placement.distance_m, 0.0, BODY.placement.hip_height_m])
         # In the torso's frame the middle of the arm is further aside than the torso is wide.
         rotation = forward_kinematics(BODY, path).torso_rotation
         local = np.einsum("nji,nj->ni", rotation, middle - hip)

@@ -15,16 +15,23 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.simulation.person import SHIRT, SKIN, random_body
 from cardbox_tracker.simulation.renderer import Renderer, Scene
-from cardbox_tracker.simulation.session import random_camera, session_camera
+from cardbox_tracker.simulation.session import session_camera
 from cardbox_tracker.vision.camera import Camera
 
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 CAMERA = session_camera()
 PLAIN = Scene(texture=0.0, noise=0.0)
 
 
 def renderer(scene: Scene = PLAIN, seed: int = 0, camera: Camera = CAMERA) -> Renderer:
     return Renderer(camera, scene, np.random.default_rng(seed))
+
+
+def random_camera(rng: np.random.Generator) -> Camera:
+    """Of f = 290 to 370 px, up to 5 degrees down: at 2 m hanging arms of `random_body` are seen."""
+    focal = rng.uniform(290.0, 370.0)
+    pitch_rad = np.radians(rng.uniform(0.0, 5.0))
+    return Camera(320, 240, focal, focal, 159.5, 119.5, float(pitch_rad))
 
 
 def cardbox_silhouette(body: BodyModel, posture: NDArray[np.float64]) -> NDArray[np.uint8]:

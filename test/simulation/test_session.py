@@ -53,7 +53,7 @@ def test_the_truth_beside_the_bag_is_that_of_its_messages(session: Path) -> None
 
 def test_the_true_joints_are_those_of_the_kinematics(session: Path) -> None:
     truth = json.loads((session / "ground_truth.json").read_text())
-    body = BodyModel(hip_height_m=-0.51)
+    body = BodyModel.of(hip_height_m=-0.51)
     with BagReader(session) as bag:
         camera = bag.calibration().camera(160, 120)
     for frame in truth["frames"]:
@@ -81,7 +81,7 @@ def test_masks_and_segments_fit_the_frames(session: Path) -> None:
 
 
 def test_the_camera_of_the_bag_is_that_of_the_truth(tmp_path: Path) -> None:
-    body = BodyModel(hip_height_m=-0.4, camera_pitch_rad=0.1, lateral_m=0.2, side_turn="right")
+    body = BodyModel.of(hip_height_m=-0.4, camera_pitch_rad=0.1, lateral_m=0.2, side_turn="right")
     truth = synthesize_session(tmp_path / "bag", **SMALL, body=body)
     with BagReader(tmp_path / "bag") as bag:
         camera = bag.calibration().camera(160, 120)

@@ -47,7 +47,7 @@ class Scene:
     """
 
     def __init__(self, lateral_m: float = 0.05) -> None:
-        self.body = BodyModel(distance_m=2.3, hip_height_m=-0.45, lateral_m=lateral_m)
+        self.body = BodyModel.of(distance_m=2.3, hip_height_m=-0.45, lateral_m=lateral_m)
         self.camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
         self._rng = np.random.default_rng(1)
 
@@ -57,7 +57,7 @@ class Scene:
             return np.zeros((self.camera.height, self.camera.width), np.uint8)
         if isinstance(posture, str):
             posture = reference_posture(posture)
-            posture[0] = self.body.lateral_m
+            posture[0] = self.body.placement.lateral_m
         return render(cardbox_patches(self.body, posture), self.camera)
 
     def image(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:

@@ -88,7 +88,7 @@ def launched(graph: Any, log: Path, *arguments: str) -> Iterator[subprocess.Pope
             process.wait()
 
 
-@pytest.mark.parametrize("single_process", ["false", "true"])
+@pytest.mark.parametrize("cardbox_nodes", ["false", "true"])
 @pytest.mark.parametrize("source", ["replay", "live"])
 def test_a_launch_file_leads_to_joint_states(
     own_graph: Any, recorded: dict[str, Path], scene: Any, source: str, single_process: str
@@ -116,7 +116,7 @@ def test_a_launch_file_leads_to_joint_states(
         assert expected["/eye"] <= found
     text = log.read_text()
     where_m = np.median([state.position[0] for state in states[5:]])
-    assert where_m == pytest.approx(scene.body.lateral_m, abs=0.1)
+    assert where_m == pytest.approx(scene.body.placement.lateral_m, abs=0.1)
     assert text.count("process started with pid") == (1 if single_process == "true" else 4)
     assert "Traceback" not in text and "process has died" not in text, text[-4000:]
 
@@ -133,6 +133,6 @@ def test_every_argument_is_explained(name: str) -> None:
         check=False,
     )
     assert shown.returncode == 0, shown.stderr
-    for argument in ("namespace", "single_process", "person_distance_m", "rep155_id"):
+    for argument in ("namespace", "cardbox_nodes", "person_distance_m", "rep155_id"):
         assert f"'{argument}':" in shown.stdout
     assert "No description given" not in shown.stdout

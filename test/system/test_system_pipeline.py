@@ -239,7 +239,7 @@ def test_body_model_message_is_the_saved_file(measured: tuple[Session, str, str]
     session, _, text = measured
     assert session.model_file.read_text() == text
     body = loads_body_model(text)
-    assert body.distance_m == pytest.approx(2.3)
+    assert body.placement.distance_m == pytest.approx(2.3)
     assert body.size("upper_arm_length") == pytest.approx(
         session.scene.body.size("upper_arm_length"), abs=0.06
     )
@@ -270,7 +270,7 @@ def test_each_image_gives_joint_states_of_its_stamp(measured: tuple[Session, str
     posture = np.array(messages[-1].position)
     body, camera = session.scene.body, session.scene.camera
     truth = reference_posture("front")
-    truth[0] = body.lateral_m
+    truth[0] = body.placement.lateral_m
     found = keypoints_m(body, posture)
     error_m = np.linalg.norm(found - keypoints_m(body, truth), axis=1)
     assert error_m.mean() < 0.15

@@ -122,7 +122,7 @@ def test_resume_while_playing_is_refused(graph: Any, bag: Path) -> None:
 def test_it_plays_in_the_process_of_the_nodes_and_ends_on_a_signal(graph: Any, bag: Path) -> None:
     images = graph.collect(Image, "image_raw", qos.REPLAY)
     given = ("-p", f"play_bag:bag:={bag}", "-p", "play_bag:loop:=true")
-    process = graph.start("single_process", "--with", "play_bag", "--ros-args", *given)
+    process = graph.start("cardbox_nodes", "--with", "play_bag", "--ros-args", *given)
     graph.wait(lambda: len(images) > COUNT + 5, "images of the second round")
     assert process.stop() == 0, process.text()
     graph.processes.remove(process)

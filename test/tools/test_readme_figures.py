@@ -74,12 +74,17 @@ def hand_made() -> dict[str, Any]:
 
 def test_section_by_hand() -> None:
     results = hand_made()
-    text = readme_section(results, {"person": {"reach": results["wave"]}})
+    text = readme_section(results, {"person": {"runs": 3, "reach": results["wave"]}})
     row = "12.3 cm | 12.3 cm | 25.0 cm | 25.0 cm | 988 px | 988 px |"
     assert f"| wave | {row}" in text
     assert f"| reach (person) | {row}" in text
     assert "7 runs (a quick run)" in text
-    assert "5.0 cm instead of 5.0 cm" in " ".join(text.split())
+    words = " ".join(text.split())
+    assert (
+        "synthetic motions is 5.0 cm; with the preset `paper`, run equally often, 5.0 cm" in words
+    )
+    assert "`person` are images of rendered, realistically shaped bodies, not films" in words
+    assert "(3 runs)" in words
     assert max(len(line) for line in text.splitlines()) <= 100
 
 

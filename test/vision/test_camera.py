@@ -72,10 +72,12 @@ def test_what_is_straight_ahead_appears_above_the_middle_of_a_camera_that_looks_
 
 
 @given(POINTS, st.floats(-1.4, 1.4))
-def test_the_way_back_from_the_optical_frame(points: np.ndarray, pitch: float) -> None:
+def test_the_way_to_the_optical_frame_is_a_rotation(points: np.ndarray, pitch: float) -> None:
     camera = CAMERA.with_pitch(pitch)
+    rotation = camera.reference_to_optical_rotation()
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
     optical = camera.reference_to_optical(points)
-    np.testing.assert_allclose(optical @ camera.reference_to_optical_rotation(), points, atol=1e-12)
+    np.testing.assert_allclose(optical @ rotation, points, atol=1e-12)
     np.testing.assert_allclose(
         np.linalg.norm(optical, axis=1), np.linalg.norm(points, axis=1), atol=1e-12
     )

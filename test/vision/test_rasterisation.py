@@ -15,6 +15,7 @@ from cardbox_tracker.vision.rasterisation import (
     NEAR_PLANE_M,
     clip_near,
     fill_convex,
+    in_front,
     render,
     snap,
 )
@@ -198,10 +199,19 @@ def test_one_corner_behind_makes_five() -> None:
     assert np.count_nonzero(cut[:, 2] == NEAR_PLANE_M) == 2
 
 
+def test_a_point_on_the_near_plane_is_in_front() -> None:
+    depths = [NEAR_PLANE_M, np.nextafter(NEAR_PLANE_M, 0), np.nextafter(NEAR_PLANE_M, 1), 0, -1]
+    points = np.array([(0.2, 0.3, z) for z in depths])
+    assert in_front(points).tolist() == [True, False, True, False, False]
+    assert in_front(points[0])
+    on = wall((-1, 1), (-1, 1), (NEAR_PLANE_M, NEAR_PLANE_M))
+    np.testing.assert_array_equal(clip_near(on), on)
+
+
 @given(st.lists(st.tuples(*[st.floats(-3, 3)] * 3), min_size=4, max_size=4))
 def test_nothing_nearer_than_the_near_plane_is_left(corners: list[tuple[float, ...]]) -> None:
     cut = clip_near(np.array(corners))
-    assert np.all(cut[:, 2] >= NEAR_PLANE_M)
+    assert np.all(in_front(cut))
 
 
 def test_a_patch_before_the_camera_by_hand() -> None:
@@ -233,7 +243,7 @@ def test_a_patch_half_behind_draws_only_its_part_in_front() -> None:
 
 
 def test_several_patches_are_drawn_together() -> None:
-    patches = cardbox_patches(BodyModel(distance_m=3.0), reference_posture("front"))
+    patches = cardbox_patches(BodyModel.of(distance_m=3.0), reference_posture("front"))
     together = render(patches, CAMERA)
     alone = [render(patch[None], CAMERA) for patch in patches]
     np.testing.assert_array_equal(together, np.bitwise_or.reduce(alone))

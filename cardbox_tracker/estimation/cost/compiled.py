@@ -1,4 +1,4 @@
-"""The cost of equation (2), compiled: equal results, a fraction of the time.
+"""The silhouette's term, compiled: equal results, a fraction of the time.
 
 What it equals is in :mod:`cardbox_tracker.estimation.cost.silhouette`; see
 :mod:`cardbox_tracker.estimation.cost.kernels` for how it works.
@@ -6,172 +6,190 @@ What it equals is in :mod:`cardbox_tracker.estimation.cost.silhouette`; see
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import kernels
-from cardbox_tracker.estimation.cost.silhouette import (
-    CostArray,
-    Silhouette,
-    check_silhouette,
-    rows_above_hips,
-)
+from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
+from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
 from cardbox_tracker.vision.camera import Camera
+
+CountArray = NDArray[np.int64]
 
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
 
 
-class CompiledCost:
-    """Implements ``SilhouetteCost`` with compiled kernels."""
+class CompiledSilhouette(SilhouetteTerm):
+    """The silhouette's term with compiled kernels."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernels if they are not yet."""
-        self.body, self.camera = body, camera
-        self.rows = rows_above_hips(body, camera)
-        self.silhouette_px = 0
-        self._sizes, self._place, self._view = _constants(body, camera)
+        super().__init__(body, camera)
+        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
-        sums = np.int16 if camera.width < 2**15 else np.int32
-        self._table = np.zeros((self.rows, camera.width + 1), sums)
-        self._covered = np.zeros_like(self._table)
-        self._torso_table = self._table
-        self._torso_base = 0
-        self._beside_arms = np.zeros_like(self._table)
-        self._torso = np.zeros(4)
-        self._base = 0
+        self._sums = np.int16 if camera.width < 2**15 else np.int32
         self.warm_up()
 
     def warm_up(self) -> None:
         """Run every kernel once, so that no live image waits for the compiler."""
         empty = np.zeros((self.camera.height, self.camera.width), np.uint8)
-        self.observe(empty)
+        self.look(empty)
         # Pixels out of a message are read-only, which is another type to the compiler.
         empty.setflags(write=False)
-        self.observe(empty)
-        self.fix_arms(np.zeros(12))
-        self.torso(np.zeros((1, 4)))
-        self.fix_arms(None)
-        self.fix_torso(np.zeros(4))
-        self.arm("left", np.zeros((1, 4)))
-        self.full(np.zeros((1, 12)))
-        self.bodies(self._sizes[None], np.zeros((1, 12)))
+        observation = self.look(empty)
+        observation.torsos_beside(np.zeros(12))(np.zeros((1, 4)))
+        observation.arms_beside(np.zeros(4))("left", np.zeros((1, 4)))
+        observation.postures(np.zeros((1, 12)))
+        observation.bodies(self.body.sizes[None], np.zeros((1, 12)))
 
-    def observe(self, silhouette: Silhouette) -> None:
-        """See :class:`SilhouetteCost`."""
-        check_silhouette(silhouette, self.camera)
-        seen = np.ascontiguousarray(silhouette[: self.rows])
-        words = seen.view(np.uint64) if seen.shape[1] % 8 == 0 else _NO_WORDS
-        self.silhouette_px = int(kernels.running_sums(seen, words, self._table))
-        self.fix_arms(None)
+    def observe(self, frame: Frame) -> CompiledObservation:
+        """See :class:`SilhouetteTerm`."""
+        upper = np.ascontiguousarray(frame.silhouette[: self.rows])
+        words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
+        row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
+        fill_row_sums(upper, words, row_sums)
+        return CompiledObservation(frame, row_sums, *self._constants)
 
-    def torso(self, torso_postures: FloatArray) -> CostArray:
-        """See :class:`SilhouetteCost`."""
-        postures = np.ascontiguousarray(torso_postures, dtype=np.float64)
-        costs = np.empty(len(postures), np.int64)
-        kernels.trunk_costs(
-            postures,
-            self._sizes,
-            self._place,
-            self._view,
-            self._torso_table,
-            self._torso_base,
-            costs,
-        )
-        return costs
+    def look(self, silhouette: Silhouette) -> CompiledObservation:
+        """See :class:`SilhouetteTerm`."""
+        return self.observe(self.frame(silhouette))
 
-    def fix_arms(self, posture: FloatArray | None) -> None:
-        """See :class:`SilhouetteCost`."""
-        self._torso_table, self._torso_base = self._table, self.silhouette_px
-        if posture is not None:
-            self._torso_table = self._beside_arms
-            self._torso_base += int(
+
+@dataclass(frozen=True, eq=False)
+class CompiledObservation(SilhouetteObservation):
+    """One silhouette as running sums along its rows.
+
+    Attributes:
+        frame: the frame.
+        row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
+        parts: lengths of the body's parts, (6, 6), metres (``kernel_arguments``).
+        shoulder: where the shoulder joints are in the torso's frame, (2,), metres.
+        place: where the hips are.
+        view: the camera.
+    """
+
+    frame: Frame
+    row_sums: NDArray[Any]
+    parts: FloatArray
+    shoulder: FloatArray
+    place: PlaceTuple
+    view: ViewTuple
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`SilhouetteObservation`."""
+        row_sums, base = self.row_sums, self.frame.foreground_px
+        if arms is not None:
+            row_sums = np.empty_like(self.row_sums)
+            posture = np.array(arms, dtype=np.float64)
+            base += int(
                 kernels.cover_arms(
-                    np.array(posture, dtype=np.float64),
-                    self._sizes,
-                    self._place,
-                    self._view,
-                    self._table,
-                    self._beside_arms,
+                    posture,
+                    self.parts,
+                    self.shoulder,
+                    self.place,
+                    self.view,
+                    self.row_sums,
+                    row_sums,
                 )
             )
 
-    def fix_torso(self, torso_posture: FloatArray) -> None:
-        """See :class:`SilhouetteCost`."""
-        self._torso = np.array(torso_posture, dtype=np.float64)
-        self._base = self.silhouette_px + int(
-            kernels.cover_trunk(
-                self._torso, self._sizes, self._place, self._view, self._table, self._covered
+        def costs(torsos: FloatArray) -> FloatArray:
+            particles = np.ascontiguousarray(torsos, dtype=np.float64)
+            counts = np.empty(len(particles), np.int64)
+            kernels.trunk_costs(
+                particles, self.parts, self.place, self.view, row_sums, base, counts
             )
-        )
+            return counts.astype(np.float64)
 
-    def arm(self, side: str, arm_postures: FloatArray) -> CostArray:
-        """See :class:`SilhouetteCost`."""
-        postures = np.ascontiguousarray(arm_postures, dtype=np.float64)
-        costs = np.empty(len(postures), np.int64)
-        kernels.arm_costs(
-            postures,
-            _SIDE_SIGN[side],
-            self._torso,
-            self._sizes,
-            self._place,
-            self._view,
-            self._covered,
-            self._base,
-            costs,
-        )
         return costs
 
-    def full(self, postures: FloatArray) -> CostArray:
-        """See :class:`SilhouetteCost`."""
-        return self._full(postures)[0]
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`SilhouetteObservation`."""
+        pose = np.array(torso, dtype=np.float64)
+        covered = np.empty_like(self.row_sums)
+        base = self.frame.foreground_px + int(
+            kernels.cover_trunk(pose, self.parts, self.place, self.view, self.row_sums, covered)
+        )
+
+        def costs(side: str, arms: FloatArray) -> FloatArray:
+            particles = np.ascontiguousarray(arms, dtype=np.float64)
+            counts = np.empty(len(particles), np.int64)
+            kernels.arm_costs(
+                particles,
+                _SIDE_SIGN[side],
+                pose,
+                self.parts,
+                self.shoulder,
+                self.place,
+                self.view,
+                covered,
+                base,
+                counts,
+            )
+            return counts.astype(np.float64)
+
+        return costs
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """See :class:`SilhouetteObservation`."""
+        return self._full(postures)[0].astype(np.float64)
 
     def overlap(self, posture: FloatArray) -> tuple[int, float]:
-        """See :class:`SilhouetteCost`."""
+        """See :class:`SilhouetteObservation`."""
         costs, areas = self._full(np.asarray(posture)[None])
         cost, area = int(costs[0]), int(areas[0])
-        common = (self.silhouette_px + area - cost) // 2
-        union = self.silhouette_px + area - common
+        foreground = self.frame.foreground_px
+        common = (foreground + area - cost) // 2
+        union = foreground + area - common
         return cost, common / union if union else 0.0
 
-    def bodies(self, sizes: FloatArray, postures: FloatArray) -> CostArray:
-        """Costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12), in one place."""
+    def bodies(self, sizes: FloatArray, postures: FloatArray) -> CountArray:
+        """Return costs (N,) of bodies with ``sizes`` (N, 18) in ``postures`` (N, 12)."""
         costs = np.empty(len(sizes), np.int64)
         kernels.body_costs(
-            np.ascontiguousarray(sizes, dtype=np.float64),
-            self._place,
             np.ascontiguousarray(postures, dtype=np.float64),
-            self._view,
-            self._table,
-            self.silhouette_px,
+            *shape_of(np.asarray(sizes, dtype=np.float64)),
+            self.place,
+            self.view,
+            self.row_sums,
+            self.frame.foreground_px,
             costs,
         )
         return costs
 
-    def polygons(self, corners_m: FloatArray) -> CostArray:
-        """Costs (N,) of any planar quadrilaterals (N, K, 4, 3), metres in the optical frame."""
+    def polygons(self, corners_m: FloatArray) -> CountArray:
+        """Return costs (N,) of planar quadrilaterals (N, K, 4, 3), metres in the optical frame."""
         costs = np.empty(len(corners_m), np.int64)
         kernels.polygon_costs(
             np.ascontiguousarray(corners_m, dtype=np.float64),
-            self._view,
-            self._table,
-            self.silhouette_px,
+            self.view,
+            self.row_sums,
+            self.frame.foreground_px,
             costs,
         )
         return costs
 
-    def _full(self, postures: FloatArray) -> tuple[CostArray, CostArray]:
+    def _full(self, postures: FloatArray) -> tuple[CountArray, CountArray]:
         contiguous = np.ascontiguousarray(postures, dtype=np.float64)
         costs = np.empty(len(contiguous), np.int64)
         areas = np.empty(len(contiguous), np.int64)
         kernels.full_costs(
             contiguous,
-            self._sizes,
-            self._place,
-            self._view,
-            self._table,
-            self.silhouette_px,
+            self.parts,
+            self.shoulder,
+            self.place,
+            self.view,
+            self.row_sums,
+            self.frame.foreground_px,
             costs,
             areas,
         )
@@ -183,7 +201,7 @@ class CompiledKeypoints:
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
-        self._constants = _constants(body, camera)
+        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
         self(np.zeros(12))
 
     def __call__(self, posture: FloatArray) -> FloatArray:
@@ -191,11 +209,3 @@ class CompiledKeypoints:
         points = np.empty((6, 3))
         kernels.keypoints(np.array(posture, dtype=np.float64), *self._constants, points)
         return points
-
-
-def _constants(body: BodyModel, camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Sizes, place and view as the kernels take them."""
-    pitch = camera.pitch_rad
-    view = (camera.fx, camera.fy, camera.cx, camera.cy, np.cos(pitch), np.sin(pitch))
-    place = (body.distance_m, body.hip_height_m)
-    return np.array(body.sizes), np.array(place), np.array(view)

@@ -1,6 +1,6 @@
 """One particle filter over a few joints (paper, algorithm "Online Motion Tracking").
 
-A cycle is: resample, add noise, keep within the joint limits, rate. The initial particles are
+An iteration is: resample, propagate, clip, inject, evaluate. The initial particles are
 d_ref + N(0, sigma_beta^2 E).
 """
 
@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import FilterConfig
 from cardbox_tracker.estimation.filtering.particle_kernels import (
+    clip,
     propagate,
     weighted_mean,
     weighted_stddev,
 )
-from cardbox_tracker.estimation.filtering.resampling import Ancestors, Resampler
+from cardbox_tracker.estimation.filtering.resampling import Indices, resample
 
 FloatArray = NDArray[np.float64]
 CostFunction = Callable[[FloatArray], FloatArray]
 """Particles (N, D) -> costs (N,), px."""
 
 SPREAD_PX = 60.0
-"""Particles this much costlier than the best weigh 1/e in the mean, px at 320x240."""
+"""Particles this much costlier than the best weigh 1/e in mean and deviation, px at 320x240."""
 
 
 class ParticleFilter:
@@ -33,36 +34,40 @@ class ParticleFilter:
     def __init__(
         self,
         config: FilterConfig,
-        resampler: Resampler,
+        strategy: str,
         noise: FloatArray,
         limits: FloatArray,
         rng: np.random.Generator,
     ) -> None:
-        """Set the filter up; :meth:`scatter` gives it particles.
+        """Set the filter up; :meth:`initialize` gives it particles.
 
         Args:
             config: numbers of Table I.
-            resampler: a strategy of :mod:`cardbox_tracker.estimation.filtering.resampling`.
+            strategy: a name of :mod:`cardbox_tracker.estimation.filtering.resampling`.
             noise: sigma_beta of each joint, (D,), rad and metres.
             limits: lowest and highest value of each joint, (D, 2).
             rng: the source of noise.
         """
         self.config = config
+        self.strategy = strategy
         self.noise = noise
-        self._resampler = resampler
         self._limits = limits
         self._rng = rng
         self.particles = np.zeros((config.particles, len(noise)))
         self.costs = np.zeros(config.particles)
 
-    def scatter(self, posture: FloatArray, rate: CostFunction, noise_scale: float = 1.0) -> None:
+    def initialize(
+        self, posture: FloatArray, evaluate: CostFunction, noise_scale: float = 1.0
+    ) -> None:
         """Start with particles around ``posture`` (D,), itself among them, and rate them."""
         self.particles[:] = posture
-        self._rate(np.arange(len(self.particles)), noise_scale, rate)
+        particles = self._propagated(np.arange(len(self.particles)), noise_scale)
+        clip(particles, self._limits)
+        self.particles, self.costs = particles, evaluate(particles)
 
-    def cycle(
+    def iterate(
         self,
-        rate: CostFunction,
+        evaluate: CostFunction,
         noise_scale: float = 1.0,
         sigma_scale: float = 1.0,
         explorers: int = 0,
@@ -70,32 +75,37 @@ class ParticleFilter:
         """Run one estimation cycle.
 
         Args:
-            rate: costs of particles against the present silhouette.
+            evaluate: costs of particles against the present frame.
             noise_scale: factor on sigma_beta.
             sigma_scale: factor on sigma_gamma, such as for a larger image.
-            explorers: so many particles, the last ones, are drawn from anywhere within the limits.
+            explorers: how many particles, the last ones, are drawn from anywhere in the limits.
         """
-        ancestors = self._resampler(
+        ancestors = resample(
+            self.strategy,
             self.costs,
             self.config.survival_rate,
             self.config.sigma_gamma_px * sigma_scale,
             self._rng,
             self.config.elite,
         )
-        self._rate(ancestors, noise_scale, rate, explorers)
+        particles = self._propagated(ancestors, noise_scale)
+        clip(particles, self._limits)
+        self._inject(particles, explorers)
+        self.particles, self.costs = particles, evaluate(particles)
 
-    def _rate(
-        self, ancestors: Ancestors, noise_scale: float, rate: CostFunction, explorers: int = 0
-    ) -> None:
+    def _propagated(self, ancestors: Indices, noise_scale: float) -> FloatArray:
+        """Return the ancestors' places plus Gaussian noise, (N, D); the elite gets none."""
         steps = self._rng.standard_normal(self.particles.shape)
         if self.config.elite:
             steps[0] = 0.0
-        propagate(steps, self.particles, ancestors, self.noise * noise_scale, self._limits)
+        propagate(steps, self.particles, ancestors, self.noise * noise_scale)
+        return steps
+
+    def _inject(self, particles: FloatArray, explorers: int) -> None:
+        """Replace the last ``explorers`` of the particles (N, D) by any within the limits."""
         if explorers > 0:
             low, high = self._limits.T
-            steps[-explorers:] = low + (high - low) * self._rng.random((explorers, len(low)))
-        self.particles = steps
-        self.costs = rate(self.particles)
+            particles[-explorers:] = low + (high - low) * self._rng.random((explorers, len(low)))
 
     def best(self) -> FloatArray:
         """Return the particle (D,) of lowest cost."""
@@ -105,7 +115,7 @@ class ParticleFilter:
     def mean(self, count: int, spread_scale: float = 1.0) -> FloatArray:
         """Return the mean (D,) of the ``count`` best particles; with 1 it is the best one.
 
-        They are weighted by exp(-(W - W_best) / spread).
+        They are weighted by exp(-(W - W_best) / (``SPREAD_PX`` ``spread_scale``)).
         """
         if count == 1:
             return self.best()
@@ -115,9 +125,10 @@ class ParticleFilter:
         return mean
 
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
-        """Return the standard deviation (D,) of the particles around ``mean`` (D,).
+        """Return the standard deviation (D,) of all particles around ``mean`` (D,).
 
-        They are weighted as for the mean: it says how far one could go without fitting worse.
+        They are weighted as for the mean, so it tells how far a joint can move before the fit
+        becomes worse.
         """
         stddev: FloatArray = weighted_stddev(
             self.particles, self.costs, mean, SPREAD_PX * spread_scale

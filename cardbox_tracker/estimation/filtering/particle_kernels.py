@@ -1,4 +1,4 @@
-"""What a filter does to all its particles in every cycle, compiled."""
+"""What a filter does to all its particles in every iteration, compiled."""
 
 from __future__ import annotations
 
@@ -12,17 +12,24 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @_compile
-def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any, limits: Any) -> None:
+def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
     """Turn ``steps`` (N, D) of unit noise into new particles, in place.
 
     A new particle is its ancestor's place in ``particles`` (N, D) plus ``sigma`` (D,) times its
-    noise, kept within ``limits`` (D, 2). ``ancestors`` is (N,).
+    noise. ``ancestors`` is (N,).
     """
     for i in range(steps.shape[0]):
         ancestor = ancestors[i]
         for d in range(steps.shape[1]):
-            moved = particles[ancestor, d] + steps[i, d] * sigma[d]
-            steps[i, d] = min(max(moved, limits[d, 0]), limits[d, 1])
+            steps[i, d] = particles[ancestor, d] + steps[i, d] * sigma[d]
+
+
+@_compile
+def clip(particles: Any, limits: Any) -> None:
+    """Move every joint of ``particles`` (N, D) into its ``limits`` (D, 2), in place."""
+    for i in range(particles.shape[0]):
+        for d in range(particles.shape[1]):
+            particles[i, d] = min(max(particles[i, d], limits[d, 0]), limits[d, 1])
 
 
 @_compile
@@ -96,20 +103,3 @@ def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
     for d in range(particles.shape[1]):
         mean[d] /= total
     return mean
-
-
-@_compile
-def add_prior(costs: Any, particles: Any, below: Any, above: Any, weight: float) -> Any:
-    """Costs (N,) plus ``weight`` times the squared distances of particles (N, D) from rest.
-
-    A value is measured in units 1/``above`` (D,) where it is positive, 1/``below`` (D,) where not.
-    """
-    rated = np.empty(costs.shape[0])
-    for i in range(costs.shape[0]):
-        squares = 0.0
-        for d in range(particles.shape[1]):
-            value = particles[i, d]
-            scaled = value * (below[d] if value < 0.0 else above[d])
-            squares += scaled * scaled
-        rated[i] = costs[i] + weight * squares
-    return rated

@@ -1,6 +1,6 @@
-"""How the particles of one estimation cycle follow from those of the one before.
+"""How the particles of one iteration follow from those of the one before.
 
-A resampler chooses *ancestors*: for each new particle the index of the old one whose neighbourhood
+Resampling chooses *ancestors*: for each new particle the index of the old one whose neighbourhood
 it is drawn from. The filter then adds noise to all but the first, which is kept as it is:
 
     d_1^k = d_best^{k-1},    d_i^k = d_ancestor(i)^{k-1} + N(0, sigma_beta^2 E),  i > 1
@@ -8,44 +8,46 @@ it is drawn from. The filter then adds noise to all but the first, which is kept
 That first particle is the *elite*. The paper keeps it in both of its strategies; without it
 (``elite=False``) all N ancestors are drawn, and all get noise, as in a textbook particle filter.
 
-The strategies of the paper (section III-C) and, beside them, the standard schemes:
+There are two families. :func:`truncation` looks at the order of the costs alone:
 
 ``drs``
     The paper's deterministic resampling. The particles are ranked by cost; the best e N survive,
     each as its own ancestor, and the rest are redrawn around the single best one. No weights, no
-    random numbers: only the order of the costs matters. (The name is the paper's. It has nothing to
-    do with "deterministic" schemes that copy particles in proportion to weights, such as residual
-    or fixed-offset systematic resampling.) It is truncation selection with an elite, as evolution
-    strategies have it, more than a way of sampling from a posterior.
+    random numbers. (The name is the paper's. It has nothing to do with "deterministic" schemes that
+    copy particles in proportion to weights, such as residual or fixed-offset systematic
+    resampling.) It is truncation selection with an elite, as evolution strategies have it, more
+    than a way of sampling from a posterior.
+
+The others draw from weights exp(-W^2 / (2 sigma_gamma^2)), each a *scheme*, a function
+``scheme(weights, n, rng)`` that returns ``n`` indices:
+
 ``srs``
-    Stratified resampling (Kitagawa 1996). Weights exp(-W^2 / (2 sigma_gamma^2)), and one uniform
-    number in each of N equal strata of their cumulative sum. The paper's comparison.
+    Stratified resampling (Kitagawa 1996): one uniform number in each of n equal strata of the
+    cumulative weights. The paper's comparison.
 ``systematic``
     The same with one uniform number for all strata (Carpenter, Clifford & Fearnhead 1999). The
-    least random numbers and, mostly, the least variance; what many libraries take by default.
+    fewest random numbers and, mostly, the least variance; what many libraries take by default.
 ``residual``
     floor(n w) copies of each particle, and independent draws for what is left over (Liu & Chen
     1998).
 ``multinomial``
-    N independent draws from the weights (Gordon, Salmond & Smith 1993): the bootstrap filter, and
-    the one with the highest variance. For comparison only.
+    n independent draws (Gordon, Salmond & Smith 1993): the bootstrap filter, and the scheme with
+    the highest variance. For comparison only.
 
 Douc, Cappe & Moulines ("Comparison of resampling schemes for particle filtering", 2005) show that
 residual and stratified resampling never have more variance than multinomial; Gerber, Chopin &
 Whiteley ("Negative association, ordering and convergence of resampling methods", 2019) have the
-state of the theory.
-All four share the weights, and the weights decide: the paper's sigma_gamma is so wide that they
-hardly differ. Stratified and systematic resampling then keep nearly every particle once, and the
-swarm spreads from cycle to cycle; the chance copies of multinomial and residual draws, a fault
-elsewhere, hold it together a little. ``docs/evaluation`` has the measurement.
+state of the theory. All four share the weights, and the weights decide: the paper's sigma_gamma is
+so wide that the schemes hardly differ (``docs/evaluation``).
 
-In doubt take ``drs``: with a few hundred particles it concentrates on what fits.
+In doubt take ``drs``: with a few hundred particles it concentrates on what fits. A new scheme is a
+function here and its entry in ``SCHEMES``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,53 +55,61 @@ from numpy.typing import NDArray
 from cardbox_tracker.estimation.filtering.particle_kernels import truncate
 
 FloatArray = NDArray[np.float64]
-Ancestors = NDArray[np.intp]
+Indices = NDArray[np.intp]
+
+Scheme = Callable[[FloatArray, int, np.random.Generator], Indices]
+"""Takes weights (N,) that sum to 1, how many to draw, and the source of random numbers."""
 
 
-class Resampler(Protocol):
-    """A strategy."""
-
-    def __call__(
-        self,
-        costs: FloatArray,
-        survival_rate: float,
-        sigma_gamma_px: float,
-        rng: np.random.Generator,
-        elite: bool = True,
-    ) -> Ancestors:
-        """Return the ancestors (N,) of the next particles.
-
-        Args:
-            costs: of the present particles, (N,), px.
-            survival_rate: e; DRS alone looks at it.
-            sigma_gamma_px: width of the weights; DRS does not look at it.
-            rng: source of random numbers.
-            elite: the first ancestor is the best particle, and the others are drawn; without it
-                all are.
-        """
+def stratified(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
+    """Return ``n`` indices, one drawn in each of n strata of the weights (N,)."""
+    return _inverse_cdf(weights, (np.arange(n) + rng.random(n)) / n)
 
 
-def deterministic(
-    costs: FloatArray,
-    survival_rate: float,
-    sigma_gamma_px: float,
-    rng: np.random.Generator,
-    elite: bool = True,
-) -> Ancestors:
-    """Algorithm "DRS": ancestors (N,) from the order of ``costs`` (N,) alone.
-
-    The best particle comes first with or without ``elite``: it survives in either case. The other
-    survivors keep their order, so a partition does the work of a sort; of equals, the first ones
-    survive.
-    """
-    # The product may fall short of a whole number by rounding, as 0.29 times 100 does.
-    survivors = max(1, int(survival_rate * len(costs) + 1e-9))
-    ancestors: Ancestors = truncate(costs, survivors)
-    return ancestors
+def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
+    """Return ``n`` indices, at the same place in each of n strata of the weights (N,)."""
+    return _inverse_cdf(weights, (np.arange(n) + rng.random()) / n)
 
 
-def srs_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
-    """Normalized probabilities (N,) of ``costs`` (N,): p = exp(-W^2 / (2 sigma_gamma^2)) / sum p.
+def multinomial(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
+    """Return ``n`` indices, drawn from the weights (N,) independent of each other."""
+    return _inverse_cdf(weights, rng.random(n))
+
+
+def residual(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
+    """Return floor(n w) copies of each index, and the rest of the ``n`` drawn from what remains."""
+    copies = np.floor(n * weights).astype(np.intp)
+    rest = n - int(copies.sum())
+    if rest > 0:
+        cumulative = np.cumsum(n * weights - copies)
+        drawn = np.searchsorted(cumulative, rng.random(rest) * cumulative[-1], side="right")
+        np.add.at(copies, drawn, 1)
+    return np.repeat(np.arange(len(weights)), copies)
+
+
+def _inverse_cdf(weights: FloatArray, numbers: FloatArray) -> Indices:
+    """Psi = min {j | r <= L_j} for each r of ``numbers`` in [0, 1)."""
+    cumulative = np.cumsum(weights)
+    cumulative[-1] = 1.0
+    return np.searchsorted(cumulative, numbers)
+
+
+SCHEMES: MappingProxyType[str, Scheme] = MappingProxyType(
+    {
+        "srs": stratified,
+        "systematic": systematic,
+        "residual": residual,
+        "multinomial": multinomial,
+    }
+)
+"""Every scheme that draws from weights, by name."""
+
+STRATEGIES: tuple[str, ...] = ("drs", *SCHEMES)
+"""Every name that ``strategy`` may have."""
+
+
+def gaussian_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
+    """Normalized weights (N,) of ``costs`` (N,): p = exp(-W^2 / (2 sigma_gamma^2)) / sum p.
 
     Computed relative to the best particle, so that large costs do not make all of them 0.
     """
@@ -109,88 +119,40 @@ def srs_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
     return normalized
 
 
-def _draw(costs: FloatArray, sigma_gamma_px: float, numbers: FloatArray, elite: bool) -> Ancestors:
-    """Ancestors where ``numbers``, each in [0, 1), fall in the cumulative weights L_i.
+def truncation(costs: FloatArray, survival_rate: float) -> Indices:
+    """Algorithm "DRS": ancestors (N,) from the order of ``costs`` (N,) alone.
 
-    With ``elite`` the best particle comes first, and the last N - 1 of the numbers count.
+    The best particle comes first, with or without an elite; the other survivors keep their order,
+    so a partition does the work of a sort. Of equal costs the first ones survive.
     """
-    cumulative = np.cumsum(srs_weights(costs, sigma_gamma_px))
-    cumulative[-1] = 1.0
-    n = len(costs)
-    ancestors = np.empty(n, dtype=np.intp)
-    first = int(elite)
-    if elite:
-        ancestors[0] = np.argmin(costs)
-    # psi = min {j | r <= L_j}
-    ancestors[first:] = np.searchsorted(cumulative, numbers[first:])
+    # The product may fall short of a whole number by rounding, as 0.29 times 100 does.
+    survivors = max(1, int(survival_rate * len(costs) + 1e-9))
+    ancestors: Indices = truncate(costs, survivors)
     return ancestors
 
 
-def stratified(
+def resample(
+    strategy: str,
     costs: FloatArray,
     survival_rate: float,
     sigma_gamma_px: float,
     rng: np.random.Generator,
     elite: bool = True,
-) -> Ancestors:
-    """Algorithm "SRS": ancestors (N,) drawn from the weights of ``costs`` (N,), one a stratum."""
-    n = len(costs)
-    return _draw(costs, sigma_gamma_px, (np.arange(n) + rng.random(n)) / n, elite)
+) -> Indices:
+    """Return the ancestors (N,) of the next particles.
 
-
-def systematic(
-    costs: FloatArray,
-    survival_rate: float,
-    sigma_gamma_px: float,
-    rng: np.random.Generator,
-    elite: bool = True,
-) -> Ancestors:
-    """Ancestors (N,) drawn from the weights, at the same place in each stratum."""
-    n = len(costs)
-    return _draw(costs, sigma_gamma_px, (np.arange(n) + rng.random()) / n, elite)
-
-
-def multinomial(
-    costs: FloatArray,
-    survival_rate: float,
-    sigma_gamma_px: float,
-    rng: np.random.Generator,
-    elite: bool = True,
-) -> Ancestors:
-    """Ancestors (N,) drawn from the weights, independent of each other."""
-    return _draw(costs, sigma_gamma_px, rng.random(len(costs)), elite)
-
-
-def residual(
-    costs: FloatArray,
-    survival_rate: float,
-    sigma_gamma_px: float,
-    rng: np.random.Generator,
-    elite: bool = True,
-) -> Ancestors:
-    """Ancestors (N,): floor(n w) copies of each particle, the rest drawn from what remains.
-
-    n is the number to draw: N, or N - 1 beside the elite.
+    Args:
+        strategy: one of ``STRATEGIES``.
+        costs: of the present particles, (N,), px.
+        survival_rate: e; only ``drs`` uses it.
+        sigma_gamma_px: width of the weights; ``drs`` does not use it.
+        rng: source of random numbers; ``drs`` draws none.
+        elite: the best particle takes the place of the first one drawn.
     """
-    drawn = len(costs) - int(elite)
-    expected = drawn * srs_weights(costs, sigma_gamma_px)
-    copies = np.floor(expected).astype(np.intp)
-    missing = drawn - int(copies.sum())
-    if missing > 0:
-        cumulative = np.cumsum(expected - copies)
-        numbers = rng.random(missing) * cumulative[-1]
-        np.add.at(copies, np.searchsorted(cumulative, numbers, side="right"), 1)
-    ancestors = np.repeat(np.arange(len(costs)), copies)
-    return np.concatenate([[np.argmin(costs)], ancestors]) if elite else ancestors
-
-
-STRATEGIES: MappingProxyType[str, Resampler] = MappingProxyType(
-    {
-        "drs": deterministic,
-        "srs": stratified,
-        "systematic": systematic,
-        "residual": residual,
-        "multinomial": multinomial,
-    }
-)
-"""Every strategy by name."""
+    if strategy == "drs":
+        return truncation(costs, survival_rate)
+    weights = gaussian_weights(costs, sigma_gamma_px)
+    ancestors = SCHEMES[strategy](weights, len(costs), rng)
+    if elite:
+        ancestors[0] = np.argmin(costs)
+    return ancestors

@@ -16,7 +16,7 @@ is reached. Beyond the paper:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from cardbox_tracker.body.sizes import (
     FloatArray,
 )
 from cardbox_tracker.errors import InitializationError
-from cardbox_tracker.estimation.cost.compiled import CompiledCost
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.initialization.references import (
     Silhouette,
     check_references,
@@ -66,6 +66,10 @@ _ALONG_BONES = np.array(
 )
 # Which angles a person misses when asked for a reference posture, and by how much.
 _LOOSE_ANGLE_RAD = np.radians(5.0)
+# How far the place of a reference posture is searched from one round to the next.
+_PLACE_NOISE_M = 0.02
+# The noise of the sizes after a round that found nothing better, as a fraction of that before.
+_SHRINK = 0.7
 
 
 @dataclass(frozen=True)
@@ -199,20 +203,20 @@ class _Search:
             np.where(_ALONG_BONES, _LENGTH_SCATTER, _BREADTH_SCATTER) * self._initial,
             _LEAST_SCATTER_M,
         )
-        self._place = BodyModel(
+        self._start = BodyModel.of(
             self._sizes,
-            config.distance_m,
-            crown_m - CROWN_TO_HIP * stature,
-            lateral_m(references["front"], camera, config.distance_m),
-            config.camera_pitch_rad,
-            config.side_turn,
+            distance_m=config.distance_m,
+            hip_height_m=crown_m - CROWN_TO_HIP * stature,
+            lateral_m=lateral_m(references["front"], camera, config.distance_m),
+            camera_pitch_rad=config.camera_pitch_rad,
+            side_turn=config.side_turn,
         )
-        self._costs = {}
+        self._camera = camera
+        self._seen = {}
         self._asked = {}
         self._postures = {}
         for name, silhouette in references.items():
-            self._costs[name] = CompiledCost(self._place, camera)
-            self._costs[name].observe(silhouette)
+            self._seen[name] = CompiledSilhouette(self._start, camera).look(silhouette)
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
             self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
@@ -226,7 +230,7 @@ class _Search:
         size_mask[SUBSETS[subset]] = 1.0
         loose = _loose_joints(name)
         posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
-        posture_noise[0] = 0.02
+        posture_noise[0] = _PLACE_NOISE_M
         sizes, posture = self._sizes, self._postures[name]
         best = float(self._rate(name, sizes[None], posture[None])[0])
         scale = 1.0
@@ -246,7 +250,7 @@ class _Search:
             if costs[winner] < best:
                 best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
             else:
-                scale *= 0.7
+                scale *= _SHRINK
             history.append(best)
             if scale * config.sigma_alpha_m < config.accuracy_m:
                 break
@@ -254,28 +258,27 @@ class _Search:
         self._sizes, self._postures[name] = sizes, posture
 
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
-        cost = self._costs[name]
-        weight_px = self._config.prior * cost.silhouette_px
+        seen = self._seen[name]
+        weight_px = self._config.prior * seen.frame.foreground_px
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
-        rated: FloatArray = cost.bodies(sizes, postures) + weight_px * prior
+        rated: FloatArray = seen.bodies(sizes, postures) + weight_px * prior
         return rated
 
     def result(self) -> InitializationResult:
         """Return the sizes rounded to a tenth of a millimetre, and the fit."""
-        place = self._place
-        body = replace(
-            place,
+        start = self._start
+        body = start.with_values(
             sizes=np.round(self._sizes, 4),
-            hip_height_m=round(float(place.hip_height_m), 4),
+            hip_height_m=round(float(start.placement.hip_height_m), 4),
             lateral_m=round(float(self._postures["front"][0]), 4),
         )
-        iou = {}
-        for name, cost in self._costs.items():
-            fitted = CompiledCost(body, cost.camera)
-            fitted.observe(self._references[name])
-            iou[name] = fitted.overlap(self._postures[name])[1]
+        fitted = CompiledSilhouette(body, self._camera)
+        iou = {
+            name: fitted.look(silhouette).overlap(self._postures[name])[1]
+            for name, silhouette in self._references.items()
+        }
         return InitializationResult(body, iou, self._rounds, self._history)
 
 

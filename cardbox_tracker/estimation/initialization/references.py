@@ -19,6 +19,9 @@ Silhouette = NDArray[np.uint8]
 MIN_PERSON_FRACTION = 0.02
 """Somebody close enough to be measured covers at least this fraction of the image."""
 
+MAX_PERSON_FRACTION = 0.6
+"""More foreground than this fraction of the image is no person, but another light or background."""
+
 MAX_LIKENESS = 0.80
 """Two different reference postures overlap less than this, as IoU when laid over each other."""
 
@@ -58,7 +61,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
             f"expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of the camera "
             f"and {_POSTURE_TEXT[name]}"
         )
-    if share > 0.6:
+    if share > MAX_PERSON_FRACTION:
         raise InitializationError(
             f"reference '{name}': {100 * share:.0f} % of the image are foreground, more than a "
             "person can be; the background was learned in another light or with somebody in it: "

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.estimation.initialization.stature import height_of_row_m
 from cardbox_tracker.vision.camera import Camera
@@ -37,12 +36,14 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
     if rows.size == 0 or rows[0] == 0:
         return body
     head = forward_kinematics(body, np.zeros(N_JOINTS)).head
-    hip_to_crown_m = head[2] - body.hip_height_m + body.size("head_height") / 2
-    view = camera.with_pitch(body.camera_pitch_rad)
+    crown_above_hip_m = (
+        head[2] - body.placement.hip_height_m + body_parts(body.sizes).head.height_m / 2
+    )
+    view = camera.with_pitch(body.camera_pose.pitch_rad)
     # The reference frame's X points from the person to the camera; a row's upper edge is half a
     # pixel above its centre.
     crown_m = height_of_row_m(view, rows[0] - 0.5, -float(head[0]))
-    hip_height_m = crown_m - float(hip_to_crown_m)
+    hip_height_m = crown_m - float(crown_above_hip_m)
     if not _LOWEST_M <= hip_height_m <= _HIGHEST_M:
         return body
-    return replace(body, hip_height_m=hip_height_m)
+    return body.with_values(hip_height_m=hip_height_m)

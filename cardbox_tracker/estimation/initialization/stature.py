@@ -25,9 +25,20 @@ SPAN = 0.985
 """Fingertip to fingertip of arms 10 degrees below the horizontal, of the stature."""
 
 _RANGE_M = (1.1, 2.2)
+"""Statures beyond this are errors of the outline: a child of six, and a very tall adult."""
 _MEAN_M = 1.71
-# Whose lower edge leaves less than this of the stature that the arms suggest hides the lower legs.
+"""Mean stature of adults (ANSUR II, 2012, both sexes, rounded)."""
+_SPAN_WEIGHT, _MEAN_WEIGHT, _SHOULDER_WEIGHT = 0.45, 0.25, 0.3
+"""How the guesses are averaged: arm span and shoulder height scatter by a few per cent between
+people of one stature, and the mean that everybody shares steadies them."""
 _FEET = 0.88
+"""A lower edge at less than this fraction of the stature that the arms suggest is no foot: a desk
+or the like hides the lower legs."""
+_UPPER_ARM_FROM, _UPPER_ARM_TO, _SHOULDER_AT = 0.45, 0.62, 0.78
+"""Fractions of the way from the fingertips to the body's middle: from the first to the second,
+beyond the elbow and short of the armpit, a column holds nothing but the arm; its middle line is
+followed to the third, the height of the shoulder joint. Chosen by eye on silhouettes."""
+_UPPER_ARM_SAMPLES = 12
 
 
 def height_of_row_m(camera: Camera, row: float, distance_m: float) -> float:
@@ -66,12 +77,11 @@ def _stature_without_feet_m(
     scale = np.hypot(1.0, (np.mean(np.nonzero(arms)[0]) - camera.cy) / camera.fy)
     depth_m = distance_m / scale
     span_m = (columns[-1] - columns[0] + 1) / camera.fx * depth_m
-    # Both measures scatter by a few per cent; what everybody shares steadies them.
-    guesses, weights = [span_m / SPAN, _MEAN_M], [0.45, 0.25]
+    guesses, weights = [span_m / SPAN, _MEAN_M], [_SPAN_WEIGHT, _MEAN_WEIGHT]
     shoulder_m = _shoulder_height_m(arms, camera, distance_m)
     if shoulder_m is not None:
         guesses.append((crown_m - shoulder_m) / CROWN_TO_SHOULDER)
-        weights.append(0.3)
+        weights.append(_SHOULDER_WEIGHT)
     return float(np.clip(np.average(guesses, weights=weights), *_RANGE_M))
 
 
@@ -86,13 +96,13 @@ def _shoulder_height_m(arms: NDArray[np.uint8], camera: Camera, distance_m: floa
     for side in (-1, 1):
         end, middle = (first, (first + last) / 2) if side < 0 else (last, (first + last) / 2)
         # Between the elbow and the armpit the arm is all there is in a column.
-        upper_arm = np.linspace(end + 0.45 * (middle - end), end + 0.62 * (middle - end), 12)
-        samples = np.round(upper_arm).astype(int)
+        fractions = np.linspace(_UPPER_ARM_FROM, _UPPER_ARM_TO, _UPPER_ARM_SAMPLES)
+        samples = np.round(end + fractions * (middle - end)).astype(int)
         rows = [float(np.mean(np.nonzero(arms[:, u])[0])) for u in samples if arms[:, u].any()]
         used = [u for u in samples if arms[:, u].any()]
         if len(used) < 2:
             continue
         slope, offset = np.polyfit(used, rows, 1)
-        shoulder = end + 0.78 * (middle - end)
+        shoulder = end + _SHOULDER_AT * (middle - end)
         heights.append(height_of_row_m(camera, slope * shoulder + offset, distance_m))
     return float(np.mean(heights)) if heights else None

@@ -62,7 +62,9 @@ def measure(folder: Path, seed: int, person: int, search_seed: int) -> Arrays:
     """
     rng = np.random.default_rng([seed, person + 1])
     if person < 0:
-        body = BodyModel(DEFAULT_SIZES, DISTANCE_M, hip_height_m=-0.51 * DISTANCE_M / 2.0)
+        body = BodyModel.of(
+            DEFAULT_SIZES, distance_m=DISTANCE_M, hip_height_m=-0.51 * DISTANCE_M / 2.0
+        )
     else:
         body = random_body(rng, DISTANCE_M)
     camera = session_camera()

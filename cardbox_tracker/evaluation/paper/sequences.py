@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
 from cardbox_tracker.evaluation.paper.sessions import Session
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, render
+from cardbox_tracker.vision.rasterisation import clip_near, render
 
 ImageArray = NDArray[np.uint8]
 
@@ -63,8 +63,9 @@ def draw_estimate(body: BodyModel, camera: Camera, posture: NDArray[np.float64])
         return canvas
     corners_m = camera.reference_to_optical(cardbox_patches(body, posture))
     for corners in corners_m[np.argsort(-corners_m[..., 2].mean(axis=1))]:
-        if np.all(corners[:, 2] > NEAR_PLANE_M):
-            polygon = np.round(camera.project(corners) * (1 << _SHIFT)).astype(np.int32)
+        visible = clip_near(corners)
+        if len(visible) > 2:
+            polygon = np.round(camera.project(visible) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillConvexPoly(canvas, polygon, _FILL_BGR, cv2.LINE_AA, _SHIFT)
             cv2.polylines(canvas, [polygon], True, _EDGE_BGR, 1, cv2.LINE_AA, _SHIFT)
     return canvas

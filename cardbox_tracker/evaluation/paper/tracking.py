@@ -25,7 +25,7 @@ from cardbox_tracker.evaluation.metrics import (
     errors_along_axes_m,
     stddev_over_runs,
 )
-from cardbox_tracker.evaluation.paper.models import make_cost
+from cardbox_tracker.evaluation.paper.models import make_silhouette_term
 from cardbox_tracker.evaluation.paper.runner import Arrays, Parts, Task
 from cardbox_tracker.evaluation.paper.sessions import Session, load_session
 
@@ -43,7 +43,7 @@ class Setting:
         config: settings of the tracker.
         seed: of the evaluation.
         every: only each image of this number; 3 is the same motion three times as fast.
-        model: how costs are computed, see ``models.make_cost``.
+        model: how costs are computed, see ``models.make_silhouette_term``.
     """
 
     session: str
@@ -98,7 +98,7 @@ def track_runs(folder: Path, setting: Setting, first: int, end: int) -> Arrays:
     postures = np.full((*shape, 12), np.nan)
     keypoints_m = np.full((*shape, 6, 3), np.nan)
     costs_px = np.full(shape, np.nan)
-    cost = make_cost(setting.model, session.body, session.camera)
+    cost = make_silhouette_term(setting.model, session.body, session.camera)
     for run in range(first, end):
         rng = np.random.default_rng([setting.seed, run])
         tracker = Tracker(session.body, session.camera, setting.config, rng, cost)

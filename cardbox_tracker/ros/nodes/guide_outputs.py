@@ -58,7 +58,7 @@ class GuideOutputs:
         silhouette = conversions.silhouette_of(message)
         if silhouette.shape != (camera.height, camera.width):
             return
-        body = BodyModel(
+        body = BodyModel.of(
             distance_m=settings.person_distance_m,
             camera_pitch_rad=math.radians(settings.camera_pitch_deg),
             side_turn=settings.side_turn,
@@ -67,7 +67,7 @@ class GuideOutputs:
             image = draw_guidance(
                 silhouette,
                 at_height_of(silhouette, body, camera),
-                camera.with_pitch(body.camera_pitch_rad),
+                camera.with_pitch(body.camera_pose.pitch_rad),
                 reference_posture(step.name, settings.side_turn),
                 step.words,
                 step.left_s,

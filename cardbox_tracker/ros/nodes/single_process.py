@@ -29,7 +29,7 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.handover import Handover
 from cardbox_tracker.ros.runtime.node import CardboxNode, run
-from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _STOP_S = 5.0
 SOURCES = ("camera", "play_bag")
@@ -63,7 +63,7 @@ class AllNodes:
 
     def work(self) -> None:
         """Serve all nodes until they are told to stop."""
-        executor = StaticExecutor()
+        executor = make_executor()
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:

@@ -23,7 +23,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
 from cardbox_tracker.ros.runtime.handover import HandingPublisher, Handover
-from cardbox_tracker.ros.runtime.static_executor import StaticExecutor
+from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 Callback = Callable[[Any, int], None]
 """Takes a message and when it left its sender, ns since the epoch."""
@@ -137,7 +137,7 @@ class CardboxNode(Node):
 
 def spin(node: CardboxNode) -> None:
     """Serve the node until it is told to stop."""
-    executor = StaticExecutor()
+    executor = make_executor(node.context)
     executor.add_node(node)
     executor.spin()
 

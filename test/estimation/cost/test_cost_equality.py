@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.body.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BodyParts, Part, body_parts
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
-from cardbox_tracker.estimation.cost.compiled import CompiledCost, CompiledKeypoints
+from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
+from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import (
-    ReferenceCost,
-    SilhouetteCost,
+    ReferenceSilhouette,
+    SilhouetteTerm,
     rows_above_hips,
 )
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import (
+    NEAR_PLANE_M,
+    clip_near,
+    fill_convex,
+    render,
+    snap,
+)
 
 SMALL = ((33, 57), (57, 33), (64, 48), (97, 41), (160, 120))
 LARGE = ((320, 240), (321, 241), (640, 480))
@@ -36,11 +48,11 @@ class Case:
     postures: np.ndarray
     silhouette: np.ndarray
 
-    def costs(self) -> tuple[ReferenceCost, CompiledCost]:
-        both = ReferenceCost(self.body, self.camera), CompiledCost(self.body, self.camera)
-        for cost in both:
-            cost.observe(self.silhouette)
-        return both
+    def terms(self) -> tuple[ReferenceSilhouette, CompiledSilhouette]:
+        return (
+            ReferenceSilhouette(self.body, self.camera),
+            CompiledSilhouette(self.body, self.camera),
+        )
 
 
 def make_case(
@@ -56,10 +68,10 @@ def make_case(
     focal = rng.uniform(0.5, 2.0) * width
     middle = rng.uniform(-0.1, 1.1, 2) * size
     camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *middle, pitch_rad)
-    body = BodyModel(
+    body = BodyModel.of(
         random_sizes(rng),
-        distance_m * rng.uniform(0.9, 1.1),
-        rng.uniform(-0.6, 0.1) * distance_m,
+        distance_m=distance_m * rng.uniform(0.9, 1.1),
+        hip_height_m=rng.uniform(-0.6, 0.1) * distance_m,
         camera_pitch_rad=pitch_rad,
     )
     low, high = JOINT_LIMITS.T
@@ -86,7 +98,7 @@ def make_silhouette(
     if kind in ("empty", "full"):
         return np.full(shape, 255 if kind == "full" else 0, np.uint8)
     silhouette = np.zeros(shape, np.uint8)
-    drawn = ReferenceCost(body, camera).draw(posture + rng.normal(0.0, 0.15, 12))
+    drawn = ReferenceSilhouette(body, camera).draw(posture + rng.normal(0.0, 0.15, 12))
     silhouette[: len(drawn)] = drawn
     if kind == "speckled person":
         silhouette[rng.random(shape) < 0.05] ^= 255
@@ -104,26 +116,25 @@ LARGE_CASES = st.builds(make_case, size=st.sampled_from(LARGE), **CASE)
 
 
 def assert_all_equal(case: Case) -> None:
-    reference, compiled = case.costs()
-    assert compiled.rows == reference.rows
-    assert compiled.silhouette_px == reference.silhouette_px
+    terms = case.terms()
+    reference, compiled = (term.look(case.silhouette) for term in terms)
+    assert compiled.frame.rows == reference.frame.rows
+    assert compiled.frame.foreground_px == reference.frame.foreground_px
     postures = case.postures
-    np.testing.assert_array_equal(compiled.full(postures), reference.full(postures))
+    np.testing.assert_array_equal(compiled.postures(postures), reference.postures(postures))
     for posture in postures[:2]:
         got, expected = compiled.overlap(posture), reference.overlap(posture)
         assert got[0] == expected[0]
         assert got[1] == pytest.approx(expected[1], abs=1e-12)
     torsos = postures[:, TORSO]
     for arms in (None, postures[0], postures[1], None):
-        reference.fix_arms(arms)
-        compiled.fix_arms(arms)
-        np.testing.assert_array_equal(compiled.torso(torsos), reference.torso(torsos))
+        expected = reference.torsos_beside(arms)(torsos)
+        np.testing.assert_array_equal(compiled.torsos_beside(arms)(torsos), expected)
     for torso in torsos[:2]:
-        reference.fix_torso(torso)
-        compiled.fix_torso(torso)
+        rate, expect = compiled.arms_beside(torso), reference.arms_beside(torso)
         for side, joints in (("left", LEFT_ARM), ("right", RIGHT_ARM)):
             arms = postures[:, joints]
-            np.testing.assert_array_equal(compiled.arm(side, arms), reference.arm(side, arms))
+            np.testing.assert_array_equal(rate(side, arms), expect(side, arms))
 
 
 @settings(max_examples=60)
@@ -145,10 +156,9 @@ def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> 
     sizes = np.array([random_sizes(rng) for _ in case.postures])
     expected = []
     for one, posture in zip(sizes, case.postures, strict=True):
-        reference = ReferenceCost(replace(case.body, sizes=one), case.camera)
-        reference.observe(case.silhouette)
-        expected.append(reference.full(posture[None])[0])
-    compiled = case.costs()[1]
+        reference = ReferenceSilhouette(case.body.with_values(sizes=one), case.camera)
+        expected.append(reference.look(case.silhouette).postures(posture[None])[0])
+    compiled = CompiledSilhouette(case.body, case.camera).look(case.silhouette)
     np.testing.assert_array_equal(compiled.bodies(sizes, case.postures), expected)
 
 
@@ -156,13 +166,13 @@ def test_costs_of_other_bodies_in_one_place_are_equal(case: Case, seed: int) -> 
 @given(SMALL_CASES)
 def test_the_model_itself_as_silhouette_leaves_no_pixel_over(case: Case) -> None:
     """Equal counts could hide pixels that differ; a cost of 0 cannot."""
-    reference, compiled = case.costs()
+    reference, compiled = case.terms()
     for posture in case.postures:
         silhouette = np.zeros((case.camera.height, case.camera.width), np.uint8)
         silhouette[: reference.rows] = reference.draw(posture)
-        compiled.observe(silhouette)
-        assert compiled.full(posture[None]).tolist() == [0]
-        assert compiled.overlap(posture) == (0, 1.0 if silhouette.any() else 0.0)
+        seen = compiled.look(silhouette)
+        assert seen.postures(posture[None]).tolist() == [0]
+        assert seen.overlap(posture) == (0, 1.0 if silhouette.any() else 0.0)
 
 
 @settings(max_examples=60)
@@ -172,6 +182,52 @@ def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
     for posture in case.postures:
         expected = case.camera.reference_to_optical(keypoints_m(case.body, posture))
         np.testing.assert_allclose(compiled(posture), expected, atol=1e-12)
+
+
+@settings(max_examples=60)
+@given(SMALL_CASES)
+def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
+    reference, compiled = case.terms()
+    parts, _ = shape_of(case.body.sizes, 0.6)
+    place, view = place_of(case.body), view_of(case.camera)
+    torsos = np.ascontiguousarray(case.postures[:, TORSO])
+    row_sums = np.zeros((compiled.rows, case.camera.width + 1), np.int32)
+    silhouette = case.silhouette[: compiled.rows]
+    silhouette_px = fill_row_sums(silhouette, np.zeros((1, 0), np.uint64), row_sums)
+    got = np.zeros(len(torsos), np.int64)
+    kernels.trunk_costs(torsos, parts, place, view, row_sums, silhouette_px, got)
+    for cost, posture in zip(got, case.postures, strict=True):
+        patches = cardbox_patches(case.body, posture, 0.6)
+        trunk = np.concatenate([patches[TORSO_PATCHES], patches[NECK_PATCHES]])
+        drawn = render(trunk, case.camera, reference.rows)
+        assert cost == np.count_nonzero(drawn ^ silhouette)
+
+
+def test_the_kernels_take_parts_and_lengths_in_their_order() -> None:
+    names = [f"_{name.removesuffix('_m').upper()}" for name in (*BodyParts._fields[:6],)]
+    assert [getattr(kernels, name) for name in names] == list(range(6))
+    names = [f"_{name.removesuffix('_m').upper()}" for name in Part._fields]
+    assert [getattr(kernels, name) for name in names] == list(range(6))
+    parts, shoulder = shape_of(DEFAULT_SIZES)
+    expected = body_parts(DEFAULT_SIZES)
+    np.testing.assert_array_equal(parts, expected[:6])
+    np.testing.assert_array_equal(shoulder, expected[6:])
+
+
+@pytest.mark.parametrize("kept", range(16))
+@pytest.mark.parametrize("beyond_m", [0.0, 1e-12, 0.05])
+def test_corners_on_the_near_plane_are_before_it(kept: int, beyond_m: float) -> None:
+    """Each set of corners exactly on the plane; the others ``beyond_m`` nearer than it."""
+    x, y = 0.03, 0.02
+    on = np.array([kept >> c & 1 for c in range(4)], bool)
+    depth = np.where(on, NEAR_PLANE_M, NEAR_PLANE_M - beyond_m)
+    corners = np.array([(-x, -y), (x, -y), (x, y), (-x, y)])
+    quad = np.column_stack([corners, depth])
+    seen = CompiledSilhouette(hand_body(), HAND_CAMERA).look(np.zeros((48, 64), np.uint8))
+    mask = np.zeros((seen.frame.rows, 64), np.uint8)
+    fill_convex(mask, snap(HAND_CAMERA.project(clip_near(quad))))
+    assert seen.polygons(quad[None, None]).tolist() == [np.count_nonzero(mask)]
+    assert mask.any() == (beyond_m == 0.0 or on.sum() > 2)
 
 
 # A body made of rectangles on whole pixels: 20 px a metre at 2 m, the torso's top at the height of
@@ -205,7 +261,7 @@ def hand_body() -> BodyModel:
     sizes = np.empty(len(HAND_SIZES))
     for name, value in HAND_SIZES.items():
         sizes[SIZE_INDEX[name]] = value
-    return BodyModel(sizes, distance_m=2.0, hip_height_m=-0.6)
+    return BodyModel.of(sizes, distance_m=2.0, hip_height_m=-0.6)
 
 
 def hand_trunk() -> np.ndarray:
@@ -224,92 +280,99 @@ def hand_full() -> np.ndarray:
     return expected
 
 
-@pytest.fixture(params=[ReferenceCost, CompiledCost])
-def hand_cost(request: pytest.FixtureRequest) -> SilhouetteCost:
+@pytest.fixture(params=[ReferenceSilhouette, CompiledSilhouette])
+def term(request: pytest.FixtureRequest) -> SilhouetteTerm:
     return request.param(hand_body(), HAND_CAMERA)
 
 
 def test_the_model_by_hand_covers_the_pixels_of_its_rectangles() -> None:
-    drawn = ReferenceCost(hand_body(), HAND_CAMERA).draw(np.zeros(12))
+    drawn = ReferenceSilhouette(hand_body(), HAND_CAMERA).draw(np.zeros(12))
     np.testing.assert_array_equal(drawn, hand_full()[:36])
 
 
-def test_costs_by_hand_before_nobody(hand_cost: SilhouetteCost) -> None:
-    hand_cost.observe(np.zeros((48, 64), np.uint8))
-    rest = np.zeros(12)
+def test_costs_by_hand_before_nobody(term: SilhouetteTerm) -> None:
+    seen = term.look(np.zeros((48, 64), np.uint8))
+    rest, upright = np.zeros(12), np.zeros((1, 4))
     aside = np.array([[0.05, 0.0, 0.0, 0.0]])  # one pixel to the right
-    assert (hand_cost.rows, hand_cost.silhouette_px) == (36, 0)
-    assert hand_cost.full(rest[None]).tolist() == [TRUNK_PX + 2 * ARM_PX]
-    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [TRUNK_PX]
-    hand_cost.fix_torso(np.zeros(4))
-    assert hand_cost.arm("left", np.zeros((1, 4))).tolist() == [TRUNK_PX + ARM_PX]
-    assert hand_cost.arm("right", np.zeros((1, 4))).tolist() == [TRUNK_PX + ARM_PX]
-    assert hand_cost.overlap(rest) == (TRUNK_PX + 2 * ARM_PX, 0.0)
-    hand_cost.fix_arms(rest)
+    assert (seen.frame.rows, seen.frame.foreground_px) == (36, 0)
+    assert seen.postures(rest[None]).tolist() == [TRUNK_PX + 2 * ARM_PX]
+    assert seen.torsos_beside(None)(upright).tolist() == [TRUNK_PX]
+    rate_arms = seen.arms_beside(np.zeros(4))
+    assert rate_arms("left", upright).tolist() == [TRUNK_PX + ARM_PX]
+    assert rate_arms("right", upright).tolist() == [TRUNK_PX + ARM_PX]
+    assert seen.overlap(rest) == (TRUNK_PX + 2 * ARM_PX, 0.0)
     # The arms stay, and 8 pixels of the torso move onto the left one.
-    assert hand_cost.torso(aside).tolist() == [TRUNK_PX + 2 * ARM_PX - 8]
-    hand_cost.fix_arms(None)
-    assert hand_cost.torso(aside).tolist() == [TRUNK_PX]
+    assert seen.torsos_beside(rest)(aside).tolist() == [TRUNK_PX + 2 * ARM_PX - 8]
+    assert seen.torsos_beside(None)(aside).tolist() == [TRUNK_PX]
 
 
-def test_costs_by_hand_before_somebody(hand_cost: SilhouetteCost) -> None:
-    seen = hand_full()
-    seen[24:26, 28:33] = 0  # 10 px of the torso are missing
-    seen[0, :5] = 255  # 5 px too many
-    seen[36:] = 255  # legs
-    hand_cost.observe(seen)
-    assert hand_cost.silhouette_px == TRUNK_PX + 2 * ARM_PX - 10 + 5
-    assert hand_cost.full(np.zeros((1, 12))).tolist() == [15]
-    cost_px, iou = hand_cost.overlap(np.zeros(12))
+def test_costs_by_hand_before_somebody(term: SilhouetteTerm) -> None:
+    silhouette = hand_full()
+    silhouette[24:26, 28:33] = 0  # 10 px of the torso are missing
+    silhouette[0, :5] = 255  # 5 px too many
+    silhouette[36:] = 255  # legs
+    seen = term.look(silhouette)
+    assert seen.frame.foreground_px == TRUNK_PX + 2 * ARM_PX - 10 + 5
+    assert seen.postures(np.zeros((1, 12))).tolist() == [15]
+    cost_px, iou = seen.overlap(np.zeros(12))
     common, union = TRUNK_PX + 2 * ARM_PX - 10, TRUNK_PX + 2 * ARM_PX + 5
     assert cost_px == 15
     assert iou == pytest.approx(common / union)
     # Without arms both of them are missing, with one the other is.
-    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [15 + 2 * ARM_PX]
-    hand_cost.fix_torso(np.zeros(4))
-    assert hand_cost.arm("left", np.zeros((2, 4))).tolist() == [15 + ARM_PX] * 2
+    assert seen.torsos_beside(None)(np.zeros((1, 4))).tolist() == [15 + 2 * ARM_PX]
+    assert seen.arms_beside(np.zeros(4))("left", np.zeros((2, 4))).tolist() == [15 + ARM_PX] * 2
 
 
-def test_a_new_silhouette_forgets_the_fixed_arms(hand_cost: SilhouetteCost) -> None:
-    nobody = np.zeros((48, 64), np.uint8)
-    hand_cost.observe(nobody)
-    hand_cost.fix_arms(np.zeros(12))
-    hand_cost.observe(nobody)
-    assert hand_cost.torso(np.zeros((1, 4))).tolist() == [TRUNK_PX]
+def test_an_observation_never_changes(term: SilhouetteTerm) -> None:
+    """Neither by what is asked of it nor by those that follow."""
+    first = term.look(hand_full())
+    rate_torsos, rate_arms = first.torsos_beside(np.zeros(12)), first.arms_beside(np.zeros(4))
+    upright = np.zeros((1, 4))
+    before = [rate_torsos(upright)[0], rate_arms("left", upright)[0]]
+    second = term.look(np.zeros((48, 64), np.uint8))
+    second.torsos_beside(np.ones(12))(upright)
+    second.arms_beside(np.full(4, 0.1))("left", upright)
+    first.torsos_beside(None)(upright)
+    first.arms_beside(np.full(4, 0.2))("right", upright)
+    assert [rate_torsos(upright)[0], rate_arms("left", upright)[0]] == before
+    assert first.postures(np.zeros((1, 12))).tolist() == [0]
 
 
-def test_a_model_outside_of_the_image_costs_the_silhouette(hand_cost: SilhouetteCost) -> None:
-    hand_cost.observe(hand_full())
+def test_a_model_outside_of_the_image_costs_the_silhouette(term: SilhouetteTerm) -> None:
+    seen = term.look(hand_full())
     away = np.zeros((2, 12))
     away[:, 0] = (-2.9, 2.9)
-    assert hand_cost.full(away).tolist() == [TRUNK_PX + 2 * ARM_PX] * 2
-    assert hand_cost.overlap(away[0]) == (TRUNK_PX + 2 * ARM_PX, 0.0)
+    assert seen.postures(away).tolist() == [TRUNK_PX + 2 * ARM_PX] * 2
+    assert seen.overlap(away[0]) == (TRUNK_PX + 2 * ARM_PX, 0.0)
 
 
-def test_nothing_against_nothing_costs_nothing(hand_cost: SilhouetteCost) -> None:
-    hand_cost.observe(np.zeros((48, 64), np.uint8))
+def test_nothing_against_nothing_costs_nothing(term: SilhouetteTerm) -> None:
     away = np.zeros(12)
     away[0] = 2.9
-    assert hand_cost.overlap(away) == (0, 0.0)
+    assert term.look(np.zeros((48, 64), np.uint8)).overlap(away) == (0, 0.0)
 
 
-def test_read_only_and_strided_silhouettes_are_taken(hand_cost: SilhouetteCost) -> None:
+def test_read_only_and_strided_silhouettes_are_taken(term: SilhouetteTerm) -> None:
     frozen = hand_full()
     frozen.setflags(write=False)
-    hand_cost.observe(frozen)
-    assert hand_cost.full(np.zeros((1, 12))).tolist() == [0]
+    assert term.look(frozen).postures(np.zeros((1, 12))).tolist() == [0]
     wide = np.zeros((48, 128), np.uint8)
     wide[:, ::2] = hand_full()
-    hand_cost.observe(wide[:, ::2])
-    assert hand_cost.full(np.zeros((1, 12))).tolist() == [0]
+    assert term.look(wide[:, ::2]).postures(np.zeros((1, 12))).tolist() == [0]
 
 
 @pytest.mark.parametrize("shape", [(64, 48), (48, 63), (47, 64), (48, 64, 1)])
 def test_a_silhouette_of_another_size_is_refused(
-    hand_cost: SilhouetteCost, shape: tuple[int, ...]
+    term: SilhouetteTerm, shape: tuple[int, ...]
 ) -> None:
     with pytest.raises(ValueError, match=r"silhouette has shape .*; the camera's is \(48, 64\)"):
-        hand_cost.observe(np.zeros(shape, np.uint8))
+        term.look(np.zeros(shape, np.uint8))
+
+
+@pytest.mark.parametrize("shape", [(48, 65), (48, 64, 3, 1), (96, 128, 3)])
+def test_an_image_of_another_size_is_refused(term: SilhouetteTerm, shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"image has shape .*; the camera's is \(48, 64\)"):
+        term.frame(hand_full(), np.zeros(shape, np.uint8))
 
 
 @pytest.mark.parametrize(
@@ -328,5 +391,5 @@ def test_a_silhouette_of_another_size_is_refused(
     ],
 )
 def test_rows_above_the_hips_by_hand(hip_height_m: float, pitch_rad: float, rows: int) -> None:
-    body = replace(hand_body(), hip_height_m=hip_height_m)
+    body = hand_body().with_values(hip_height_m=hip_height_m)
     assert rows_above_hips(body, HAND_CAMERA.with_pitch(pitch_rad)) == rows

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.estimation.config import FilterConfig
+from cardbox_tracker.estimation.filtering import particle_filter
 from cardbox_tracker.estimation.filtering.particle_filter import SPREAD_PX, ParticleFilter
-from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
 NOISE = np.array([0.25, 0.02, 0.1])
 WIDE = np.array([[-100.0, 100.0]] * 3)
@@ -31,7 +31,7 @@ def make(
     **values: Any,
 ) -> ParticleFilter:
     config = FilterConfig(**{"particles": 50, **values})
-    return ParticleFilter(config, STRATEGIES[strategy], noise, limits, np.random.default_rng(seed))
+    return ParticleFilter(config, strategy, noise, limits, np.random.default_rng(seed))
 
 
 def with_particles(particles: np.ndarray, costs: np.ndarray, **values: Any) -> ParticleFilter:
@@ -46,11 +46,11 @@ def with_particles(particles: np.ndarray, costs: np.ndarray, **values: Any) -> P
 @given(seed=SEEDS)
 def test_the_first_particle_is_the_best_before_unchanged(strategy: str, seed: int) -> None:
     filters = make(seed, strategy)
-    filters.scatter(START, distance_px)
+    filters.initialize(START, distance_px)
     np.testing.assert_array_equal(filters.particles[0], START)
     for _ in range(4):
         best = filters.best().copy()
-        filters.cycle(distance_px)
+        filters.iterate(distance_px)
         np.testing.assert_array_equal(filters.particles[0], best)
         # All others moved.
         assert not np.any(np.all(filters.particles[1:] == best, axis=1))
@@ -60,10 +60,10 @@ def test_the_first_particle_is_the_best_before_unchanged(strategy: str, seed: in
 @given(seed=SEEDS)
 def test_the_lowest_cost_never_rises_on_one_silhouette(strategy: str, seed: int) -> None:
     filters = make(seed, strategy)
-    filters.scatter(START, distance_px)
+    filters.initialize(START, distance_px)
     lowest = filters.costs.min()
     for _ in range(6):
-        filters.cycle(distance_px)
+        filters.iterate(distance_px)
         assert filters.costs.min() <= lowest
         lowest = filters.costs.min()
 
@@ -79,18 +79,18 @@ def test_no_particle_leaves_the_limits(seed: int, noise: float, explorers: int) 
         return distance_px(particles)
 
     # Even a start outside is moved onto them.
-    filters.scatter(np.array([9.0, 0.05, -9.0]), rate)
-    filters.cycle(rate)
-    filters.cycle(rate, noise_scale=3.0, explorers=explorers)
+    filters.initialize(np.array([9.0, 0.05, -9.0]), rate)
+    filters.iterate(rate)
+    filters.iterate(rate, noise_scale=3.0, explorers=explorers)
     for particles in rated:
         assert np.all((particles >= limits[:, 0]) & (particles <= limits[:, 1]))
 
 
 def test_costs_are_those_of_the_particles() -> None:
     filters = make()
-    filters.scatter(START, distance_px)
+    filters.initialize(START, distance_px)
     np.testing.assert_array_equal(filters.costs, distance_px(filters.particles))
-    filters.cycle(distance_px)
+    filters.iterate(distance_px)
     np.testing.assert_array_equal(filters.costs, distance_px(filters.particles))
 
 
@@ -101,7 +101,7 @@ def test_noise_has_the_standard_deviation_it_should(seed: int, noise_scale: floa
     count = 20_000
     filters = make(seed, particles=count, survival_rate=1e-9)
     expected = NOISE * noise_scale
-    filters.scatter(START, distance_px, noise_scale)
+    filters.initialize(START, distance_px, noise_scale)
     best = START
     for _ in range(2):
         # One survivor, so that all were drawn around it.
@@ -114,13 +114,13 @@ def test_noise_has_the_standard_deviation_it_should(seed: int, noise_scale: floa
         within = np.mean(np.abs(steps) < expected, axis=0)
         np.testing.assert_allclose(within, 0.6827, atol=5 * np.sqrt(0.22 / count))
         best = filters.best().copy()
-        filters.cycle(distance_px, noise_scale)
+        filters.iterate(distance_px, noise_scale)
 
 
 def test_a_joint_without_noise_stays() -> None:
     filters = make(noise=np.array([0.2, 0.0, 0.2]))
-    filters.scatter(START, distance_px)
-    filters.cycle(distance_px)
+    filters.initialize(START, distance_px)
+    filters.iterate(distance_px)
     np.testing.assert_array_equal(filters.particles[:, 1], START[1])
 
 
@@ -128,25 +128,26 @@ def test_drs_draws_the_others_around_the_survivors() -> None:
     costs = [5.0, 1.0, 4.0, 2.0, 3.0]
     filters = with_particles(np.array([50.0, 10, 40, 20, 30]), np.array(costs), survival_rate=0.4)
     filters.noise = np.array([1e-3])
-    filters.cycle(lambda particles: particles[:, 0])
+    filters.iterate(lambda particles: particles[:, 0])
     # The best, the other of int(0.4 * 5) survivors, and the best for those that died.
     np.testing.assert_allclose(filters.particles[:, 0], [10, 20, 10, 10, 10], atol=0.01)
 
 
-def test_the_resampler_is_given_the_settings() -> None:
+def test_resampling_is_given_the_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     given_to = []
 
-    def resampler(costs: np.ndarray, *rest: Any) -> np.ndarray:
-        given_to.append((costs.tolist(), *rest))
+    def resample(strategy: str, costs: np.ndarray, *rest: Any) -> np.ndarray:
+        given_to.append((strategy, costs.tolist(), *rest))
         return np.array([1, 1, 0])
 
+    monkeypatch.setattr(particle_filter, "resample", resample)
     rng = np.random.default_rng(0)
     config = FilterConfig(3, 0.7, sigma_gamma_px=500.0)
-    filters = ParticleFilter(config, resampler, np.zeros(1), WIDE[:1], rng)
+    filters = ParticleFilter(config, "systematic", np.zeros(1), WIDE[:1], rng)
     filters.particles = np.array([[1.0], [2.0], [3.0]])
     filters.costs = np.array([30.0, 10.0, 20.0])
-    filters.cycle(lambda particles: particles[:, 0], sigma_scale=4.0)
-    assert given_to == [([30.0, 10.0, 20.0], 0.7, 2000.0, rng, True)]
+    filters.iterate(lambda particles: particles[:, 0], sigma_scale=4.0)
+    assert given_to == [("systematic", [30.0, 10.0, 20.0], 0.7, 2000.0, rng, True)]
     assert filters.particles.tolist() == [[2.0], [2.0], [1.0]]
 
 
@@ -156,8 +157,8 @@ def test_explorers_are_the_last_and_come_from_anywhere(explorers: int) -> None:
     found = []
     for seed in range(60):
         filters = make(seed, limits=limits, noise=np.full(3, 1e-3), survival_rate=1e-9)
-        filters.scatter(START, distance_px)
-        filters.cycle(distance_px, explorers=explorers)
+        filters.initialize(START, distance_px)
+        filters.iterate(distance_px, explorers=explorers)
         near = np.all(np.abs(filters.particles - START) < 0.02, axis=1)
         assert near[: 50 - explorers].all()
         found.append(filters.particles[50 - explorers :])
@@ -214,7 +215,7 @@ def test_a_larger_image_spreads_the_weights_of_the_standard_deviation() -> None:
 @pytest.mark.parametrize("count", [2, 50])
 def test_statistics_leave_the_particles_alone(count: int) -> None:
     filters = make(survival_rate=count / 50)
-    filters.scatter(START, distance_px)
+    filters.initialize(START, distance_px)
     before = filters.particles.copy()
     filters.stddev(filters.mean(count))
     np.testing.assert_array_equal(filters.particles, before)
@@ -224,9 +225,9 @@ def test_statistics_leave_the_particles_alone(count: int) -> None:
 def test_the_seed_decides_everything(strategy: str) -> None:
     def run(seed: int) -> np.ndarray:
         filters = make(seed, strategy)
-        filters.scatter(START, distance_px)
+        filters.initialize(START, distance_px)
         for _ in range(3):
-            filters.cycle(distance_px, explorers=5)
+            filters.iterate(distance_px, explorers=5)
         return filters.particles
 
     np.testing.assert_array_equal(run(3), run(3))
@@ -237,7 +238,7 @@ def test_the_filter_finds_the_minimum() -> None:
     """From half a radian away, over five seeds."""
     for seed in range(5):
         filters = make(seed, particles=200, survival_rate=0.4)
-        filters.scatter(np.array([0.6, 0.1, -0.3]), distance_px)
+        filters.initialize(np.array([0.6, 0.1, -0.3]), distance_px)
         for cycle in range(25):
-            filters.cycle(distance_px, noise_scale=0.85**cycle)
+            filters.iterate(distance_px, noise_scale=0.85**cycle)
         np.testing.assert_allclose(filters.mean(20), (1.0, 0.0, -0.5), atol=0.02)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.estimation.filtering.resampling import STRATEGIES, srs_weights
+from cardbox_tracker.estimation.filtering.resampling import gaussian_weights, resample, truncation
 
 SIGMA_PX = 1000.0
 
@@ -30,12 +30,14 @@ class Places:
 
 
 def drs(costs: np.ndarray, survival_rate: float) -> np.ndarray:
-    # Neither sigma_gamma nor a generator is looked at.
-    return STRATEGIES["drs"](costs, survival_rate, float("nan"), None)
+    # Neither sigma_gamma nor a generator is used.
+    ancestors = resample("drs", costs, survival_rate, float("nan"), None)
+    np.testing.assert_array_equal(ancestors, truncation(costs, survival_rate))
+    return ancestors
 
 
 def srs(costs: np.ndarray, rng: object, sigma_px: float = SIGMA_PX) -> np.ndarray:
-    return STRATEGIES["srs"](costs, float("nan"), sigma_px, rng)
+    return resample("srs", costs, float("nan"), sigma_px, rng)
 
 
 def costs_with_weights(*weights: float) -> np.ndarray:
@@ -124,19 +126,19 @@ def test_drs_leaves_the_costs_as_they_are() -> None:
     assert costs.tolist() == [3, 1, 2, 0]
 
 
-def test_srs_weights_by_hand() -> None:
+def test_gaussian_weights_by_hand() -> None:
     # exp(-W^2 / (2 sigma^2)) at 0, sigma and 2 sigma.
     raw = np.array([1.0, np.exp(-0.5), np.exp(-2.0)])
     np.testing.assert_allclose(
-        srs_weights(np.array([0.0, SIGMA_PX, 2 * SIGMA_PX]), SIGMA_PX), raw / raw.sum()
+        gaussian_weights(np.array([0.0, SIGMA_PX, 2 * SIGMA_PX]), SIGMA_PX), raw / raw.sum()
     )
 
 
 @given(COSTS, st.floats(100.0, 1e6))
-def test_srs_weights_are_a_distribution_that_falls_with_the_cost(
+def test_gaussian_weights_are_a_distribution_that_falls_with_the_cost(
     costs: np.ndarray, sigma_px: float
 ) -> None:
-    weights = srs_weights(costs, sigma_px)
+    weights = gaussian_weights(costs, sigma_px)
     assert weights.sum() == pytest.approx(1.0)
     assert np.all(weights >= 0)
     assert np.all(np.diff(weights[np.argsort(costs)]) <= 1e-15)
@@ -145,13 +147,13 @@ def test_srs_weights_are_a_distribution_that_falls_with_the_cost(
 @pytest.mark.parametrize("offset_px", [1e6, 1e9, 1e12])
 def test_huge_costs_leave_weights(offset_px: float) -> None:
     """exp(-W^2 / 2 sigma^2) alone would be 0 for all of them."""
-    weights = srs_weights(offset_px + np.array([0.0, 0.0, offset_px]), SIGMA_PX)
+    weights = gaussian_weights(offset_px + np.array([0.0, 0.0, offset_px]), SIGMA_PX)
     np.testing.assert_allclose(weights, [0.5, 0.5, 0.0])
 
 
 @given(st.integers(2, 80), st.floats(0.0, 1e9))
 def test_equal_costs_weigh_the_same(count: int, cost_px: float) -> None:
-    np.testing.assert_allclose(srs_weights(np.full(count, cost_px), SIGMA_PX), 1.0 / count)
+    np.testing.assert_allclose(gaussian_weights(np.full(count, cost_px), SIGMA_PX), 1.0 / count)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +168,7 @@ def test_equal_costs_weigh_the_same(count: int, cost_px: float) -> None:
 )
 def test_srs_by_hand(places: tuple[float, ...], drawn: list[int]) -> None:
     costs = costs_with_weights(0.1, 0.2, 0.3, 0.4)
-    np.testing.assert_allclose(srs_weights(costs, SIGMA_PX), [0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(gaussian_weights(costs, SIGMA_PX), [0.1, 0.2, 0.3, 0.4])
     # The first is the best, whatever its stratum says.
     assert srs(costs, Places(*places)).tolist() == [3, *drawn]
 
@@ -191,7 +193,7 @@ def test_srs_ancestors_are_ordered_and_have_weight(costs: np.ndarray, seed: int)
     assert ancestors.shape == costs.shape
     assert costs[ancestors[0]] == costs.min()
     assert np.all(np.diff(ancestors[1:]) >= 0)
-    assert np.all(srs_weights(costs, SIGMA_PX)[ancestors] > 0)
+    assert np.all(gaussian_weights(costs, SIGMA_PX)[ancestors] > 0)
 
 
 @given(COSTS, SEEDS)
@@ -211,5 +213,5 @@ def test_srs_does_not_look_at_the_order_alone() -> None:
 def test_survivors_are_not_lost_to_rounding() -> None:
     """0.29 times 100 is 28.999999999999996."""
     costs = np.arange(100, dtype=np.float64)
-    ancestors = STRATEGIES["drs"](costs, 0.29, 1.0, np.random.default_rng(0))
+    ancestors = truncation(costs, 0.29)
     assert sorted(set(ancestors.tolist())) == list(range(29))

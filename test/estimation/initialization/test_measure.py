@@ -49,14 +49,14 @@ SHARED_M = 0.06
 
 
 def references_of(body: BodyModel) -> dict[str, np.ndarray]:
-    camera = CAMERA.with_pitch(body.camera_pitch_rad)
+    camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
     silhouettes = {}
     for name in REFERENCE_NAMES:
         posture = reference_posture(name, body.side_turn)
-        posture[0] = body.lateral_m
+        posture[0] = body.placement.lateral_m
         silhouette = render(cardbox_patches(body, posture), camera)
         # The model ends at the hips; a person goes on, down to the image's lower border.
-        middle = round(camera.cx + camera.fx * body.lateral_m / body.distance_m)
+        middle = round(camera.cx + camera.fx * body.placement.lateral_m / body.placement.distance_m)
         silhouette[rows_above_hips(body, camera) :, middle - 20 : middle + 20] = 255
         silhouettes[name] = silhouette
     return silhouettes
@@ -64,8 +64,8 @@ def references_of(body: BodyModel) -> dict[str, np.ndarray]:
 
 def measure(body: BodyModel, **values: object) -> InitializationResult:
     config = InitializationConfig(
-        distance_m=body.distance_m,
-        camera_pitch_rad=body.camera_pitch_rad,
+        distance_m=body.placement.distance_m,
+        camera_pitch_rad=body.camera_pose.pitch_rad,
         side_turn=body.side_turn,
     )
     return initialize_body(references_of(body), CAMERA, replace(config, **values))
@@ -73,7 +73,7 @@ def measure(body: BodyModel, **values: object) -> InitializationResult:
 
 def heights_m(body: BodyModel) -> dict[str, float]:
     """Heights above the camera of what the outline shows."""
-    top = body.hip_height_m + body.size("waist_height") + body.size("torso_height")
+    top = body.placement.hip_height_m + body.size("waist_height") + body.size("torso_height")
     return {
         "shoulder": top - body.size("shoulder_drop"),
         "torso's top": top,
@@ -87,8 +87,7 @@ def measured() -> list[tuple[BodyModel, InitializationResult]]:
     pairs = []
     for number in range(BODIES):
         rng = np.random.default_rng(number)
-        body = replace(
-            random_body(rng, DISTANCE_M),
+        body = random_body(rng, DISTANCE_M).with_values(
             lateral_m=float(rng.uniform(-0.08, 0.08)),
             hip_height_m=float(rng.uniform(-0.6, -0.52)),
             side_turn=("left", "right")[number % 2],
@@ -118,12 +117,17 @@ def test_heights_and_lateral_place_are_found(measured: Measured) -> None:
         expected = heights_m(body)
         for name, height in heights_m(result.body).items():
             assert height == pytest.approx(expected[name], abs=SHOWN_M), name
-        assert result.body.lateral_m == pytest.approx(body.lateral_m, abs=SHOWN_M)
+        assert result.body.placement.lateral_m == pytest.approx(
+            body.placement.lateral_m, abs=SHOWN_M
+        )
 
 
 def test_the_hips_follow_from_the_stature(measured: Measured) -> None:
     """No outline shows them; people of one stature differ in them by several centimetres."""
-    errors = [abs(result.body.hip_height_m - body.hip_height_m) for body, result in measured]
+    errors = [
+        abs(result.body.placement.hip_height_m - body.placement.hip_height_m)
+        for body, result in measured
+    ]
     assert np.mean(errors) < SHARED_M
 
 
@@ -147,8 +151,8 @@ def test_the_fit_is_told_and_good(measured: Measured) -> None:
 def test_what_was_given_is_in_the_body(measured: Measured) -> None:
     for body, result in measured:
         assert result.body.side_turn == body.side_turn
-        assert result.body.distance_m == body.distance_m
-        assert result.body.camera_pitch_rad == body.camera_pitch_rad
+        assert result.body.placement.distance_m == body.placement.distance_m
+        assert result.body.camera_pose.pitch_rad == body.camera_pose.pitch_rad
         assert np.all(result.body.sizes >= SIZE_LIMITS[:, 0])
         assert np.all(result.body.sizes <= SIZE_LIMITS[:, 1])
         # Tenths of a millimetre, so that the file is the body.
@@ -168,18 +172,18 @@ def test_rounds_end_and_never_make_it_worse(measured: Measured) -> None:
 
 
 def test_a_pitched_camera_changes_nothing() -> None:
-    body = BodyModel(hip_height_m=-0.6, camera_pitch_rad=np.radians(8.0), lateral_m=0.05)
+    body = BodyModel.of(hip_height_m=-0.6, camera_pitch_rad=np.radians(8.0), lateral_m=0.05)
     result = measure(body)
     assert result.mean_iou > 0.9
     expected = heights_m(body)
     for name, height in heights_m(result.body).items():
         assert height == pytest.approx(expected[name], abs=SHOWN_M), name
-    assert result.body.lateral_m == pytest.approx(0.05, abs=SHOWN_M)
+    assert result.body.placement.lateral_m == pytest.approx(0.05, abs=SHOWN_M)
 
 
 def test_a_distance_too_large_makes_everything_as_much_larger() -> None:
     """A silhouette gives sizes up to scale."""
-    body = BodyModel(hip_height_m=-0.51)
+    body = BodyModel.of(hip_height_m=-0.51)
     near, far = measure(body).body, measure(body, distance_m=2.2).body
     for name in ("head_width", "torso_depth", "forearm_width"):
         assert far.size(name) == pytest.approx(1.1 * near.size(name), rel=0.06)
@@ -190,7 +194,7 @@ def test_a_distance_too_large_makes_everything_as_much_larger() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rounded_person_with_legs_is_measured(seed: int) -> None:
     """The cardbox never fits them exactly; 0.80 is what recorded people have to reach."""
-    body = replace(random_body(np.random.default_rng(seed)), side_turn="right")
+    body = random_body(np.random.default_rng(seed)).with_values(side_turn="right")
     renderer = Renderer(CAMERA, Scene(), np.random.default_rng(seed))
     references = {
         name: renderer.silhouette(body, reference_posture(name, "right"))
@@ -205,7 +209,7 @@ def test_a_rounded_person_with_legs_is_measured(seed: int) -> None:
 
 
 def test_the_seed_decides_every_number() -> None:
-    body = BodyModel(hip_height_m=-0.51)
+    body = BodyModel.of(hip_height_m=-0.51)
     first, second = measure(body, seed=7), measure(body, seed=7)
     assert first.body == second.body
     assert (first.iou, first.rounds, first.costs_px) == (second.iou, second.rounds, second.costs_px)
@@ -214,7 +218,7 @@ def test_the_seed_decides_every_number() -> None:
 
 def test_progress_goes_to_one() -> None:
     told: list[float] = []
-    references = references_of(BodyModel(hip_height_m=-0.51))
+    references = references_of(BodyModel.of(hip_height_m=-0.51))
     config = InitializationConfig(hypotheses=20, max_rounds=3)
     initialize_body(references, CAMERA, config, told.append)
     assert told == sorted(told)
@@ -223,7 +227,7 @@ def test_progress_goes_to_one() -> None:
 
 
 def test_rounds_have_a_maximum() -> None:
-    result = measure(BodyModel(hip_height_m=-0.51), max_rounds=4, accuracy_m=0.0)
+    result = measure(BodyModel.of(hip_height_m=-0.51), max_rounds=4, accuracy_m=0.0)
     assert result.rounds == dict.fromkeys(SUBSETS, 8)
 
 
@@ -246,7 +250,7 @@ def test_a_poor_fit_is_refused_with_its_numbers() -> None:
 
 
 def test_the_required_fit_is_a_setting() -> None:
-    body = BodyModel(hip_height_m=-0.51)
+    body = BodyModel.of(hip_height_m=-0.51)
     reached = measure(body).mean_iou
     assert measure(body, min_iou=reached - 0.001).mean_iou == reached
     with pytest.raises(InitializationError, match=r"expected 0\.9"):
@@ -264,7 +268,7 @@ def test_the_required_fit_is_a_setting() -> None:
 def test_unusable_references_are_refused_before_any_work(
     name: str, replacement: str | None, text: str
 ) -> None:
-    references = references_of(BodyModel(hip_height_m=-0.51))
+    references = references_of(BodyModel.of(hip_height_m=-0.51))
     nobody = np.zeros((240, 320), np.uint8)
     references[name] = nobody if replacement is None else references[replacement]
     told: list[float] = []
@@ -275,4 +279,4 @@ def test_unusable_references_are_refused_before_any_work(
 
 def test_a_person_cut_off_at_the_border_is_refused() -> None:
     with pytest.raises(InitializationError, match="'arms': the person is cut off at the right"):
-        measure(BodyModel(hip_height_m=-0.51, lateral_m=0.3))
+        measure(BodyModel.of(hip_height_m=-0.51, lateral_m=0.3))

@@ -20,7 +20,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
-BODY = BodyModel(hip_height_m=-0.51)
+BODY = BodyModel.of(hip_height_m=-0.51)
 
 
 def seen(name: str, torso_y_m: float = 0.0, side_turn: str = "left") -> np.ndarray:
@@ -192,5 +192,5 @@ def test_only_head_and_chest_say_where_the_person_stands() -> None:
 @pytest.mark.parametrize("torso_y_m", [-0.2, 0.0, 0.15])
 def test_lateral_place_of_a_person(name: str, torso_y_m: float) -> None:
     """Within two pixels of 1.2 cm; from the side the head lies 4 cm forward of the torso's axis."""
-    found = lateral_m(seen(name, torso_y_m), CAMERA, BODY.distance_m)
+    found = lateral_m(seen(name, torso_y_m), CAMERA, BODY.placement.distance_m)
     assert found == pytest.approx(torso_y_m, abs=0.025 + (0.04 if name == "side" else 0.0))

@@ -33,7 +33,7 @@ def outstretched(rows: int) -> np.ndarray:
 
 
 def seen(body: BodyModel, name: str) -> np.ndarray:
-    camera = CAMERA.with_pitch(body.camera_pitch_rad)
+    camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
     return render(cardbox_patches(body, reference_posture(name)), camera)
 
 
@@ -94,18 +94,18 @@ def test_the_upper_body_tells_the_stature(factor: float, pitch_deg: float) -> No
 
     The sizes are by default those of 1.72 m.
     """
-    body = BodyModel(
+    body = BodyModel.of(
         DEFAULT_SIZES * factor, hip_height_m=-0.51, camera_pitch_rad=np.radians(pitch_deg)
     )
     references = {name: seen(body, name) for name in ("front", "arms")}
-    found = stature_m(references, CAMERA.with_pitch(body.camera_pitch_rad), 2.0)
+    found = stature_m(references, CAMERA.with_pitch(body.camera_pose.pitch_rad), 2.0)
     assert found == pytest.approx(1.72 * factor, abs=0.07)
 
 
 def test_the_stature_grows_with_the_span_of_the_arms() -> None:
     found = []
     for factor in (0.8, 0.9, 1.0, 1.1):
-        body = BodyModel(DEFAULT_SIZES * factor, hip_height_m=-0.51)
+        body = BodyModel.of(DEFAULT_SIZES * factor, hip_height_m=-0.51)
         references = {name: seen(body, name) for name in ("front", "arms")}
         found.append(stature_m(references, CAMERA, 2.0))
     assert found == sorted(found)

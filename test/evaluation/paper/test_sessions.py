@@ -40,7 +40,7 @@ def test_silhouettes_and_truth_belong_together(session: Session) -> None:
 
 
 def test_the_truth_is_that_of_the_kinematics(session: Session) -> None:
-    person = BodyModel(hip_height_m=-0.51)
+    person = BodyModel.of(hip_height_m=-0.51)
     expected = session.camera.reference_to_optical(keypoints_m(person, session.postures))
     np.testing.assert_allclose(session.keypoints_m, expected, atol=1e-4)
     np.testing.assert_allclose(session.torso_rad, session.postures[:, 1:4], atol=1e-3)

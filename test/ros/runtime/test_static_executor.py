@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import gc
+import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -19,7 +25,13 @@ from rclpy.task import Future  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
-from cardbox_tracker.ros.runtime.static_executor import StaticExecutor  # noqa: E402
+from cardbox_tracker.ros.runtime import static_executor, wait_set  # noqa: E402
+from cardbox_tracker.ros.runtime.node import spin  # noqa: E402
+from cardbox_tracker.ros.runtime.static_executor import (  # noqa: E402
+    StaticExecutor,
+    make_executor,
+)
+from cardbox_tracker.ros.runtime.wait_set import RELIED_ON, UnsuitableRclpyError  # noqa: E402
 
 LIMIT_S = 30.0
 QOS = QoSProfile(depth=100)
@@ -32,7 +44,7 @@ class Served:
         self.node = make_node(name="served")
         self.other = make_node(name="other")
         self.errors: list[BaseException] = []
-        self._executor = StaticExecutor(context=self.node.context)
+        self._executor = make_executor(self.node.context)
         self._executor.add_node(self.node)
         self._others = SingleThreadedExecutor(context=self.node.context)
         self._others.add_node(self.other)
@@ -43,6 +55,10 @@ class Served:
             self._executor.spin()
         except Exception as error:
             self.errors.append(error)
+
+    @property
+    def executor(self) -> Any:
+        return self._executor
 
     def begin(self) -> None:
         self._thread.start()
@@ -71,6 +87,35 @@ class Served:
             self._thread.join(LIMIT_S)
         self._others.shutdown()
         assert not self._thread.is_alive(), "the executor did not end"
+
+
+class Without:
+    """Stands for an object that lacks one attribute, or whose attribute lacks one."""
+
+    def __init__(self, original: Any, path: list[str]) -> None:
+        self._original = original
+        self._path = path
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._original, name)
+        if name != self._path[0]:
+            return value
+        if len(self._path) == 1:
+            raise AttributeError(name)
+        return Without(value, self._path[1:])
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._original(*arguments)
+
+
+def remove(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """Hide a name of ``RELIED_ON`` from the module, not from rclpy itself."""
+    root, *path = name.split(".")
+    monkeypatch.setattr(wait_set, root, Without(getattr(wait_set, root), path))
+
+
+def warnings_in(log: str) -> list[str]:
+    return [line for line in log.splitlines() if "[cardbox_tracker]" in line]
 
 
 @pytest.fixture
@@ -230,3 +275,238 @@ def test_it_ends_with_ros(served: Served) -> None:
         assert time.monotonic() < end
         time.sleep(0.01)
     assert isinstance(served.errors[0], ExternalShutdownException)
+
+
+def test_a_coroutine_goes_on_when_nobody_wakes_the_executor(served: Served) -> None:
+    done: Future = Future()
+
+    async def patient(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        await done
+        return response
+
+    group = ReentrantCallbackGroup()
+    served.node.create_service(Trigger, "wait", patient, callback_group=group)
+    served.begin()
+    client = served.other.create_client(Trigger, "wait")
+    served.until(client.service_is_ready)
+    answer = client.call_async(Trigger.Request())
+    end = time.monotonic() + 0.3
+    served.until(lambda: time.monotonic() > end)
+    done.set_result(None)
+    served.until(answer.done)
+
+
+def test_a_coroutine_may_wait_for_what_a_message_brings(served: Served) -> None:
+    arrived: Future = Future()
+
+    async def patient(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.message = await arrived
+        return response
+
+    group = ReentrantCallbackGroup()
+    served.node.create_service(Trigger, "wait", patient, callback_group=group)
+    served.node.create_subscription(
+        String, "words", lambda word: arrived.set_result(word.data), QOS, callback_group=group
+    )
+    served.begin()
+    publisher = served.publisher("words")
+    client = served.other.create_client(Trigger, "wait")
+    served.until(client.service_is_ready)
+    answer = client.call_async(Trigger.Request())
+    end = time.monotonic() + 0.1
+    served.until(lambda: time.monotonic() > end)
+    publisher.publish(String(data="hello"))
+    served.until(answer.done)
+    assert answer.result().message == "hello"
+
+
+def test_what_a_coroutine_raises_after_waiting_ends_the_spinning(served: Served) -> None:
+    done: Future = Future()
+
+    async def fail() -> None:
+        await done
+        raise RuntimeError("as told")
+
+    served.executor.create_task(fail)
+    served.begin()
+    time.sleep(0.1)
+    done.set_result(None)
+    served.until(lambda: served.errors)
+    assert str(served.errors[0]) == "as told"
+
+
+def test_tasks_are_run_at_once_and_a_cancelled_one_is_forgotten(served: Served) -> None:
+    ran: list[str] = []
+    never: Future = Future()
+
+    async def wait_for_ever() -> None:
+        ran.append("waiting")
+        await never
+
+    served.begin()
+    waiting = served.executor.create_task(wait_for_ever)
+    served.until(lambda: ran)
+    waiting.cancel()
+    served.executor.create_task(ran.append, "after")
+    served.until(lambda: len(ran) == 2)
+    assert not served.errors
+
+
+def test_a_guard_condition_of_a_node_is_served(served: Served) -> None:
+    seen: list[None] = []
+    guard = served.node.create_guard_condition(lambda: seen.append(None))
+    served.begin()
+    for i in range(3):
+        guard.trigger()
+        served.until(lambda i=i: len(seen) == i + 1)
+
+
+def test_a_node_may_be_added_and_removed_while_it_spins(
+    served: Served, make_node: Callable[..., Any]
+) -> None:
+    heard: list[str] = []
+    served.begin()
+    time.sleep(0.1)
+    late = make_node(name="late")
+    late.create_subscription(String, "words", lambda word: heard.append(word.data), QOS)
+    served.executor.add_node(late)
+    publisher = served.publisher("words")
+    publisher.publish(String(data="one"))
+    served.until(lambda: heard)
+    served.executor.remove_node(late)
+    time.sleep(0.2)
+    publisher.publish(String(data="two"))
+    time.sleep(0.2)
+    assert heard == ["one"]
+
+
+def test_an_interrupted_construction_leaves_no_traceback(
+    make_node: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[Any] = []
+
+    def interrupt(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    context = make_node().context
+    monkeypatch.setattr(sys, "unraisablehook", left.append)
+    for place in ("GuardCondition", "SignalHandlerGuardCondition"):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"rclpy.executors.{place}", interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                StaticExecutor(context=context)
+            gc.collect()
+    assert not left
+
+
+def test_ctrl_c_while_it_is_made_leaves_no_traceback(
+    make_node: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[Any] = []
+    original = rclpy.executors.SignalHandlerGuardCondition
+
+    def interrupted(*arguments: Any) -> Any:
+        made = original(*arguments)
+        signal.raise_signal(signal.SIGINT)
+        return made
+
+    context = make_node().context
+    monkeypatch.setattr(sys, "unraisablehook", left.append)
+    with monkeypatch.context() as patch:
+        patch.setattr("rclpy.executors.SignalHandlerGuardCondition", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            make_executor(context)
+        gc.collect()
+    assert not left
+
+
+def test_it_may_outlive_its_context_without_a_traceback(
+    make_node: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[Any] = []
+    monkeypatch.setattr(sys, "unraisablehook", left.append)
+    executor = StaticExecutor(context=make_node().context)
+    executor.shutdown()
+    executor.shutdown()
+    executor.wake()
+    executor.context.shutdown()
+    del executor
+    gc.collect()
+    assert not left
+
+
+@pytest.mark.parametrize("name", RELIED_ON)
+def test_what_rclpy_lacks_is_named_once_and_its_own_executor_serves(
+    name: str,
+    make_node: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    remove(monkeypatch, name)
+    served = Served(make_node)
+    try:
+        assert type(served.executor) is SingleThreadedExecutor
+        with pytest.raises(UnsuitableRclpyError):
+            StaticExecutor(context=served.node.context)
+        heard: list[str] = []
+        served.node.create_subscription(String, "words", lambda word: heard.append(word.data), QOS)
+        served.begin()
+        served.publisher("words").publish(String(data="hello"))
+        served.until(lambda: heard)
+    finally:
+        served.end()
+    (warning,) = warnings_in(capfd.readouterr().err)
+    assert "[WARN]" in warning
+    assert name in warning
+
+
+def test_a_node_spins_where_rclpy_lacks_something(
+    make_node: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    remove(monkeypatch, RELIED_ON[-1])
+    node = make_node()
+
+    def hear(word: String) -> None:
+        raise RuntimeError(f"heard {word.data}")
+
+    node.create_subscription(String, "words", hear, QOS)
+    publisher = node.create_publisher(String, "words", QOS)
+    node.create_timer(0.05, lambda: publisher.publish(String(data="hello")))
+    with pytest.raises(RuntimeError, match="heard hello"):
+        spin(node)
+    assert len(warnings_in(capfd.readouterr().err)) == 1
+
+
+def test_a_wait_set_of_another_kind_is_noticed(
+    make_node: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    def changed(*_: Any) -> Any:
+        raise TypeError("incompatible constructor arguments")
+
+    monkeypatch.setattr(wait_set, "_wait_set", changed)
+    assert type(make_executor(make_node().context)) is SingleThreadedExecutor
+    (warning,) = warnings_in(capfd.readouterr().err)
+    assert "incompatible constructor arguments" in warning
+
+
+def test_nothing_is_warned_of_with_this_rclpy(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert isinstance(served.executor, StaticExecutor)
+    assert not warnings_in(capfd.readouterr().err)
+
+
+@pytest.mark.parametrize("module", [static_executor, wait_set])
+def test_no_private_name_of_rclpy_is_used(module: ModuleType) -> None:
+    tree = list(ast.walk(ast.parse(Path(str(module.__file__)).read_text())))
+    own = {node.name for node in tree if isinstance(node, ast.FunctionDef)} | {
+        node.attr
+        for node in tree
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+    }
+    used = {node.attr for node in tree if isinstance(node, ast.Attribute)}
+    assert {name for name in used if name.startswith("_")} <= own | {"__del__"}

@@ -1,0 +1,126 @@
+"""The shapes of the body's parts and the places of its joints, from the 18 sizes: in one place.
+
+Every part is a box or frustum in a frame of its own: X forwards, Y to the person's left, Z up,
+metres. Torso, waist, neck and head share the torso's frame, whose origin is the middle of the hips.
+The origin of an upper arm is the shoulder joint, that of a forearm the elbow joint; both hang down
+along -Z.
+
+What draws or describes a body takes its shapes from here: the patches, the boxes of the volumetric
+model, the URDFs, the simulated person and, through the patches, the compiled cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import SIZE_INDEX, FloatArray
+
+Length = TypeVar("Length", float, FloatArray)
+"""Metres: a number for one body, an array (...) for many."""
+
+
+class Part(NamedTuple, Generic[Length]):
+    """Extent of one part in its frame, metres; it is symmetric to the plane of X and Z."""
+
+    bottom_m: Length
+    """Where it begins along Z."""
+    height_m: Length
+    bottom_width_m: Length
+    """Along Y, at its bottom."""
+    top_width_m: Length
+    """Along Y, at its top."""
+    depth_m: Length
+    """Along X."""
+    forward_m: Length
+    """Where its axis is along X."""
+
+    @property
+    def top_m(self) -> Length:
+        """Where it ends along Z."""
+        return self.bottom_m + self.height_m
+
+    @property
+    def middle_m(self) -> Length:
+        """Height of its centre along Z."""
+        return self.bottom_m + self.height_m / 2
+
+    @property
+    def mean_width_m(self) -> Length:
+        """Width where no trapezoid can be shown."""
+        return (self.top_width_m + self.bottom_width_m) / 2
+
+
+class BodyParts(NamedTuple, Generic[Length]):
+    """All parts, and where the arms are joined to the torso; both arms are alike.
+
+    The middle of the torso's top is ``torso.top_m``, the chin ``head.bottom_m``, the crown
+    ``head.top_m``; an arm's part ends at minus its ``height_m``.
+    """
+
+    torso: Part[Length]
+    waist: Part[Length]
+    neck: Part[Length]
+    head: Part[Length]
+    upper_arm: Part[Length]
+    forearm: Part[Length]
+    shoulder_aside_m: Length
+    """Distance of a shoulder joint from the plane of X and Z of the torso's frame."""
+    shoulder_height_m: Length
+    """Height of the shoulder joints along Z of the torso's frame."""
+
+
+def body_parts(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts[float]:
+    """Return the parts of one body.
+
+    Args:
+        sizes_m: shape (18,), ordered as ``SIZE_NAMES``.
+        neck_to_head: width of the neck as a fraction of the head's, 0 without a neck.
+    """
+    return _parts(np.asarray(sizes_m).tolist(), neck_to_head)
+
+
+def parts_of_bodies(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts[FloatArray]:
+    """Return the parts of many bodies (..., 18) at once, every length of shape (...)."""
+    return _parts(list(np.moveaxis(np.asarray(sizes_m), -1, 0)), neck_to_head)
+
+
+def _parts(sizes: Sequence[Length], neck_to_head: float) -> BodyParts[Length]:
+    def size(name: str) -> Length:
+        return sizes[SIZE_INDEX[name]]
+
+    middle = 0.0 * sizes[0]
+
+    def limb(name: str) -> Part[Length]:
+        length, width = size(f"{name}_length"), size(f"{name}_width")
+        return Part(-length, length, width, width, width, middle)
+
+    torso = Part(
+        size("waist_height"),
+        size("torso_height"),
+        size("torso_bottom_width"),
+        size("torso_top_width"),
+        size("torso_depth"),
+        middle,
+    )
+    hips_width, hips_depth = size("waist_width"), size("waist_depth")
+    waist = Part(middle, size("waist_height"), hips_width, hips_width, hips_depth, middle)
+    head_width, forward = size("head_width"), size("head_offset")
+    # A neck leads from the torso's axis to the head's.
+    width = neck_to_head * head_width
+    neck = Part(torso.top_m, size("neck_length"), width, width, width, forward / 2)
+    head = Part(
+        neck.top_m, size("head_height"), head_width, head_width, size("head_depth"), forward
+    )
+    return BodyParts(
+        torso,
+        waist,
+        neck,
+        head,
+        limb("upper_arm"),
+        limb("forearm"),
+        size("shoulder_breadth") / 2,
+        torso.top_m - size("shoulder_drop"),
+    )

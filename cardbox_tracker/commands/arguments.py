@@ -1,0 +1,106 @@
+"""Argument types and options that several subcommands share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
+
+
+def add_recording(parser: argparse.ArgumentParser) -> None:
+    """Add the recording to read and the span in which its background is learned."""
+    parser.add_argument("recording", type=Path, metavar="BAG", help="rosbag2 folder or file")
+    parser.add_argument(
+        "--background",
+        type=span,
+        required=True,
+        metavar="T0:T1",
+        help="seconds during which nobody is in view",
+    )
+
+
+def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add ``--preset``, a name of ``estimation.config.PRESETS``."""
+    from cardbox_tracker.estimation.config import PRESETS
+
+    parser.add_argument(
+        "--preset",
+        choices=PRESETS,
+        default=default,
+        help="tracker settings: the paper's Table I, or those that track best",
+    )
+
+
+def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--seed``; ``what`` says which random numbers it determines."""
+    parser.add_argument("--seed", type=seed, default=0, help=f"random seed of {what}")
+
+
+def span(text: str) -> TimeSpan:
+    """Return the span that ``T0:T1`` means, in seconds from the start of the recording.
+
+    Raises:
+        argparse.ArgumentTypeError: it is not two such times, the first before the second.
+    """
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
+
+    try:
+        return TimeSpan.parse(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            "expected T0:T1, seconds from the start of the recording with T0 before T1, "
+            f"got {text!r}"
+        ) from None
+
+
+def time(text: str) -> float:
+    """Return a time in seconds from the start of the recording.
+
+    Raises:
+        argparse.ArgumentTypeError: it is not a finite number, or it is negative.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(
+            f"expected seconds from the start of the recording, got {text!r}"
+        )
+    return value
+
+
+def seed(text: str) -> int:
+    """Return a seed: a whole number of 0 or more."""
+    return _integer(text, 0)
+
+
+def particle_count(text: str) -> int:
+    """Return a number of particles: 2 or more."""
+    return _integer(text, 2)
+
+
+def run_count(text: str) -> int:
+    """Return a number of runs: 2 or more, so that there is a spread."""
+    return _integer(text, 2)
+
+
+def process_count(text: str) -> int:
+    """Return a number of processes: 1 or more."""
+    return _integer(text, 1)
+
+
+def _integer(text: str, lowest: int) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = lowest - 1
+    if value < lowest:
+        raise argparse.ArgumentTypeError(
+            f"expected a whole number of {lowest} or more, got {text!r}"
+        )
+    return value

@@ -1,0 +1,29 @@
+"""``cardbox call``: a service of the running nodes."""
+
+from __future__ import annotations
+
+import argparse
+
+from cardbox_tracker.errors import RosMissingError
+
+NAME = "call"
+HELP = "call a service of the running nodes, as 'ros2 service call' does"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox call``."""
+    parser.add_argument("service", metavar="SERVICE", help="such as initializer/initialize")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call the service and print its answer.
+
+    Raises:
+        RosMissingError: there is no rclpy.
+        CardboxError: the service is missing, or it answered that it failed.
+    """
+    try:
+        from cardbox_tracker.ros.runtime.call import call_service
+    except ImportError as error:
+        raise RosMissingError(error) from None
+    print(call_service(options.service, lambda text: print(text, flush=True)))

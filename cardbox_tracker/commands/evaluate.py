@@ -1,0 +1,61 @@
+"""``cardbox evaluate``: the paper's experiments."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import add_seed, process_count, run_count
+
+NAME = "evaluate"
+HELP = "repeat the paper's experiments; continues where it was interrupted"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox evaluate``."""
+    parser.add_argument(
+        "--runs",
+        type=run_count,
+        default=100,
+        metavar="N",
+        help="runs of each strategy and motion",
+    )
+    parser.add_argument(
+        "--output", type=Path, required=True, metavar="DIR", help="folder of results"
+    )
+    parser.add_argument("--quick", action="store_true", help="everything smaller, in two minutes")
+    parser.add_argument(
+        "--session",
+        type=Path,
+        default=None,
+        metavar="DIR",
+        help="a recording with ground_truth.json instead of synthetic ones",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=process_count,
+        default=None,
+        metavar="N",
+        help="processes; without it, one per core",
+    )
+    add_seed(parser, "recordings and filters")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the experiments and write report, plots and numbers.
+
+    Raises:
+        CardboxError: a session cannot be read, or the results cannot be written.
+    """
+    from cardbox_tracker.evaluation.paper.evaluate import evaluate
+    from cardbox_tracker.evaluation.paper.runner import default_jobs
+
+    evaluate(
+        options.output,
+        options.runs,
+        options.seed,
+        options.quick,
+        options.session,
+        options.jobs or default_jobs(),
+    )
+    print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")

@@ -1,0 +1,101 @@
+"""``cardbox initialize``: the body of the person in a recording."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import add_recording, add_seed, span
+from cardbox_tracker.errors import CardboxError
+
+NAME = "initialize"
+HELP = "measure the person in a recording"
+
+_REFERENCES = {
+    "front": "faces the camera, arms hanging 20 degrees away from the body",
+    "side": "stands the same, turned by 90 degrees",
+    "arms": "faces the camera, both arms stretched sideways",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox initialize``."""
+    from cardbox_tracker.body.posture import SIDE_TURNS
+
+    add_recording(parser)
+    for name, posture in _REFERENCES.items():
+        parser.add_argument(
+            f"--{name}",
+            type=span,
+            required=True,
+            metavar="T0:T1",
+            help=f"seconds during which the person {posture}",
+        )
+    parser.add_argument(
+        "--distance",
+        type=float,
+        required=True,
+        metavar="M",
+        help="from the camera to the person, metres along the floor; all sizes are proportional "
+        "to it",
+    )
+    parser.add_argument(
+        "--side-turn",
+        choices=SIDE_TURNS,
+        default="left",
+        help="which way the person turns for --side, as they see it",
+    )
+    parser.add_argument(
+        "--camera-pitch-deg",
+        type=float,
+        default=0.0,
+        metavar="P",
+        help="positive when the camera looks down",
+    )
+    add_seed(parser, "the hypotheses")
+    parser.add_argument(
+        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Measure the person, write the body model and print its sizes.
+
+    Raises:
+        CardboxError: the recording cannot be read, its references give no body, or the model cannot
+            be written.
+    """
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.body.model_file import save_body_model
+    from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
+    from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+
+    config = InitializationConfig(
+        distance_m=options.distance,
+        camera_pitch_rad=math.radians(options.camera_pitch_deg),
+        side_turn=options.side_turn,
+        seed=options.seed,
+    )
+    # An impossible distance or pitch is refused by its own name, before anything follows from it.
+    BodyModel.of(distance_m=config.distance_m, camera_pitch_rad=config.camera_pitch_rad)
+    _check_folder(options.output)
+    spans = {name: getattr(options, name) for name in _REFERENCES}
+    with BagReader(options.recording) as bag:
+        source = SilhouetteSource(bag, options.background)
+        with progress_bar("initialize") as show:
+            result = initialize_from_recording(source, spans, config, show)
+    save_body_model(result.body, options.output)
+    print(describe(result))
+    print(f"wrote {options.output}")
+
+
+def _check_folder(output: Path) -> None:
+    """Refuse an output that cannot be written before a minute of work, not after it."""
+    folder = output.parent
+    if not folder.is_dir():
+        reason = "Not a directory" if folder.exists() else "No such file or directory"
+        raise CardboxError(f"cannot write {output}: {reason}; choose a folder that exists")

@@ -1,0 +1,55 @@
+"""``cardbox synthesize``: a recording of a synthetic person."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import add_seed
+
+NAME = "synthesize"
+HELP = "record a synthetic person, with ground truth"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox synthesize``."""
+    parser.add_argument(
+        "--motion",
+        default="all",
+        help="what follows the reference postures: wave, bend, bow or all",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="BAG",
+        help="recording to write; must not exist",
+    )
+    add_seed(parser, "noise and sway")
+    parser.add_argument(
+        "--storage", choices=("mcap", "sqlite3"), default="mcap", help="format of the recording"
+    )
+    parser.add_argument(
+        "--compressed", action="store_true", help="write JPEG images instead of raw ones"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the recording.
+
+    Raises:
+        CardboxError: the motion is unknown, or the recording cannot be written.
+    """
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.simulation.session import synthesize_session
+
+    with progress_bar("synthesize") as show:
+        synthesize_session(
+            options.output,
+            motion=options.motion,
+            seed=options.seed,
+            storage=options.storage,
+            compressed=options.compressed,
+            progress=show,
+        )
+    print(f"wrote {options.output}")

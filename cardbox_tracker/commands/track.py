@@ -1,0 +1,130 @@
+"""``cardbox track``: the posture in each image of a recording."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cardbox_tracker.commands.arguments import (
+    add_preset,
+    add_recording,
+    add_seed,
+    particle_count,
+    time,
+)
+from cardbox_tracker.errors import CardboxError
+
+if TYPE_CHECKING:
+    from cardbox_tracker.estimation.config import TrackerConfig
+
+NAME = "track"
+HELP = "follow the posture through a recording"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox track``."""
+    from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+
+    add_recording(parser)
+    parser.add_argument(
+        "--model",
+        type=Path,
+        required=True,
+        metavar="MODEL.yaml",
+        help="the person, from 'cardbox initialize' or the node initializer",
+    )
+    parser.add_argument(
+        "--start",
+        type=time,
+        required=True,
+        metavar="T",
+        help="second at which the person stands as for --front; tracking starts there",
+    )
+    parser.add_argument(
+        "--csv",
+        type=Path,
+        required=True,
+        metavar="OUT.csv",
+        help="table to write, one row per image",
+    )
+    add_preset(parser, "default")
+    parser.add_argument(
+        "--strategy",
+        choices=STRATEGIES,
+        default="drs",
+        help="resampling; drs is the paper's deterministic one",
+    )
+    parser.add_argument(
+        "--particles",
+        type=particle_count,
+        default=None,
+        metavar="N",
+        help="particles of each of the three filters; without it, the preset's",
+    )
+    parser.add_argument(
+        "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
+    )
+    parser.add_argument(
+        "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
+    )
+    add_seed(parser, "the filters")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Track the person and write what was asked for.
+
+    Raises:
+        CardboxError: the recording or the body model cannot be read, a setting is out of range, or
+            a result cannot be written.
+    """
+    from cardbox_tracker.body.model_file import load_body_model
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.result_bag import ResultBag
+    from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+    from cardbox_tracker.recordings.track import track_recording
+
+    body = load_body_model(options.model)
+    config = _config(options)
+    with BagReader(options.recording) as bag:
+        source = SilhouetteSource(bag, options.background)
+        total_s = max(1e-9, bag.duration_s - options.start)
+        with (
+            ResultBag(options.bag, body, source.frame_id) as results,
+            progress_bar("track") as show,
+        ):
+            summary = track_recording(
+                source,
+                body,
+                config,
+                options.seed,
+                options.start,
+                options.csv,
+                options.video,
+                observers=(
+                    results.add,
+                    lambda frame, *_: show((frame.time_s - options.start) / total_s),
+                ),
+            )
+    print(
+        f"tracked {summary.frames_tracked} of {summary.frames} images, "
+        f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
+    )
+    for path in (options.csv, options.video, options.bag):
+        if path is not None:
+            print(f"wrote {path}")
+
+
+def _config(options: argparse.Namespace) -> TrackerConfig:
+    """Return the preset with what the options change in it."""
+    from cardbox_tracker.estimation.config import PRESETS
+
+    config = replace(PRESETS[options.preset](), strategy=options.strategy)
+    if options.particles is None:
+        return config
+    try:
+        return config.with_particles(options.particles)
+    except ValueError as error:
+        raise CardboxError(str(error)) from None

@@ -1,0 +1,26 @@
+"""``cardbox urdf``: the robot description of a measured person."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+NAME = "urdf"
+HELP = "print the robot description (URDF) of a measured person"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox urdf``."""
+    parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the URDF.
+
+    Raises:
+        CardboxError: the body model cannot be read.
+    """
+    from cardbox_tracker.body.model_file import load_body_model
+    from cardbox_tracker.description.urdf import urdf_from_body
+
+    print(urdf_from_body(load_body_model(options.model)))

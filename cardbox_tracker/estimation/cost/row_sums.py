@@ -1,0 +1,79 @@
+"""Running sums along the rows of a silhouette, compiled: what the costs are read from.
+
+With f = 1 for foreground and 0 for background, row v of the row sums is
+
+    S(v, 0) = 0,    S(v, u + 1) = S(v, u) + 1 - 2 f(v, u)
+
+so that the sum of (1 - 2 f) over the columns a <= u < b is S(v, b) - S(v, a).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+RowSums = NDArray[np.signedinteger[Any]]
+"""Shape (rows, W + 1), of 16 bits where the image is narrow enough, else of 32."""
+
+_FOREGROUND = np.uint64(0xFFFFFFFFFFFFFFFF)
+# An index of this type is never negative, so no code is made to count from an array's end.
+_index = np.uint64
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _count_on(
+    row_sums: RowSums, v: int, u: np.uint64, count: int, sums: np.int32, step: np.int32
+) -> None:
+    """Write the ``count`` entries of row ``v`` that follow ``sums`` in column ``u``."""
+    for i in range(count):
+        row_sums[v, u + _index(i) + _index(1)] = np.int32(sums + step + np.int32(i) * step)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_row_sums(
+    silhouette: NDArray[np.uint8], words: NDArray[np.uint64], row_sums: RowSums
+) -> int:
+    """Fill ``row_sums`` for a silhouette and count its foreground.
+
+    Args:
+        silhouette: shape (rows, W), 0 or 255.
+        words: the same memory as (rows, W / 8) of 64 bits: where eight pixels are alike, and as the
+            eight before, they are done by the run. With no words, (rows, 0), pixel after pixel.
+        row_sums: written.
+
+    Returns:
+        Foreground pixels.
+    """
+    rows, width = silhouette.shape
+    total = 0
+    for v in range(_index(rows)):
+        sums = np.int64(0)
+        row_sums[v, 0] = 0
+        u = _index(0)
+        w, n = _index(0), _index(words.shape[1])
+        while w < n:
+            word = words[v, w]
+            begin = w
+            w += _index(1)
+            if word == _index(0) or word == _FOREGROUND:
+                while w < n and words[v, w] == word:
+                    w += _index(1)
+                step = 1 if word == _index(0) else -1
+                count = int(w - begin) * 8
+                _count_on(row_sums, v, u, count, np.int32(sums), np.int32(step))
+                sums += count * step
+                u += _index(count)
+            else:
+                for _ in range(8):
+                    sums += 1 - 2 * (silhouette[v, u] != 0)
+                    u += _index(1)
+                    row_sums[v, u] = sums
+        while u < _index(width):
+            sums += 1 - 2 * (silhouette[v, u] != 0)
+            u += _index(1)
+            row_sums[v, u] = sums
+        total += (width - sums) // 2
+    return total

@@ -1,0 +1,85 @@
+"""Mistakes of 'cardbox track': each is told in words, and nothing appears and nothing is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--start", "-1"), "--start: expected seconds from the start of the recording, got '-1'"),
+        (("--start", "soon"), "got 'soon'"),
+        (("--start", "99"), "no image lies after --start 99 s"),
+        (("--background", "90:99"), "0 images lie in the background span 90:99 s of a bag of"),
+        (("--preset", "fast"), "invalid choice: 'fast' (choose from "),
+        (("--strategy", "best"), "invalid choice: 'best' (choose from "),
+        (("--particles", "1"), "--particles: expected a whole number of 2 or more, got '1'"),
+        (("--particles", "9999999999"), "particles is 1e+10; expected 2 to 1e+06"),
+        (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),
+        (("--model", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give the"),
+        (("--model", "FOLDER/session"), "Is a directory"),
+        (("--model", "FOLDER/text.txt"), "text.txt"),
+        (("--model", "FOLDER/binary.yaml"), "binary.yaml"),
+        (("--model", "FOLDER/list.yaml"), "list.yaml"),
+        (("--model", "FOLDER/lacking.yaml"), "head_width"),
+        (("--model", "FOLDER/negative.yaml"), "head_width is -0.17 m; expected 0.08 to 0.35 m"),
+        (("--model", "FOLDER/centimetres.yaml"), "(is it given in centimetres?)"),
+        (("--csv", "FOLDER/missing/out.csv"), "out.csv: No such file or directory; choose"),
+        (("--csv", "FOLDER/text.txt/out.csv"), "out.csv: Not a directory; choose a folder"),
+        (("--csv", "FOLDER/session"), "it is a folder; give the name of a file"),
+        (("--video", "FOLDER/out.gif"), "its name must end in .mp4 or .avi"),
+        (("--video", "FOLDER/missing/out.mp4"), "out.mp4: No such file or directory"),
+        (("--bag", "FOLDER/session"), "is a recording already; choose another name or remove it"),
+        (("--bag", "FOLDER/missing/out"), "No such file or directory; choose a folder"),
+        (("--bag", "FOLDER/text.txt/out"), "Not a directory"),
+    ],
+)
+def test_mistakes_of_track(
+    files: Path, words: tuple[str, str], expected: str, cardbox: Callable
+) -> None:
+    before = sorted(path.name for path in files.iterdir())
+    option, value = words
+    options = {
+        "--background": "0:3.9",
+        "--model": f"{files / 'person.yaml'}",
+        "--start": "15.6",
+        "--csv": f"{files / 'out.csv'}",
+    } | {option: value.replace("FOLDER", str(files))}
+    done = cardbox("track", files / "session", *(f"{n}={text}" for n, text in options.items()))
+    done.assert_refused("track", expected)
+    assert sorted(path.name for path in files.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("missing", "there is no recording"),
+        ("empty folder", "no rosbag2 recording (it has no metadata.yaml)"),
+        ("text.txt", "cannot read the recording"),
+        ("person.yaml", "cannot read the recording"),
+        ("no images", "has 0 image topics; expected one"),
+        ("no camera_info", "has 0 CameraInfo topics; expected one"),
+        ("cut.mcap", "cut.mcap"),
+    ],
+)
+@pytest.mark.parametrize("command", ["initialize", "track"])
+def test_recordings_that_are_none(
+    files: Path, command: str, name: str, expected: str, spans: dict[str, str], cardbox: Callable
+) -> None:
+    output = files / "output"
+    if command == "initialize":
+        options = spans | {"--distance": "2", "--output": f"{output}"}
+    else:
+        options = {
+            "--background": "0:3.9",
+            "--model": f"{files / 'person.yaml'}",
+            "--start": "1",
+            "--csv": f"{output}",
+        }
+    done = cardbox(command, files / name, *(f"{n}={text}" for n, text in options.items()))
+    done.assert_refused(command, expected, name)
+    assert not output.exists()

@@ -1,0 +1,94 @@
+"""The files that other programs read: CI, pre-commit and Docker name what there is."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+TOOLS = {"python", "ruff", "mypy", "pytest"}
+
+
+def read_yaml(name: str) -> Any:
+    return yaml.safe_load((ROOT / name).read_text(encoding="utf-8"))
+
+
+def jobs() -> dict[str, Any]:
+    return dict(read_yaml(".github/workflows/ci.yml")["jobs"])
+
+
+def hooks() -> list[dict[str, Any]]:
+    return [
+        hook for repo in read_yaml(".pre-commit-config.yaml")["repos"] for hook in repo["hooks"]
+    ]
+
+
+def dockerfile() -> list[str]:
+    """Return the instructions, continuation lines joined, without comments."""
+    text = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^#.*\n", "", text).replace("\\\n", " ")
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+
+def test_ci_runs_its_script_on_the_python_of_jazzy_and_the_oldest() -> None:
+    test = jobs()["test"]
+    assert {"run": ".ci/run"} in test["steps"]
+    assert (ROOT / ".ci" / "run").is_file()
+    versions = test["strategy"]["matrix"]["python"]
+    assert versions == ["3.11", "3.12"]
+    setup = (ROOT / "setup.py").read_text(encoding="utf-8")
+    assert f'python_requires=">={versions[0]}"' in setup
+    for version in versions:
+        assert f'"Programming Language :: Python :: {version}"' in setup
+
+
+def test_every_job_has_a_limit_and_a_pinned_action() -> None:
+    for name, job in jobs().items():
+        assert job["runs-on"] == "ubuntu-24.04", name
+        assert job["timeout-minutes"] <= 90, name
+        for step in job["steps"]:
+            assert set(step) & {"uses", "run"}
+            if "uses" in step:
+                assert re.fullmatch(r"actions/[a-z-]+@v\d+", step["uses"])
+
+
+@pytest.mark.parametrize("hook", hooks(), ids=lambda hook: hook["id"])
+def test_hooks_run_what_make_setup_installs(hook: dict[str, Any]) -> None:
+    assert hook["language"] == "system"
+    program, *words = shlex.split(hook["entry"])
+    assert program.removeprefix(".venv/bin/") in TOOLS
+    if words[:1] == ["-m"]:
+        assert (ROOT / (words[1].replace(".", "/") + ".py")).is_file()
+
+
+def test_hooks_lint_as_make_lint_does() -> None:
+    entries = " ".join(hook["entry"] for hook in hooks())
+    for command in re.findall(r"\$\(BIN\)/((?:ruff|mypy)[a-z ]*)", (ROOT / "Makefile").read_text()):
+        assert f".venv/bin/{command.strip()}" in entries
+
+
+def test_the_image_is_made_of_what_is_there() -> None:
+    lines = dockerfile()
+    assert lines[0] == "FROM ros:jazzy"
+    for line in lines:
+        if line.startswith("COPY "):
+            assert (ROOT / line.split()[1]).exists(), line
+    text = "\n".join(lines)
+    (skipped,) = re.findall(r'--skip-keys "([^"]*)"', text)
+    xml = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert set(skipped.split()) <= {element.text for element in xml.findall("exec_depend")}
+    for module in re.findall(r"python -m (cardbox_tracker[\w.]*)", text):
+        assert (ROOT / (module.replace(".", "/") + ".py")).is_file()
+
+
+def test_the_image_does_not_take_in_what_is_built() -> None:
+    ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").split()
+    assert {".git", ".venv", "build"} <= set(ignored)
+    for needed in ("cardbox_tracker", "config", "launch", "resource", "setup.py", "setup.cfg"):
+        assert needed not in ignored
