@@ -43,8 +43,8 @@ class BackgroundNode(CardboxNode):
         self._image_bytes = 0
         self._covered = 0.0
 
-        self._silhouette = self.hand_over(Image, "silhouette", qos.SILHOUETTE)
-        self._infos = self.hand_over(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+        self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
         compressed = settings.image_transport == "compressed"

@@ -27,7 +27,7 @@ from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
-from cardbox_tracker.ros.runtime.handover import Handover
+from cardbox_tracker.ros.runtime.intra_process import IntraProcess
 from cardbox_tracker.ros.runtime.node import CardboxNode, run
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
@@ -52,9 +52,9 @@ class AllNodes:
         if source == "camera":
             kinds.append(CameraNode)
         try:
-            handover = Handover()
+            intra_process = IntraProcess()
             for kind in kinds:
-                self.nodes.append(kind(handover=handover))
+                self.nodes.append(kind(intra_process=intra_process))
             if source == "play_bag":
                 self._player = PlayBagNode()
         except Exception:
