@@ -36,8 +36,8 @@ COMPRESSED = "/compressed"
 ARGUMENTS = {
     "rate": ("1.0", float, "speed; 2 plays twice as fast"),
     "loop": ("false", _is_true, "play again and again"),
-    "start_s": ("0.0", float, "begin so long after the bag's start"),
-    "duration_s": ("0.0", float, "play so much of the bag; 0 is all"),
+    "start_s": ("0.0", float, "time to begin at, from the bag's start"),
+    "duration_s": ("0.0", float, "play this long; 0: to the end of the bag"),
 }
 
 

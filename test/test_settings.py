@@ -70,7 +70,7 @@ def test_only_what_must_restarts(changes: dict[str, Any], expected: bool) -> Non
 
 @pytest.mark.parametrize("kind", CORE)
 def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
-    plain = {"torso", "arm"} if kind is TrackerConfig else set()
+    plain = {"torso", "arm", "terms"} if kind is TrackerConfig else set()
     assert {f for f in kind.__dataclass_fields__ if f not in plain} == set(
         settings.settings_of(kind)
     )

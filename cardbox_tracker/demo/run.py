@@ -109,7 +109,7 @@ def _start_nodes(nodes: Nodes, truth: GroundTruth, preset: str, seed: int) -> No
     def parameters(**values: object) -> list[str]:
         return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
-    # A replay shall lose nothing, where a live camera's old images are better dropped.
+    # A replay must not lose images; of a live camera, old ones are better dropped.
     deep = [
         word
         for topic, end in (

@@ -63,7 +63,7 @@ class BagReader:
     """Context of an open recording.
 
     Raises, in all its methods:
-        BagError: the recording cannot be read, or has not what was asked for.
+        BagError: the recording cannot be read, or lacks the topic asked for.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -88,7 +88,7 @@ class BagReader:
                 path = files[0]
             else:
                 raise BagError(
-                    f"{path} is no rosbag2 recording (it has no metadata.yaml); give the folder "
+                    f"{path} is not a rosbag2 recording (it has no metadata.yaml); give the folder "
                     "that 'ros2 bag record' or 'cardbox synthesize' made"
                 )
         try:

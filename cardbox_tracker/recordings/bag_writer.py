@@ -60,7 +60,7 @@ class BagWriter:
             path: folder to make.
             storage: ``mcap`` or ``sqlite3``.
             overwrite: replace a recording of that name; nothing else is ever replaced.
-            compress: compress the chunks of an mcap file (zstd, as every reader of mcap knows).
+            compress: compress the chunks of an mcap file with zstd, which all its readers support.
             latched: topics whose last message a late subscriber needs; 'ros2 bag play' knows then.
 
         Raises:
@@ -114,7 +114,7 @@ class BagWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Move the recording to its place, or after an error remove what there is of it."""
+        """Move the recording to its place, or remove it after an error."""
         try:
             self._writer.close()
             if kind is None:

@@ -46,7 +46,7 @@ class ResultBag:
             self._writer.__exit__(kind, error, trace)
 
     def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
-        """Write what is known of one image."""
+        """Write the outputs of one image."""
         if self._writer is None:
             return
         self._write(self._writer, frame, estimate, tracker)

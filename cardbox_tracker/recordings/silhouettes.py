@@ -17,7 +17,7 @@ WORKING_SIZE = (320, 240)
 
 
 class TimeSpan(NamedTuple):
-    """Seconds from the bag's start; the end belongs to it."""
+    """Seconds from the bag's start, both ends included."""
 
     start_s: float
     end_s: float
@@ -27,7 +27,7 @@ class TimeSpan(NamedTuple):
         """Read ``T0:T1``.
 
         Raises:
-            ValueError: the text is no such span.
+            ValueError: the text is not of that form.
         """
         start, colon, end = text.partition(":")
         try:
@@ -121,7 +121,7 @@ class SilhouetteSource:
         """Return the silhouettes of a span.
 
         Raises:
-            CardboxError: no image lies in it; the text says what it was meant for.
+            CardboxError: no image lies in it; the text names ``what``.
         """
         found = [frame.silhouette for frame in self.frames(*span)]
         if not found:

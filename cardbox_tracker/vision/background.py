@@ -7,7 +7,7 @@ of the empty scene. A pixel of a later image I_t is foreground where
 
 with a threshold of 2. A pixel that happened to be free of noise while learning has a sigma near 0
 and would fire on a single grey level, so sigma_B has a floor. The rule alone flags one noisy pixel
-in twenty; the clean-up that follows is what makes a silhouette of it, and can be turned off.
+in twenty; a clean-up follows, which can be turned off.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class SilhouetteExtractor:
         self.model = model
         self.gain = 1.0
         self._limit = config.threshold * np.maximum(model.stddev, config.min_stddev)
-        # With these, a difference of either sign becomes a score that reaches 1 at its limit.
+        # Factors that turn a difference of either sign into a score, 1 at its limit.
         brighter = np.maximum(self._limit, config.min_contrast)
         darker = np.maximum(brighter, config.shadow * model.mean)
         self._brighter = np.asarray(1.0 / brighter, dtype=np.float32)
@@ -166,7 +166,7 @@ class SilhouetteExtractor:
         step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
-        # Fresh memory costs more than the arithmetic on it.
+        # Allocated once: new memory for each image takes longer than the arithmetic on it.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
     def __call__(self, brightness: ImageArray) -> ImageArray:

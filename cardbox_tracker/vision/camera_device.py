@@ -40,7 +40,7 @@ def open_video(name: str) -> cv2.VideoCapture:
     """Open a video file.
 
     Raises:
-        CameraError: it does not exist or is no video.
+        CameraError: it does not exist, or OpenCV cannot read it.
     """
     path = Path(name).expanduser()
     if not path.is_file():
@@ -48,7 +48,7 @@ def open_video(name: str) -> cv2.VideoCapture:
     capture = cv2.VideoCapture(str(path))
     if not capture.isOpened():
         raise CameraError(
-            f"{path} is no video that OpenCV can read; expected for example MP4, AVI or MKV: "
+            f"OpenCV cannot read {path} as a video; expected for example MP4, AVI or MKV: "
             "convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
         )
     return capture

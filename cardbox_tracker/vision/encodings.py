@@ -84,7 +84,7 @@ def decode_compressed(data: Any, grey: bool = True) -> ImageArray:
     """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
 
     Raises:
-        EncodingError: the bytes are no image.
+        EncodingError: the bytes cannot be decoded as an image.
     """
     raw = np.frombuffer(data, np.uint8)
     flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR

@@ -1,6 +1,6 @@
 """Which pixels differ enough from the background, and from their neighbours, to be foreground.
 
-Half a dozen passes of OpenCV over float images, in one: what a row needs stays in the cache.
+One pass over the image instead of half a dozen of OpenCV: the rows in use stay in the cache.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ NEAR_PLANE_M = 0.1
 """What is nearer to the camera's plane than this, or behind it, is cut off; see ``in_front``."""
 
 SUBPIXELS = 256.0
-"""Corners lie on a grid of so many points a pixel."""
+"""Corners are rounded to a grid of this many points a pixel."""
 
 CROSSING_BITS = 16
 """Edges cross rows at whole numbers of 2^-16 px."""

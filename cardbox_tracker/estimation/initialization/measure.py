@@ -99,7 +99,7 @@ class InitializationConfig:
         0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
     )
     accuracy_m: float = setting(
-        0.002, "a step ends when its noise has shrunk below this", unit="m", limits=(1e-6, 1.0)
+        0.002, "a step ends when its noise has shrunk below this", unit="m", limits=(0.0, 1.0)
     )
     prior: float = setting(
         0.003,

@@ -1,7 +1,7 @@
 """Images and calibrations between messages and the core, without copies where possible.
 
-Received data is an ``array.array`` that numpy reads in place; what is sent is an ``array.array``
-too, the only kind that rclpy takes without looking at every byte.
+Received data is an ``array.array``, which numpy reads in place. Sent data is an ``array.array``
+too: rclpy checks every byte of any other type.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def silhouette_of(message: Image) -> ImageArray:
     if width == 0 or height == 0 or step < width or data.size < step * height:
         raise EncodingError(
             f"the silhouette claims {width}x{height} with {step} bytes a row but has {data.size} "
-            "bytes; its publisher fills the message wrongly"
+            "bytes; expected step x height bytes, and a step of at least the width"
         )
     return data[: step * height].reshape(height, step)[:, :width]
 

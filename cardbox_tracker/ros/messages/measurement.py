@@ -25,7 +25,7 @@ def measured_message(result: InitializationResult, text: str) -> DiagnosticStatu
 
 
 def refused_message(text: str) -> DiagnosticStatus:
-    """Return level ERROR and ``text``, what was wrong."""
+    """Return level ERROR and ``text``, the reason."""
     return DiagnosticStatus(
         level=DiagnosticStatus.ERROR, name=_NAME, message=text, hardware_id=_HARDWARE_ID
     )

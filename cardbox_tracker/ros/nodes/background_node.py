@@ -29,7 +29,7 @@ _COVERAGE_TO_WARN = 0.6
 
 
 class BackgroundNode(CardboxNode):
-    """Learns the empty scene and cuts out whoever enters it."""
+    """Learns the empty scene and cuts out the person who enters it."""
 
     def __init__(self, **options: Any) -> None:
         """Subscribe to the camera and wait for its images."""
@@ -43,8 +43,8 @@ class BackgroundNode(CardboxNode):
         self._image_bytes = 0
         self._covered = 0.0
 
-        self._silhouette = self.hand_over(Image, "silhouette", qos.SILHOUETTE)
-        self._infos = self.hand_over(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+        self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
         compressed = settings.image_transport == "compressed"
@@ -141,7 +141,7 @@ class BackgroundNode(CardboxNode):
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
         silhouette = pipeline.silhouette(image)
-        # The image first: whoever tracks it need not wait for what hardly ever changes.
+        # The image first, so that the tracker does not wait for a CameraInfo that rarely changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size

@@ -84,7 +84,9 @@ class CameraNode(CardboxNode):
                 elif settings.loop and self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0):
                     continue
                 else:
-                    self.diagnostics.wait_for(f"nothing: the end of {settings.file} is reached")
+                    self.diagnostics.wait_for(
+                        f"a restart: {settings.file} has been played to its end"
+                    )
                     return
                 continue
             if not self._locked and time.monotonic() - started_s >= settings.settle_s:
@@ -114,7 +116,7 @@ class CameraNode(CardboxNode):
         self.diagnostics.working()
 
     def _lock_exposure(self) -> None:
-        """Switch to manual where possible: a scene whose brightness drifts is no background."""
+        """Switch exposure and white balance to manual where the device allows it."""
         self._locked = True
         for what, done in lock_exposure(self._capture).items():
             if done:
@@ -151,7 +153,7 @@ def main(args: list[str] | None = None) -> int:
         description="Publish a V4L2 device or a video file.",
         epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
     )
-    parser.add_argument("--list", action="store_true", help="say what each device offers, and end")
+    parser.add_argument("--list", action="store_true", help="list devices and modes, and exit")
     if parser.parse_args(remove_ros_args(command_line)[1:]).list:
         print(describe_devices())
         return 0

@@ -60,7 +60,7 @@ class InitializerNode(CardboxNode):
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
-        # Its answer comes when the work is done; meanwhile another call is refused, not queued.
+        # It answers when the measurement is done; a second call meanwhile is refused at once.
         self.create_service(
             Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
         )
@@ -94,7 +94,7 @@ class InitializerNode(CardboxNode):
         return self._references.capture(name, self.parameters.value.capture_frames)
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Measure in another thread, so that silhouettes and captures go on meanwhile."""
+        """Measure in another thread, so that silhouettes and captures are still served."""
         if not self._busy.acquire(blocking=False):
             response.message = "an initialization is already running; wait for its answer"
             return response
@@ -132,7 +132,8 @@ class InitializerNode(CardboxNode):
                 references.captured, self._camera, settings.config(), self._progress
             )
         except CardboxError:
-            references.captured = before  # captured on request: stays, to be replaced singly
+            # Those captured by service stay, to be replaced one by one.
+            references.captured = before
             raise
         references.captured = {}
         answer = _answer(result)
@@ -168,7 +169,7 @@ class InitializerNode(CardboxNode):
         }
 
     def close(self) -> None:
-        """End a guidance that is still counting."""
+        """End a guidance that is still running."""
         self._stop.set()
 
 
@@ -183,7 +184,7 @@ def _answer(result: InitializationResult) -> str:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    # Whoever tracks the same silhouette goes first.
+    # The tracker, which gets the same silhouettes, has priority.
     os.nice(_NICENESS)
     return run_node(InitializerNode, args)
 

@@ -2,10 +2,10 @@
 
     play_bag BAG [--rate 2] [--loop] [--topics /image_raw] [--pause-at 4.5 9] ...
 
-It pauses by itself at the times of ``--pause-at`` and on the service ``play_bag/pause``, and goes
-on with ``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
-``paused at 4.500 s`` or ``finished``. So a script can have the recording stand still at a reference
-posture, call ``initializer/capture_front``, and resume. The exit code is 0 at the end of the bag.
+It pauses at the times of ``--pause-at`` and on the service ``play_bag/pause``, and continues on
+``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
+``paused at 4.500 s`` or ``finished``. So a script can pause the recording at a reference posture,
+call ``initializer/capture_front``, and resume. The exit code is 0 at the end of the bag.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _PROGRESS_S = 5.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-# Recorded once, at the time of their making; a late subscriber needs them too.
+# Recorded once, when they were published; a late subscriber needs them too.
 _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
 
 
@@ -145,9 +145,10 @@ class PlayBagNode(CardboxNode):
             self._executor.spin_once(timeout_sec=0.1 if self._paused else min(left_s, 0.1))
 
     def _settle(self, delay_s: float) -> None:
-        """Serve calls until nobody has subscribed or left for ``delay_s``.
+        """Serve calls until no subscriber has come or gone for ``delay_s``.
 
-        Whoever subscribes is found topic by topic; so their first image has its CameraInfo.
+        DDS matches a subscriber topic by topic: without the delay its first image could come before
+        its CameraInfo is matched.
         """
         subscribers: list[int] = []
         since_s = time.monotonic()
@@ -171,7 +172,7 @@ class PlayBagNode(CardboxNode):
         self._paused = True
         text = f"paused at {self._position_s:.3f} s"
         self._say(text)
-        self.get_logger().info(f"{text}; goes on with {self.resolve('~/resume')}")
+        self.get_logger().info(f"{text}; to continue, call {self.resolve('~/resume')}")
         return text
 
     def _resume(self) -> str:

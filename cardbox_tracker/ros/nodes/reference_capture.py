@@ -16,7 +16,9 @@ from cardbox_tracker.estimation.initialization.references import (
 )
 from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
 
+# As many as the parameter capture_frames allows.
 _KEPT = 30
+# Older silhouettes may show the posture before.
 _ONE_POSTURE_NS = 1_000_000_000
 _OLD_S = 2.0
 
@@ -36,7 +38,7 @@ class ReferenceCapture:
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
-        """Take note of the latest silhouette."""
+        """Keep a silhouette as the latest one."""
         self._recent.append(message)
         self._received_s = time.monotonic()
 

@@ -27,7 +27,7 @@ from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
-from cardbox_tracker.ros.runtime.handover import Handover
+from cardbox_tracker.ros.runtime.intra_process import IntraProcess
 from cardbox_tracker.ros.runtime.node import CardboxNode, run
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
@@ -52,9 +52,9 @@ class AllNodes:
         if source == "camera":
             kinds.append(CameraNode)
         try:
-            handover = Handover()
+            intra_process = IntraProcess()
             for kind in kinds:
-                self.nodes.append(kind(handover=handover))
+                self.nodes.append(kind(intra_process=intra_process))
             if source == "play_bag":
                 self._player = PlayBagNode()
         except Exception:
@@ -67,7 +67,7 @@ class AllNodes:
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:
-            # It keeps the time of the recording, whatever the others do.
+            # In a thread of its own, so that it keeps the time of the recording.
             self._playing = threading.Thread(target=partial(_play, self._player), daemon=True)
             self._playing.start()
         executor.spin()
@@ -75,7 +75,7 @@ class AllNodes:
     def close(self) -> None:
         """Release what the nodes hold, the source first."""
         if self._playing is not None:
-            # It notices the end of ROS; a thread that still used it would abort the process.
+            # The player ends with ROS; a thread that used ROS afterwards would abort the process.
             try_shutdown()
             self._playing.join(timeout=_STOP_S)
         if self._player is not None:
@@ -92,7 +92,7 @@ def _play(player: PlayBagNode) -> None:
     except ExternalShutdownException:
         pass
     except Exception:
-        # As in every node: what fails because ROS ends is no error.
+        # As in every node, exceptions while ROS shuts down are expected.
         if player.context.ok():
             raise
 

@@ -41,7 +41,7 @@ class TrackerNode(CardboxNode):
         """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
-        # Compiles what no cache has yet, so that no live image waits for it.
+        # Compiled before the first image arrives, unless it is in the cache.
         self.get_logger().info("preparing (the very first start compiles for half a minute)")
         compile_all()
         self._body: BodyModel | None = None

@@ -1,4 +1,4 @@
-"""What the tracker publishes of one image."""
+"""What the tracker publishes for each image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 
 
 class TrackerOutputs:
-    """The tracker's topics; what costs time is made only while somebody subscribes."""
+    """The tracker's topics; each message is made only while the topic has a subscriber."""
 
     def __init__(self, node: CardboxNode, rep155_id: str) -> None:
         """Advertise the topics for ``node``, those of REP-155 unless ``rep155_id`` is empty."""
@@ -45,7 +45,7 @@ class TrackerOutputs:
         silhouette: conversions.ImageArray,
         tracker: Tracker,
     ) -> None:
-        """Publish a posture only where there is one: nothing stale under a new stamp."""
+        """Publish the outputs of an image; without a posture, no old one under its stamp."""
         for output, value in self._stream.values(estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None and estimate.posture is not None:
@@ -58,7 +58,7 @@ class TrackerOutputs:
         return _wanted(self._publishers[output.topic])
 
     def waiting(self, message: Image, text: str) -> None:
-        """Show a silhouette and what the tracker waits for, where the overlay would be."""
+        """Publish on ``overlay`` the silhouette and what the tracker waits for."""
         if not _wanted(self._overlay) or self._guided:
             return
         image = draw_message(conversions.silhouette_of(message), text)

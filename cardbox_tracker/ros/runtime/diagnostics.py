@@ -1,7 +1,7 @@
-"""What a node says of itself on ``/diagnostics`` once a second, and in its log when that changes.
+"""The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
-A node that publishes nothing looks dead; here it says what it waits for. Lost images are noticed
-by the spacing of their stamps, since the middleware does not tell.
+A node that publishes nothing yet reports what it waits for. Lost images are counted by the spacing
+of their stamps, since the middleware does not report them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class StreamStatistics:
         self.out_of_order = 0
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # The same in order: with every image the period is asked for.
+        # The same, sorted: the period is needed with every image.
         self._ordered_ns: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
@@ -68,7 +68,7 @@ class StreamStatistics:
 
     @property
     def period_ns(self) -> int:
-        """Spacing of the stamps where none is missing, ns.
+        """Spacing of the stamps without losses, ns.
 
         A low percentile: where most images are lost, the median is a multiple of the period.
         """
@@ -112,13 +112,13 @@ class NodeDiagnostics:
         self._timer = node.create_timer(PERIOD_S, self._tick, clock=steady)
 
     def wait_for(self, text: str) -> None:
-        """Say that nothing comes out until ``text`` arrives."""
+        """Report that the node publishes nothing until ``text`` arrives."""
         self._waiting, self._problem = text, ""
         if self._is_news(text):
             self._node.get_logger().info(f"waiting for {text}")
 
     def problem(self, text: str) -> None:
-        """Say what is wrong; it stands until :meth:`working`."""
+        """Report an error; it is shown until :meth:`working`."""
         self._problem = text
         if self._is_news(text):
             self._node.get_logger().error(text)

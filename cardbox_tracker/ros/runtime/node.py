@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
-from cardbox_tracker.ros.runtime.handover import HandingPublisher, Handover
+from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 Callback = Callable[[Any, int], None]
@@ -42,16 +42,18 @@ N = TypeVar("N", bound=Closable)
 class CardboxNode(Node):
     """A node that says what it does, what it waits for, and what is wrong."""
 
-    def __init__(self, name: str, handover: Handover | None = None, **options: Any) -> None:
+    def __init__(
+        self, name: str, intra_process: IntraProcess | None = None, **options: Any
+    ) -> None:
         """Create the node.
 
         Args:
             name: of the node.
-            handover: shared by the nodes of one process, those that offer a topic first.
+            intra_process: shared by the nodes of one process, those that offer a topic first.
             options: those of :class:`rclpy.node.Node`.
         """
         super().__init__(name, **options)
-        self._handover = handover
+        self._intra_process = intra_process
         self.diagnostics = NodeDiagnostics(self)
 
     def resolve(self, topic: str) -> str:
@@ -68,17 +70,19 @@ class CardboxNode(Node):
             qos_overriding_options=qos.overridable(profile),
         )
 
-    def hand_over(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher | HandingPublisher:
+    def advertise_inside(
+        self, kind: Any, topic: str, profile: QoSProfile
+    ) -> Publisher | IntraProcessPublisher:
         """As :meth:`advertise`, but nodes of this process are handed the messages themselves."""
         publisher = self.advertise(kind, topic, profile)
-        return publisher if self._handover is None else self._handover.offer(publisher)
+        return publisher if self._intra_process is None else self._intra_process.offer(publisher)
 
     def subscribe(
         self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
     ) -> None:
         """Take the messages of a topic, handed over where a node of this process offers it.
 
-        What ``callback`` raises is reported and the node goes on.
+        An exception in ``callback`` is reported, and the node continues.
         """
 
         def guarded(message: Any, info: dict[str, Any]) -> None:
@@ -89,7 +93,9 @@ class CardboxNode(Node):
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
-        if self._handover is not None and self._handover.take(self.resolve(topic), guarded):
+        if self._intra_process is not None and self._intra_process.take(
+            self.resolve(topic), guarded
+        ):
             return
         self.create_subscription(
             kind,
@@ -130,7 +136,7 @@ class CardboxNode(Node):
 
     def _unexpected(self, where: str, error: Exception) -> None:
         if not self.context.ok():
-            return  # a signal ended the node in the middle of it
+            return  # a signal is ending the node
         self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
         self.get_logger().debug(traceback.format_exc())
 
@@ -157,8 +163,8 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
     node: N | None = None
     try:
         node = create()
-        # What was made so far stays, compiled code above all; looking through it for garbage in the
-        # middle of an image takes a tenth of a second.
+        # Objects made so far stay as long as the process, compiled code above all; a garbage
+        # collection that visits them takes a tenth of a second.
         gc.collect()
         gc.freeze()
         work(node)
@@ -168,7 +174,7 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except Exception:
-        # A signal ends ROS in the midst of whatever runs; what then fails is no error.
+        # A signal shuts ROS down at any point; exceptions that follow from it are expected.
         if ok():
             raise
     finally:

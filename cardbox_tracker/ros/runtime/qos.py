@@ -1,7 +1,7 @@
-"""Quality of service of every topic (REP-2003), overridable, and mismatches told in plain words.
+"""Quality of service of every topic (REP-2003), overridable; mismatches in plain words.
 
-Drivers publish reliable or best effort, consumers of sensor data subscribe with best effort; what
-describes a state (models, background) is latched: a late subscriber gets the last message.
+Drivers publish reliable or best effort; subscribers of sensor data ask for best effort. Topics that
+describe a state (models, background) are latched: a late subscriber gets the last message.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 SENSOR_DATA = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-# A driver offers the strongest, so that every subscriber can have what it wants (REP-2003).
+# Reliable publishers match subscribers of either kind (REP-2003).
 CAMERA = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-# A reader's queue of a few frames rides out a hiccup; the writer keeps to one.
+# A queue of five lets the subscriber be late by some images; the publisher keeps only the latest.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# A recording waits for a slow subscriber rather than lose what it has to show.
+# A recording may wait for a slow subscriber; no image is lost while 100 are queued.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# For whoever records a replay and shall miss nothing.
+# For a subscriber that records a replay and must not miss a message.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
     depth=1,
@@ -46,7 +46,7 @@ _MEANING = {
 def overridable(profile: QoSProfile) -> QoSOverridingOptions:
     """Return options that declare ``qos_overrides.<topic>...`` parameters.
 
-    Durability is only overridable where it is not what the topic is about (latched topics).
+    Durability can be overridden except on latched topics, which depend on it.
     """
     kinds = [QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY]
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:

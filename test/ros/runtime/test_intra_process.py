@@ -15,7 +15,7 @@ from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.ros.runtime.handover import Handover  # noqa: E402
+from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
 from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
 
 
@@ -25,8 +25,8 @@ def make(make_node: Callable[..., Any]) -> Iterator[Callable[..., CardboxNode]]:
     context = make_node(name="outside").context
     nodes: list[CardboxNode] = []
 
-    def create(name: str, handover: Handover | None) -> CardboxNode:
-        node = CardboxNode(name, handover, context=context, enable_rosout=False)
+    def create(name: str, intra_process: IntraProcess | None) -> CardboxNode:
+        node = CardboxNode(name, intra_process, context=context, enable_rosout=False)
         nodes.append(node)
         return node
 
@@ -36,10 +36,10 @@ def make(make_node: Callable[..., Any]) -> Iterator[Callable[..., CardboxNode]]:
 
 
 def test_takers_get_the_message_itself_at_once_and_in_order(make: Callable[..., Any]) -> None:
-    handover, taken = Handover(), []
-    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
+    intra_process, taken = IntraProcess(), []
+    publisher = make("giver", intra_process).advertise_inside(String, "words", qos.RESULT)
     for name in ("first", "second"):
-        make(name, handover).subscribe(
+        make(name, intra_process).subscribe(
             String, "words", lambda word, _, name=name: taken.append((name, word)), qos.RESULT
         )
     word = String(data="hello")
@@ -49,9 +49,9 @@ def test_takers_get_the_message_itself_at_once_and_in_order(make: Callable[..., 
 
 
 def test_a_taker_learns_when_it_was_handed_over(make: Callable[..., Any]) -> None:
-    handover, sent_ns = Handover(), []
-    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
-    make("taker", handover).subscribe(
+    intra_process, sent_ns = IntraProcess(), []
+    publisher = make("giver", intra_process).advertise_inside(String, "words", qos.RESULT)
+    make("taker", intra_process).subscribe(
         String, "words", lambda _, sent: sent_ns.append(sent), qos.RESULT
     )
     before = time.time_ns()
@@ -60,15 +60,17 @@ def test_a_taker_learns_when_it_was_handed_over(make: Callable[..., Any]) -> Non
 
 
 def test_an_error_of_one_taker_is_its_own(make: Callable[..., Any]) -> None:
-    handover, taken = Handover(), []
-    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
-    failing = make("failing", handover)
+    intra_process, taken = IntraProcess(), []
+    publisher = make("giver", intra_process).advertise_inside(String, "words", qos.RESULT)
+    failing = make("failing", intra_process)
 
     def fail(_: String, __: int) -> None:
         raise CardboxError("as told")
 
     failing.subscribe(String, "words", fail, qos.RESULT)
-    make("taker", handover).subscribe(String, "words", lambda w, _: taken.append(w), qos.RESULT)
+    make("taker", intra_process).subscribe(
+        String, "words", lambda w, _: taken.append(w), qos.RESULT
+    )
     publisher.publish(String(data="hello"))
     assert taken[0].data == "hello"
     assert failing.diagnostics._problem == "as told"
@@ -77,9 +79,9 @@ def test_an_error_of_one_taker_is_its_own(make: Callable[..., Any]) -> None:
 @pytest.mark.parametrize("shared", [True, False])
 def test_what_is_not_handed_over_goes_by_dds(make: Callable[..., Any], shared: bool) -> None:
     """A topic that is only advertised, or nodes that share nothing."""
-    handover = Handover() if shared else None
-    giver, taker = make("giver", handover), make("taker", handover)
-    offer = giver.advertise if shared else giver.hand_over
+    intra_process = IntraProcess() if shared else None
+    giver, taker = make("giver", intra_process), make("taker", intra_process)
+    offer = giver.advertise if shared else giver.advertise_inside
     publisher = offer(String, "words", qos.RESULT)
     taken: list[str] = []
     taker.subscribe(String, "words", lambda word, _: taken.append(word.data), qos.RESULT)
@@ -87,9 +89,11 @@ def test_what_is_not_handed_over_goes_by_dds(make: Callable[..., Any], shared: b
 
 
 def test_other_processes_get_it_too(make: Callable[..., Any]) -> None:
-    handover, inside, outside = Handover(), [], []
-    publisher = make("giver", handover).hand_over(String, "words", qos.RESULT)
-    make("taker", handover).subscribe(String, "words", lambda w, _: inside.append(w), qos.RESULT)
+    intra_process, inside, outside = IntraProcess(), [], []
+    publisher = make("giver", intra_process).advertise_inside(String, "words", qos.RESULT)
+    make("taker", intra_process).subscribe(
+        String, "words", lambda w, _: inside.append(w), qos.RESULT
+    )
     other = make("other", None)
     other.subscribe(String, "words", lambda word, _: outside.append(word.data), qos.RESULT)
     hear(other, publisher, outside)
