@@ -67,7 +67,7 @@ def test_video_and_calibration_come_out_at_the_rate(
     [
         ({"device": "/dev/video_none"}, ("no camera /dev/video_none", "file")),
         ({"file": "/nowhere.mp4"}, ("no video /nowhere.mp4",)),
-        ({"file": __file__}, ("no video that OpenCV can read", "ffmpeg")),
+        ({"file": __file__}, ("OpenCV cannot read", "ffmpeg")),
         ({"device": "''"}, ("both empty",)),
     ],
 )
