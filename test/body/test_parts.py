@@ -52,7 +52,7 @@ def test_many_bodies_are_each_alone(seed: int) -> None:
 
 @given(SEEDS)
 def test_cardbox_and_volumetric_model_span_the_same(seed: int) -> None:
-    body = BodyModel(random_sizes(seed))
+    body = BodyModel.of(random_sizes(seed))
     patches = cardbox_patches(body, REST)
     corners = volumetric_faces(body, REST)
     for axis in range(3):
@@ -62,7 +62,7 @@ def test_cardbox_and_volumetric_model_span_the_same(seed: int) -> None:
 
 @given(SEEDS)
 def test_joints_are_where_the_parts_end(seed: int) -> None:
-    body = BodyModel(random_sizes(seed), distance_m=3.0, hip_height_m=0.0)
+    body = BodyModel.of(random_sizes(seed), distance_m=3.0, hip_height_m=0.0)
     parts, frames = body_parts(body.sizes), forward_kinematics(body, REST)
     assert frames.neck[2] == pytest.approx(parts.torso.top_m)
     assert frames.head[0] + 3.0 == pytest.approx(parts.head.forward_m)

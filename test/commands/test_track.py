@@ -58,7 +58,7 @@ def test_mistakes_of_track(
     ("name", "expected"),
     [
         ("missing", "there is no recording"),
-        ("empty folder", "no rosbag2 recording (it has no metadata.yaml)"),
+        ("empty folder", "not a rosbag2 recording (it has no metadata.yaml)"),
         ("text.txt", "cannot read the recording"),
         ("person.yaml", "cannot read the recording"),
         ("no images", "has 0 image topics; expected one"),

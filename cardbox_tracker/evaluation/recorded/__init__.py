@@ -1,0 +1,1 @@
+"""Recorded sessions with ground truth: initialize, track, compare, report."""

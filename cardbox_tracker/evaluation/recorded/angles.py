@@ -1,0 +1,63 @@
+"""Joint angles from keypoints: what the 12 joints would be, were the truth a body of ours.
+
+A limb hangs along -Z of its parent's frame turned by Rx(+-abduction) Ry(-flexion), so its direction
+in that frame is
+
+    (sin f, +- sin a cos f, -cos a cos f),
+
+with + for the left arm. The two angles follow from it; at a flexion of 90 degrees abduction is free
+and given as 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
+
+FloatArray = NDArray[np.float64]
+
+_LEVEL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+"""Rotation from the reference frame into the optical frame of a level camera."""
+
+
+def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: float) -> FloatArray:
+    """Return the 11 angles of the posture, all but ``torso_y``.
+
+    Args:
+        keypoints_m: (..., 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame.
+        torso_rad: roll, pitch and yaw of the torso, (..., 3).
+        pitch_rad: how far the camera looks down.
+
+    Returns:
+        Shape (..., 11), rad, ordered as ``JOINT_NAMES[1:]``.
+    """
+    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
+    to_optical = np.array([(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)]) @ _LEVEL
+    points = np.asarray(keypoints_m) @ to_optical  # the inverse of a rotation is its transpose
+    torso = np.asarray(torso_rad)
+    frame = rotation_z(torso[..., 2]) @ rotation_y(torso[..., 1]) @ rotation_x(torso[..., 0])
+    angles = [torso]
+    for first, side in ((0, 1.0), (3, -1.0)):
+        parent = frame
+        for start in (first, first + 1):
+            bone = points[..., start + 1, :] - points[..., start, :]
+            local = np.einsum("...ji,...j->...i", parent, bone)
+            abduction, flexion = limb_angles(local, side)
+            angles.append(np.stack([abduction, flexion], axis=-1))
+            parent = parent @ rotation_x(side * abduction) @ rotation_y(-flexion)
+    return np.concatenate(angles, axis=-1)
+
+
+def limb_angles(bone: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+    """Return abduction and flexion (...), rad, of a limb along ``bone`` (..., 3).
+
+    Args:
+        bone: in the frame of the limb's parent, of any length above 0.
+        side: +1 for the left arm, -1 for the right.
+    """
+    unit = bone / np.linalg.norm(bone, axis=-1, keepdims=True)
+    flexion = np.arcsin(np.clip(unit[..., 0], -1.0, 1.0))
+    abduction = np.arctan2(side * unit[..., 1], -unit[..., 2])
+    return np.where(np.abs(unit[..., 0]) < 1.0 - 1e-12, abduction, 0.0), flexion

@@ -1,0 +1,83 @@
+"""``cardbox evaluate --sessions``: figures and report of recorded sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.precompile import compile_all
+from cardbox_tracker.evaluation.paper.results import provenance, write_json
+from cardbox_tracker.evaluation.recorded.figures import figures
+from cardbox_tracker.evaluation.recorded.report import sessions_report
+from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
+from cardbox_tracker.files import atomic_path
+
+
+def evaluate_sessions(
+    folders: Sequence[Path],
+    output: Path,
+    preset: str,
+    seeds: tuple[int, ...],
+    jobs: int,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, Any]:
+    """Evaluate recorded sessions; write ``sessions.json`` and ``sessions.md`` into ``output``.
+
+    Args:
+        folders: sessions, each with ``bag/`` and ``ground_truth.json``.
+        output: folder of the results; made if it is missing.
+        preset: a name of ``PRESETS``.
+        seeds: of initialization and filters; each is a run of its own.
+        jobs: processes.
+        progress: told the finished fraction.
+
+    Returns:
+        What ``sessions.json`` holds.
+
+    Raises:
+        CardboxError: a folder is no session, or the results cannot be written.
+    """
+    for folder in folders:
+        load_session(folder)  # what is wrong shows before the work begins
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
+    compile_all()
+    sessions = []
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        work = [pool.submit(evaluate_session, folder, preset, seeds) for folder in folders]
+        for done, future in enumerate(work, 1):
+            sessions.append(future.result())
+            if progress is not None:
+                progress(done / len(work))
+    names = " ".join(folder.name for folder in folders)
+    results = {
+        "command": f"cardbox evaluate --sessions {names} --output DIR",
+        "preset": preset,
+        "seeds": list(seeds),
+        "sessions": sessions,
+        "provenance": provenance(),
+    }
+    write_json(results, output / "sessions.json")
+    with atomic_path(output / "sessions.md") as temporary:
+        temporary.write_text(sessions_report(results), encoding="utf-8")
+    return results
+
+
+def evaluate_session(folder: Path, preset: str, seeds: tuple[int, ...]) -> dict[str, Any]:
+    """Return the figures of one session: of each run, and MediaPipe's beside them."""
+    session = load_session(folder)
+    runs = track_session(session, PRESETS[preset](), seeds)
+    return {
+        "name": session.name,
+        "mediapipe": session.mediapipe,
+        "mediapipe_ms": session.mediapipe_ms,
+        "runs": [figures(session, run) for run in runs],
+    }

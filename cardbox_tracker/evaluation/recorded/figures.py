@@ -1,0 +1,138 @@
+"""The figures of a run on a recorded session.
+
+All errors are in centimetres over the six keypoints, estimate minus truth, in the camera's optical
+frame: sideways to the right of the image, vertical downwards, depth away from the camera. *Aligned*
+is after both skeletons are shifted to their middle of the shoulders; *PA* after the best similarity
+transform.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.evaluation.metrics import align, angle_errors_deg
+from cardbox_tracker.evaluation.recorded.angles import joint_angles
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.evaluation.recorded.tracking import SessionRun
+
+FloatArray = NDArray[np.float64]
+
+SHOULDERS = (0, 3)
+KINDS = ("shoulder", "elbow", "hand")
+"""Keypoints i and i + 3 are of the same kind."""
+
+FAR_CM = 30.0
+"""A mean error beyond this is no tracking, whatever the state says."""
+
+COVERAGE_STDDEVS = 2.0
+_LEAST_STDDEV_DEG = 0.5
+
+
+def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
+    """Return all figures of one run; without any estimate those that need one are missing."""
+    have = np.asarray(np.isfinite(run.keypoints_m).all(axis=(1, 2)))
+    is_tracking = run.states == TRACKING
+    result: dict[str, Any] = {
+        "frames": len(have),
+        "without_estimate": int((~have).sum()),
+        "states": {str(s): int((run.states == s).sum()) for s in np.unique(run.states) if s},
+    }
+    if not run.body:
+        return result | {"failure": run.failure}
+    result |= {"lengths": lengths(session, run), "ms": float(np.median(run.milliseconds))}
+    if not have.any():
+        return result
+    estimates, truth = 100 * run.keypoints_m[have], 100 * session.keypoints_m[have]
+    difference = estimates - truth
+    distance = np.linalg.norm(difference, axis=2)
+    local = difference - difference[:, SHOULDERS].mean(axis=1, keepdims=True)
+    aligned = np.linalg.norm(local, axis=2)
+    result |= {
+        "absolute": float(distance.mean()),
+        "aligned": float(aligned.mean()),
+        "pa": float(np.linalg.norm(align(estimates, truth) - truth, axis=2).mean()),
+        "by_keypoint": dict(zip(KEYPOINT_NAMES, distance.mean(axis=0).tolist(), strict=True)),
+    }
+    for axis, name in enumerate(("sideways", "vertical", "depth")):
+        result[name] = float(difference[..., axis].mean())
+        for i, kind in enumerate(KINDS):
+            result[f"{kind}_{name}"] = float(difference[:, [i, i + 3], axis].mean())
+    for i, kind in enumerate(KINDS):
+        result[kind] = float(distance[:, [i, i + 3]].mean())
+        result[f"aligned_{kind}"] = float(aligned[:, [i, i + 3]].mean())
+    far = distance.mean(axis=1) > FAR_CM
+    segments = session.segments[have]
+    result |= {
+        "far": int(far.sum()),
+        "far_but_tracking": int((far & is_tracking[have]).sum()),
+        "by_motion": {
+            str(name): {
+                "aligned": float(aligned[segments == name].mean()),
+                "absolute": float(distance[segments == name].mean()),
+            }
+            for name in dict.fromkeys(segments.tolist())
+        },
+        "acceleration": acceleration_error(session, run),
+        "coverage": coverage(session, run),
+    }
+    return result
+
+
+def acceleration_error(session: RecordedSession, run: SessionRun) -> float:
+    """Mean difference of the accelerations of estimate and truth, m/s^2.
+
+    Taken by second differences over three consecutive images; where one is missing, none counts.
+    """
+    time_s = (session.stamps_ns - session.stamps_ns[0]) / 1e9
+    step_s = np.diff(time_s)
+    period_s = float(np.median(step_s))
+    even = (np.abs(step_s[:-1] - period_s) < 0.2 * period_s) & (
+        np.abs(step_s[1:] - period_s) < 0.2 * period_s
+    )
+    error = run.keypoints_m - session.keypoints_m
+    second = (error[:-2] - 2 * error[1:-1] + error[2:]) / period_s**2
+    norms = np.linalg.norm(second, axis=2)[even]
+    return float(np.nanmean(norms)) if np.isfinite(norms).any() else float("nan")
+
+
+def coverage(session: RecordedSession, run: SessionRun) -> dict[str, float]:
+    """Fraction of images in which a joint's true angle lies within two standard deviations.
+
+    Given for each angle of the posture, only where the state is ``tracking`` or ``uncertain`` and
+    the truth has the torso's angles.
+    """
+    have = ~np.isnan(run.stddevs).any(axis=1) & ~np.isnan(session.torso_rad).any(axis=1)
+    if not have.any():
+        return {}
+    truth = joint_angles(
+        session.keypoints_m[have],
+        session.torso_rad[have],
+        float(np.radians(session.truth.pitch_deg)),
+    )
+    errors = angle_errors_deg(run.postures[have, 1:], truth)
+    stddevs = np.maximum(np.degrees(run.stddevs[have, 1:]), _LEAST_STDDEV_DEG)
+    inside = errors <= COVERAGE_STDDEVS * stddevs
+    return dict(zip(JOINT_NAMES[1:], inside.mean(axis=0).tolist(), strict=True))
+
+
+def lengths(session: RecordedSession, run: SessionRun) -> dict[str, float]:
+    """Ratio of each measured length to the true one, of the truth's own joints."""
+    assert run.body is not None
+    truth = session.keypoints_m
+
+    def true_m(first: int, second: int) -> float:
+        return float(np.median(np.linalg.norm(truth[:, first] - truth[:, second], axis=1)))
+
+    upper_arm = (true_m(0, 1) + true_m(3, 4)) / 2
+    forearm = (true_m(1, 2) + true_m(4, 5)) / 2
+    return {
+        "upper_arm": run.body.size("upper_arm_length") / upper_arm,
+        "forearm": run.body.size("forearm_length") / forearm,
+        "shoulders": run.body.size("shoulder_breadth") / true_m(0, 3),
+    }

@@ -1,0 +1,200 @@
+"""``sessions.md``: what the tracker does on recorded sessions, in tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+Results = Mapping[str, Any]
+"""The contents of ``sessions.json``."""
+
+MOTION_CAPTURE = "cmu"
+"""Sessions with this in their name have motion capture as motions."""
+
+
+def sessions_report(results: Results) -> str:
+    """Return the report in Markdown."""
+    seeds = ", ".join(map(str, results["seeds"]))
+    lines = [
+        "# Recorded sessions with ground truth",
+        "",
+        f"Preset `{results['preset']}`, seeds {seeds}; every figure is a mean over the seeds. Each "
+        "session is initialized from its own reference postures with the silhouettes that the "
+        "background model cuts out, then all images from the first neutral posture on are tracked; "
+        "images with the neck in view after the reference postures are scored. Bodies and rooms "
+        "are rendered, motions are scripted or, in sessions named `cmu`, motion capture.",
+        "",
+        *_versus(results),
+        *_signed(results),
+        *_steadiness(results),
+        *_lengths(results),
+        *_motions(results),
+        f"Made by `{results['command']}` at commit {results['provenance']['commit']} on "
+        f"{results['provenance']['cpu']}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def mean_of(runs: Sequence[Mapping[str, Any]], *path: str) -> float:
+    """Return the mean of a figure over the runs that have it; nan if none has."""
+    values = []
+    for run in runs:
+        value: Any = run
+        for key in path:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        if isinstance(value, int | float) and np.isfinite(value):
+            values.append(float(value))
+    return float(np.mean(values)) if values else float("nan")
+
+
+def _versus(results: Results) -> list[str]:
+    """Errors beside MediaPipe's."""
+    columns: dict[str, Callable[[Results], float]] = {
+        "absolute": lambda s: mean_of(s["runs"], "absolute"),
+        "aligned": lambda s: mean_of(s["runs"], "aligned"),
+        "MediaPipe aligned": lambda s: s["mediapipe"].get("aligned", float("nan")),
+        "PA": lambda s: mean_of(s["runs"], "pa"),
+        "MediaPipe PA": lambda s: s["mediapipe"].get("pa", float("nan")),
+        "aligned shoulders": lambda s: mean_of(s["runs"], "aligned_shoulder"),
+        "aligned elbows": lambda s: mean_of(s["runs"], "aligned_elbow"),
+        "aligned hands": lambda s: mean_of(s["runs"], "aligned_hand"),
+    }
+    lines = [
+        "## Errors, cm",
+        "",
+        "Mean 3D distance of shoulders, elbows and hands. *Aligned*: after both skeletons are "
+        "shifted to the middle of their shoulders; *PA*: after the best similarity transform. "
+        "MediaPipe Pose (full) has no metric place, so it has no absolute error.",
+        "",
+        *_table(results, columns, "{:.1f}"),
+    ]
+    compared = [
+        (s["name"], mean_of(s["runs"], "aligned") / s["mediapipe"]["aligned"])
+        for s in results["sessions"]
+        if "aligned" in s["mediapipe"] and np.isfinite(mean_of(s["runs"], "aligned"))
+    ]
+    if compared:
+        better = [name for name, ratio in compared if ratio < 1]
+        worst = max(compared, key=lambda pair: pair[1])
+        lines += [
+            f"Aligned error below MediaPipe's on {len(better)} of {len(compared)} sessions; the "
+            f"largest ratio is {worst[1]:.2f} ({worst[0]}).",
+            "",
+        ]
+    failures = {
+        s["name"]: run["failure"]
+        for s in results["sessions"]
+        for run in s["runs"]
+        if run.get("failure")
+    }
+    lines += [f"- `{name}` was not initialized: {text}" for name, text in failures.items()]
+    return [*lines, ""] if failures else lines
+
+
+def _signed(results: Results) -> list[str]:
+    columns: dict[str, Callable[[Results], float]] = {
+        f"{kind} {axis}": partial(_figure, path=(f"{kind}_{axis}",))
+        for kind in ("shoulder", "elbow", "hand")
+        for axis in ("sideways", "vertical", "depth")
+    }
+    return [
+        "## Signed errors, cm",
+        "",
+        "Estimate minus truth: sideways to the right of the image, vertical downwards, depth away "
+        "from the camera.",
+        "",
+        *_table(results, columns, "{:+.1f}"),
+    ]
+
+
+def _steadiness(results: Results) -> list[str]:
+    columns: dict[str, Callable[[Results], float]] = {
+        "acceleration error, m/s²": lambda s: mean_of(s["runs"], "acceleration"),
+        "without estimate, %": lambda s: _percent(s, "without_estimate"),
+        "beyond 30 cm, %": lambda s: _percent(s, "far"),
+        "of these `tracking`, images": lambda s: mean_of(s["runs"], "far_but_tracking"),
+        "coverage: mean, %": lambda s: _coverage(s, np.mean),
+        "least, %": lambda s: _coverage(s, np.min),
+        "most, %": lambda s: _coverage(s, np.max),
+        "ms an image": lambda s: mean_of(s["runs"], "ms"),
+        "MediaPipe ms": lambda s: s["mediapipe_ms"] or float("nan"),
+    }
+    return [
+        "## Steadiness, losses, uncertainty, time",
+        "",
+        "Coverage: in how many images the true angle of a joint lies within two of its standard "
+        "deviations; mean, least and most over the 11 angles. MediaPipe's time is that of another "
+        "run, so it compares roughly; `cardbox benchmark` compares in one run.",
+        "",
+        *_table(results, columns, "{:.1f}"),
+    ]
+
+
+def _lengths(results: Results) -> list[str]:
+    columns: dict[str, Callable[[Results], float]] = {
+        name: partial(_figure, path=("lengths", key))
+        for name, key in (
+            ("upper arm", "upper_arm"),
+            ("forearm to hand", "forearm"),
+            ("shoulder breadth", "shoulders"),
+        )
+    }
+    return [
+        "## Measured lengths, as a ratio to the true ones",
+        "",
+        *_table(results, columns, "{:.3f}"),
+    ]
+
+
+def _motions(results: Results) -> list[str]:
+    lines = ["## By motion: aligned (absolute), cm", ""]
+    for session in results["sessions"]:
+        names = dict.fromkeys(n for run in session["runs"] for n in run.get("by_motion", {}))
+        texts = [
+            f"{name} {mean_of(session['runs'], 'by_motion', name, 'aligned'):.1f} "
+            f"({mean_of(session['runs'], 'by_motion', name, 'absolute'):.1f})"
+            for name in names
+        ]
+        lines.append(f"- `{session['name']}`: {', '.join(texts) or 'no estimate'}")
+    return [*lines, ""]
+
+
+def _figure(session: Results, path: tuple[str, ...]) -> float:
+    return mean_of(session["runs"], *path)
+
+
+def _percent(session: Results, key: str) -> float:
+    return 100 * mean_of(session["runs"], key) / max(mean_of(session["runs"], "frames"), 1)
+
+
+def _coverage(session: Results, summary: Callable[[list[float]], Any]) -> float:
+    names = dict.fromkeys(n for run in session["runs"] for n in run.get("coverage", {}))
+    values = [mean_of(session["runs"], "coverage", name) for name in names]
+    return 100 * float(summary(values)) if values else float("nan")
+
+
+def _table(
+    results: Results, columns: Mapping[str, Callable[[Results], float]], form: str
+) -> list[str]:
+    """Rows are sessions; then the means over all, and over those with motion capture."""
+    sessions = results["sessions"]
+    values = {s["name"]: [column(s) for column in columns.values()] for s in sessions}
+    lines = [f"| session | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
+    lines += [_row(name, row, form) for name, row in values.items()]
+    groups = {f"mean of {len(sessions)}": list(values)}
+    captured = [name for name in values if MOTION_CAPTURE in name]
+    if 0 < len(captured) < len(values):
+        groups[f"motion capture ({len(captured)})"] = captured
+    for label, names in groups.items():
+        rows = np.array([values[name] for name in names])
+        means = [float(np.nanmean(c)) if np.isfinite(c).any() else float("nan") for c in rows.T]
+        lines.append(_row(f"**{label}**", means, form))
+    return [*lines, ""]
+
+
+def _row(name: str, values: Iterable[float], form: str) -> str:
+    cells = [form.format(value) if np.isfinite(value) else "" for value in values]
+    return f"| {name} | {' | '.join(cells)} |"

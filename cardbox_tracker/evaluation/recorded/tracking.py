@@ -1,0 +1,116 @@
+"""Initialize and track recorded sessions, several seeds at once."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.initialize import initialize_from_recording
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SessionRun:
+    """What one seed found on one session, a row for each scored image of it.
+
+    Attributes:
+        body: the person as measured; None if the initialization failed.
+        failure: why it failed; empty if it did not.
+        states: tracking state of each image, (n,); empty where the image was not tracked.
+        keypoints_m: (n, 6, 3), metres in the optical frame; nan where there is none.
+        postures: (n, 12), rad and metres; nan where there is none.
+        stddevs: standard deviations, (n, 12).
+        milliseconds: of each tracked image from silhouette to posture, (m,).
+    """
+
+    body: BodyModel | None
+    failure: str
+    states: NDArray[np.str_]
+    keypoints_m: FloatArray
+    postures: FloatArray
+    stddevs: FloatArray
+    milliseconds: FloatArray
+
+
+def track_session(
+    session: RecordedSession, config: TrackerConfig, seeds: tuple[int, ...]
+) -> list[SessionRun]:
+    """Initialize and track one session with each of ``seeds``.
+
+    Raises:
+        CardboxError: the recording cannot be read.
+    """
+    with BagReader(session.bag) as bag:
+        source = SilhouetteSource(bag, session.spans["empty"])
+        offset_s = (session.truth.start_ns - bag.start_ns) / 1e9
+        bodies = [_measure(session, source, seed) for seed in seeds]
+        trackers = [
+            Tracker(body, source.camera, config, np.random.default_rng(seed)) if body else None
+            for (body, _), seed in zip(bodies, seeds, strict=True)
+        ]
+        found: list[dict[int, Estimate]] = [{} for _ in seeds]
+        times: list[list[float]] = [[] for _ in seeds]
+        for frame in source.frames(session.start_s + offset_s):
+            for tracker, estimates, spent in zip(trackers, found, times, strict=True):
+                if tracker is None:
+                    continue
+                start = time.perf_counter()
+                estimates[frame.stamp_ns] = tracker.track(frame.silhouette)
+                spent.append(1e3 * (time.perf_counter() - start))
+    return [
+        _run(session, body, failure, estimates, spent)
+        for (body, failure), estimates, spent in zip(bodies, found, times, strict=True)
+    ]
+
+
+def _measure(
+    session: RecordedSession, source: SilhouetteSource, seed: int
+) -> tuple[BodyModel | None, str]:
+    """Return the measured person, or None and why not."""
+    truth = session.truth
+    config = InitializationConfig(
+        distance_m=truth.distance_m,
+        camera_pitch_rad=float(np.radians(truth.pitch_deg)),
+        side_turn=truth.side_turn,
+        seed=seed,
+    )
+    spans = {name: session.spans[name] for name in ("front", "side", "arms")}
+    try:
+        return initialize_from_recording(source, spans, config).body, ""
+    except CardboxError as error:
+        return None, str(error)
+
+
+def _run(
+    session: RecordedSession,
+    body: BodyModel | None,
+    failure: str,
+    estimates: dict[int, Estimate],
+    milliseconds: list[float],
+) -> SessionRun:
+    n = len(session.stamps_ns)
+    states = np.full(n, "", dtype="<U16")
+    keypoints = np.full((n, 6, 3), np.nan)
+    postures, stddevs = np.full((n, 12), np.nan), np.full((n, 12), np.nan)
+    for i, stamp in enumerate(session.stamps_ns.tolist()):
+        estimate = estimates.get(stamp)
+        if estimate is None:
+            continue
+        states[i] = estimate.state
+        if estimate.posture is not None and estimate.keypoints_m is not None:
+            keypoints[i], postures[i] = estimate.keypoints_m, estimate.posture[:12]
+        if estimate.posture_stddev is not None:
+            stddevs[i] = estimate.posture_stddev[:12]
+    return SessionRun(body, failure, states, keypoints, postures, stddevs, np.array(milliseconds))
