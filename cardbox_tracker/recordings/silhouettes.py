@@ -35,7 +35,9 @@ class TimeSpan(NamedTuple):
         except ValueError:
             colon = ""
         if not colon or not 0 <= span.start_s < span.end_s:
-            raise ValueError(f"{text!r} is no span; expected T0:T1 in seconds, such as 0:4")
+            raise ValueError(
+                f"expected T0:T1 in seconds with T0 before T1, such as 0:4, got {text!r}"
+            )
         return span
 
     def contains(self, time_s: float) -> bool:

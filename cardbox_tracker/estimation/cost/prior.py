@@ -52,8 +52,8 @@ class RestPrior:
 
     weight: float = setting(
         0.012,
-        "cost of an angle that is one unit from rest, as a fraction of the silhouette's "
-        "foreground pixels",
+        "weight of the squared distance of each angle from rest, in units of that angle, as a "
+        "fraction of the silhouette's foreground pixels",
         limits=(0.0, 1.0),
     )
 
@@ -79,7 +79,7 @@ class RestPriorObservation:
     """The prior of one frame; see :class:`~cardbox_tracker.estimation.cost.terms.TermObservation`.
 
     Attributes:
-        weight_px: cost of an angle that is one unit from rest.
+        weight_px: weight of the squared distance from rest, in units of each angle.
     """
 
     weight_px: float
