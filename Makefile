@@ -86,7 +86,7 @@ SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.js
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
-		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --output docs/evaluation; fi
+		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation; fi
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

@@ -79,3 +79,28 @@ def test_figures_of_mediapipe_that_are_none_are_refused(session: Path, tmp_path:
     (tmp_path / "peer_mediapipe.json").write_text("[]")
     with pytest.raises(CardboxError, match=r"is not what peer_mediapipe\.json should be"):
         load_session(tmp_path)
+
+
+def test_recovery_counts_its_trials(session: Path) -> None:
+    found = evaluate_session(session, "paper", (0,), recovery=True)
+    recovery = found["runs"][0]["recovery"]
+    assert set(recovery) == {"absent", "gap", "arm hidden"}
+    for kind in recovery.values():
+        assert 0 <= kind["recovered"] <= kind["trials"]
+        assert kind["trials"] >= 1
+    report = sessions_report(
+        {
+            "seeds": [0],
+            "preset": "paper",
+            "sessions": [found],
+            "command": "",
+            "provenance": {"commit": "", "cpu": ""},
+        }
+    )
+    assert "## Recovery after disturbances" in report
+
+
+def test_a_session_that_cannot_be_read_is_told_in_its_row(session: Path, tmp_path: Path) -> None:
+    (tmp_path / "ground_truth.json").write_text((session / "ground_truth.json").read_text())
+    found = evaluate_session(tmp_path, "paper", (0,))
+    assert "there is no recording" in found["runs"][0]["failure"]
