@@ -12,8 +12,8 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import kernels, row_sums
-from cardbox_tracker.estimation.filtering import particle_kernels
+from cardbox_tracker.estimation.cost import kernels, pose_prior, row_sums, whole_body_kernels
+from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
 from cardbox_tracker.vision import foreground as contrast
@@ -27,7 +27,16 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels, contrast, regions)
+    modules: tuple[ModuleType, ...] = (
+        kernels,
+        pose_prior,
+        row_sums,
+        whole_body_kernels,
+        particle_kernels,
+        whole_body_moves,
+        contrast,
+        regions,
+    )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules
@@ -41,6 +50,7 @@ def test_no_image_waits_for_the_compiler(preset: str) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
+    assert before["cardbox_tracker.estimation.filtering.whole_body_moves.move_all"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     mean = np.full((240, 320), 90, np.float32)

@@ -420,8 +420,8 @@ def _depth_inside(x: float, y: float, z: float, parts: Floats, margin: float) ->
     return max(deep, 1.0 - sqrt(a * a + b * b + c * c))
 
 
-@_inline
-def _penetration(points: Floats, parts: Floats) -> float:
+@_compile
+def penetration(points: Floats, parts: Floats) -> float:
     """Sum of how deep hand, middle of the forearm and elbow (3, 3) lie inside trunk or head."""
     margin = parts[FOREARM, TOP_WIDTH] / 2
     elbow, hand = points[1], points[2]
@@ -438,7 +438,7 @@ def _arm_prior(arm: Arm, side: float, parts: Floats, rules: Floats, gmm: Floats)
     for c in range(6):
         arm.outward[c] = arm.directions[c] * (side if c == 1 or c == 4 else 1.0)
     rated = nats_of(arm.outward, gmm, rules[UNKNOWN_DENSITY], arm.away)
-    rated += rules[PENETRATION] * _penetration(arm.points, parts)
+    rated += rules[PENETRATION] * penetration(arm.points, parts)
     prior: float = rules[WEIGHT] * rated
     return prior
 

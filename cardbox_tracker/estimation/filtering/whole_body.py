@@ -110,7 +110,7 @@ class WholeBodyFilter:
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._survivors = self._reference[None].copy()
-        self._is_new = True
+        self._is_new, self._is_lost = True, False
         self._age = 0
         self._home_m = 0.0
         self._output: FloatArray | None = None
@@ -119,7 +119,13 @@ class WholeBodyFilter:
         self._chance: float | None = None
 
     def recover(self) -> None:
-        """Do nothing: in every frame some torsos stand upright where the silhouette is."""
+        """See :class:`~.pose_filter.PoseFilter`: the search goes on, and somebody upright joins it.
+
+        To forget would cost more than it brings where silhouettes stay poor.
+        """
+        self._is_lost = True
+        # What was wrong is not shown, nor is the next result mixed with it.
+        self._output = None
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`: every setting of this filter restarts."""
@@ -137,18 +143,20 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._cost.terms = tuple(term.observe(self._frame) for term in terms)
         self._sight = self._cost.sight()
-        passes = 1
-        if self._is_new:
-            passes = self._config.start_passes
+        passes = self._config.start_passes if self._is_new else 1
+        if self._is_new or self._is_lost:
+            self._home_m = 0.0
+            self._survivors[-1] = self._reference
             place_m = self._sight * self._body.placement.distance_m
-            self._survivors[0, 0] = np.clip(place_m, *STATE_LIMITS[0])
+            self._survivors[-1, 0] = np.clip(place_m, *STATE_LIMITS[0])
+        if self._is_new:
             # Now it is known where the legs are.
             self._cost.see(self._frame.silhouette, self._survivors[0])
         else:
             self._age += 1
         for _ in range(passes):
             self._search()
-        self._is_new = False
+        self._is_new = self._is_lost = False
         return self._fit()
 
     def _search(self) -> None:

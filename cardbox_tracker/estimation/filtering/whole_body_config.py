@@ -170,5 +170,7 @@ class WholeBodyConfig:
                 f"{self.fresh_torsos}, {self.torso_explorers}, {self.torsos}; expected each to be "
                 "among the next ones"
             )
+        if self.alike > self.survivors:
+            raise ValueError(f"alike is {self.alike}; expected 1 to {self.survivors}")
         if self.best_torsos > self.torsos:
             raise ValueError(f"best_torsos is {self.best_torsos}; expected 1 to {self.torsos}")
