@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
+from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.pose_prior import ArmPrior
 from cardbox_tracker.estimation.cost.prior import RestPrior
@@ -22,7 +23,17 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, fill_convex, snap
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
-BODY = BodyModel.of(hip_height_m=-0.4, shoulder_breadth=0.36, upper_arm_length=0.3)
+
+
+def somebody(**sizes_m: float) -> BodyModel:
+    """The default body with other sizes."""
+    sizes = DEFAULT_SIZES.copy()
+    for name, size_m in sizes_m.items():
+        sizes[SIZE_INDEX[name]] = size_m
+    return BodyModel.of(sizes, hip_height_m=-0.4)
+
+
+BODY = somebody(shoulder_breadth=0.36, upper_arm_length=0.3)
 CONFIG = WholeBodyCostConfig()
 STIFF = replace(CONFIG, lift_gain=0.0)
 LIMITS = np.vstack([JOINT_LIMITS, [[-0.9, 0.9], [-0.3, 0.3]]])
@@ -118,7 +129,7 @@ def test_pixels_are_those_of_the_drawn_outlines(seed: int, distance_m: float) ->
 
 
 def test_a_trunk_looks_as_wide_from_the_side_as_it_is_deep() -> None:
-    body = BODY.with_values(torso_depth=0.1, waist_depth=0.1, distance_m=8.0)
+    body = somebody(torso_depth=0.1, waist_depth=0.1).with_values(distance_m=8.0)
     of = cost(body=body)
     for yaw, width_m in ((0.0, body.size("waist_width")), (np.pi / 2, 0.1)):
         corners = of.corners(state(d4=yaw))[kernels.WAIST]

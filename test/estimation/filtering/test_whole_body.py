@@ -29,6 +29,7 @@ CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+STIFF = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig(lift_gain=0.0))
 
 
 def seen(posture: np.ndarray) -> np.ndarray:
@@ -91,12 +92,12 @@ def test_survivors_are_the_best_and_then_apart() -> None:
 
 
 def arms_for(
-    silhouette: np.ndarray, state: np.ndarray, arm: int, seed: int = 0, **counts: int
+    silhouette: np.ndarray, state: np.ndarray, arm: int, of: WholeBodyCost = COST, **counts: int
 ) -> np.ndarray:
     """40 proposals for an arm, of them so many mirrors, tips and banked ones."""
-    rng = np.random.default_rng(seed)
-    COST.see(silhouette, state)
-    COST.fix_torso(state)
+    rng = np.random.default_rng(0)
+    of.see(silhouette, state)
+    of.fix_torso(state)
     bank = np.tile([0.1, 0.2, 0.3, 0.4], (5, 1))
     return moves.propose_arms(
         state[None],
@@ -107,11 +108,11 @@ def arms_for(
         counts.get("tips", 0),
         bank,
         counts.get("banked", 0),
-        COST.uncovered(arm),
-        COST.parts,
-        COST.girdle,
-        COST.place,
-        COST.view,
+        of.uncovered(arm),
+        of.parts,
+        of.girdle,
+        of.place,
+        of.view,
         ARM_LIMITS,
         rng.standard_normal((40, 4)),
         rng.random((40, 3)),
@@ -125,16 +126,20 @@ def test_a_tip_puts_the_hand_on_the_pixel(arm: int) -> None:
     shoulder = CAMERA.project(COST.keypoints(state)[3 * arm])
     tip = shoulder + np.array([30.0 * (1 - 2 * arm), -20.0])
     cv2.circle(silhouette, (round(tip[0]), round(tip[1])), 8, 255, -1)
-    arms = arms_for(silhouette, state, arm, tips=12)[-12:]
-    bent = set()
-    for angles in arms:
+    arms = arms_for(silhouette, state, arm, tips=30, of=STIFF)[-30:]
+    limits = ARM_LIMITS.T
+    free = [angles for angles in arms if not np.any(np.isclose(angles, limits, atol=1e-9))]
+    assert len(free) > 5, "joint limits hold for the others"
+    hands = []
+    for angles in free:
         found = state.copy()
         found[4 + 4 * arm : 8 + 4 * arm] = angles
-        points = COST.keypoints(found)
-        # The girdle lifts the shoulder after the arm was reached out: a few pixels.
-        assert np.linalg.norm(CAMERA.project(points[3 * arm + 2]) - tip) < 16
-        bent.add(round(float(points[3 * arm + 2, 2]), 2))
-    assert len(bent) > 4, "hands at one pixel are at different depths"
+        hands.append(STIFF.keypoints(found)[3 * arm + 2])
+    pixels = CAMERA.project(np.array(hands))
+    # All at one pixel of what was uncovered, at different depths.
+    np.testing.assert_allclose(pixels, np.tile(pixels[0], (len(pixels), 1)), atol=1e-6)
+    assert silhouette[round(pixels[0, 1]), round(pixels[0, 0])] == 255
+    assert np.ptp(np.array(hands)[:, 2]) > 0.1
 
 
 def test_without_anything_uncovered_nothing_reaches() -> None:
