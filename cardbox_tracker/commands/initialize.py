@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
     """
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import save_body_model
-    from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+    from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.initialize import describe, initialize_from_recording

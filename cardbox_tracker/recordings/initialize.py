@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
-    initialize_body,
 )
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 

@@ -22,8 +22,9 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
+from cardbox_tracker.estimation.initialization.config import InitializationResult
 from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
-from cardbox_tracker.estimation.initialization.measure import InitializationResult, initialize_body
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
