@@ -23,7 +23,8 @@ def initialize_from_recording(
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: the references are unusable, or the model does not fit them.
+        InitializationError: the references are unusable, show other postures than they should, or
+            the model does not fit them.
     """
     references = {
         name: average_silhouette(source.silhouettes(span, name)) for name, span in spans.items()
