@@ -149,7 +149,23 @@ def _lengths(results: Results) -> list[str]:
         "The height of the shoulder joints is compared while the arms hang.",
         "",
         *_table(results, columns, ("{:.3f}", "{:.3f}", "{:.3f}", "{:+.1f}")),
+        *_deviations(results, columns),
     ]
+
+
+def _deviations(results: Results, columns: Mapping[str, Callable[[Results], float]]) -> list[str]:
+    """A sentence with the mean and the largest deviation of each length; none without lengths."""
+    table = np.array([[column(s) for column in columns.values()] for s in results["sessions"]])
+    measured = table[np.isfinite(table).all(axis=1)]
+    if not measured.size:
+        return []
+    *ratios, height = np.abs(measured - (1.0, 1.0, 1.0, 0.0)).T
+    texts = [
+        f"{name} {100 * off.mean():.1f} % ({100 * off.max():.1f} %)"
+        for name, off in zip(columns, ratios, strict=False)
+    ]
+    joints = f"shoulder joints {height.mean():.1f} cm ({height.max():.1f} cm)"
+    return [f"Mean (largest) deviation: {', '.join(texts)}, {joints}.", ""]
 
 
 def _motions(results: Results) -> list[str]:

@@ -61,4 +61,11 @@ def test_the_report_has_ratios_and_centimetres() -> None:
         "sessions": [one],
         "provenance": {"commit": "none", "cpu": "none"},
     }
-    assert "| some | 1.012 | 0.900 | 1.000 | -0.3 |" in sessions_report(results)
+    report = sessions_report(results)
+    assert "| some | 1.012 | 0.900 | 1.000 | -0.3 |" in report
+    assert (
+        "deviation: upper arm 1.2 % (1.2 %), forearm to hand 10.0 % (10.0 %), shoulder breadth "
+        "0.0 % (0.0 %), shoulder joints 0.3 cm (0.3 cm)." in report
+    )
+    results["sessions"] = [one | {"runs": [{"frames": 3, "without_estimate": 3}]}]
+    assert "deviation:" not in sessions_report(results)
