@@ -7,7 +7,7 @@
 
 Every link and joint but the sensor's frame ends in ``_ID``. As in the reference model, ``torso`` is
 at the height of the shoulders, ``l_shoulder`` is the upper arm and ``l_elbow`` the forearm. The
-wrist of the reference model is the end of the fist here, where the outline ends.
+wrist of the reference model is at the knuckles here, where the forearm of the body model ends.
 """
 
 from __future__ import annotations

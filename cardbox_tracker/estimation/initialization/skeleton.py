@@ -1,6 +1,6 @@
 """Where the shoulder joints are and how long the arms, from the outlines of ``front`` and ``arms``.
 
-A fit of all 18 sizes at once finds arms 6 to 12 % too long and shoulders 2 cm too high: the girdle
+A fit of all 18 sizes at once finds arms 5 to 10 % too long and shoulders 2 cm too high: the girdle
 lifts the shoulders in ``arms``, open fingers reach beyond the fist, and nothing in the outline of a
 straight arm shows the elbow. So the bones of the arms are measured before the fit, from what the
 outline does show, with the proportions of people for the rest:
