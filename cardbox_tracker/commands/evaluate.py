@@ -53,6 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="with --sessions: seeds, each a run of its own, from --seed on",
     )
+    parser.add_argument(
+        "--recovery",
+        action="store_true",
+        help="with --sessions: also measure how soon tracking is right again after disturbances",
+    )
     add_preset(parser, "default")
     parser.add_argument(
         "--jobs",
@@ -93,5 +98,13 @@ def _sessions(options: argparse.Namespace, jobs: int) -> None:
 
     seeds = tuple(range(options.seed, options.seed + options.seeds))
     with progress_bar("evaluate") as show:
-        evaluate_sessions(options.sessions, options.output, options.preset, seeds, jobs, show)
+        evaluate_sessions(
+            options.sessions,
+            options.output,
+            options.preset,
+            seeds,
+            jobs,
+            options.recovery,
+            show,
+        )
     print(f"wrote {options.output}/sessions.md and {options.output}/sessions.json")

@@ -30,6 +30,7 @@ def sessions_report(results: Results) -> str:
         *_versus(results),
         *_signed(results),
         *_steadiness(results),
+        *_recovery(results),
         *_lengths(results),
         *_motions(results),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']} on "
@@ -166,6 +167,36 @@ def _deviations(results: Results, columns: Mapping[str, Callable[[Results], floa
     ]
     joints = f"shoulder joints {height.mean():.1f} cm ({height.max():.1f} cm)"
     return [f"Mean (largest) deviation: {', '.join(texts)}, {joints}.", ""]
+
+
+def _recovery(results: Results) -> list[str]:
+    """How often each kind of disturbance was recovered from; empty where it was not measured."""
+    kinds = dict.fromkeys(
+        kind for s in results["sessions"] for run in s["runs"] for kind in run.get("recovery", {})
+    )
+    if not kinds:
+        return []
+    lines = [
+        "## Recovery after disturbances",
+        "",
+        "In brackets the trials, with the first seed. Recovered: half a second to one second after "
+        "the disturbance the mean error is at most 4 cm above that of the undisturbed run, or "
+        "below 10 cm.",
+        "",
+        f"| session | {' | '.join(kinds)} |",
+        "|---" * (len(kinds) + 1) + "|",
+    ]
+    totals = {kind: np.zeros(2, int) for kind in kinds}
+    for session in results["sessions"]:
+        cells = []
+        for kind in kinds:
+            trials = [r["recovery"][kind] for r in session["runs"] if "recovery" in r]
+            counts = np.array([(t["recovered"], t["trials"]) for t in trials]).reshape(-1, 2)
+            totals[kind] += counts.sum(axis=0)
+            cells.append("{} ({})".format(*counts.sum(axis=0)))
+        lines.append(f"| {session['name']} | {' | '.join(cells)} |")
+    cells = ["{} ({})".format(*total) for total in totals.values()]
+    return [*lines, f"| **all** | {' | '.join(cells)} |", ""]
 
 
 def _motions(results: Results) -> list[str]:
