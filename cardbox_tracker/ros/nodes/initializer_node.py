@@ -159,8 +159,10 @@ class InitializerNode(CardboxNode):
         self._describe(body)
 
     def _describe(self, body: BodyModel) -> None:
-        frame_id = self._frame_id if self.parameters.value.optical_frame_in_urdf else None
-        self._description.publish(String(data=urdf_from_body(body, frame_id or None)))
+        settings = self.parameters.value
+        frame_id = self._frame_id if settings.optical_frame_in_urdf else None
+        urdf = urdf_from_body(body, frame_id or None, torso_place=settings.torso_place_in_urdf)
+        self._description.publish(String(data=urdf))
 
     def _values(self) -> dict[str, str]:
         return {

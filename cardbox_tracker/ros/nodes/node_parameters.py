@@ -108,6 +108,12 @@ class InitializerParameters(NodeParameters):
         "already publishes where it is",
         effect=_NEXT_MEASUREMENT,
     )
+    torso_place_in_urdf: bool = parameter(
+        True,
+        "robot_description has the joints torso_x and torso_z; must be the same as the tracker's "
+        "torso_place",
+        effect=_NEXT_MEASUREMENT,
+    )
 
     def config(self) -> InitializationConfig:
         """Return the settings of the core."""
