@@ -15,8 +15,8 @@ is reached. Beyond the paper:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,8 @@ from cardbox_tracker.body.sizes import (
 )
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Image
+from cardbox_tracker.estimation.initialization.part_colors import can_learn, learn_appearance
 from cardbox_tracker.estimation.initialization.references import (
     Silhouette,
     check_references,
@@ -150,14 +152,17 @@ def initialize_body(
     camera: Camera,
     config: InitializationConfig | None = None,
     progress: Callable[[float], None] | None = None,
+    images: Mapping[str, Sequence[Image]] | None = None,
 ) -> InitializationResult:
-    """Measure a person.
+    """Measure a person, and learn what they look like.
 
     Args:
         references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
         camera: working camera, of the silhouettes' size.
         config: settings.
         progress: called with the finished fraction.
+        images: some of each of the references ``front`` and ``arms``, (H, W, 3) bgr or (H, W), of
+            the camera's size; without them the body has no appearance.
 
     Raises:
         InitializationError: the references are unusable, or the model does not fit them.
@@ -180,7 +185,10 @@ def initialize_body(
             f"({np.degrees(config.camera_pitch_rad):g} degrees), the side the person turned to "
             f"({config.side_turn}), and look at the silhouettes"
         )
-    return result
+    if images is None or not can_learn(images, references):
+        return result
+    appearance = learn_appearance(images, references, result.body, camera, config.seed)
+    return replace(result, body=result.body.with_values(appearance=appearance))
 
 
 class _Search:

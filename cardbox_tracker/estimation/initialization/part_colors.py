@@ -55,6 +55,14 @@ _ROUNDS, _POSTURES, _SHRINK = 8, 300, 0.7
 _PLACE_M, _ROLL_RAD, _ABDUCTION_RAD = 0.03, np.radians(4.0), np.radians(10.0)
 
 
+def can_learn(images: Mapping[str, Sequence[Image]], references: Mapping[str, Silhouette]) -> bool:
+    """Return whether there are images of what is learned from, all of one kind and size."""
+    needed = [image for name in LEARNED_FROM for image in images.get(name, ())]
+    size = references[LEARNED_FROM[0]].shape
+    one_kind = len({image.shape for image in needed}) == 1 and needed[0].shape[:2] == size
+    return one_kind and all(images.get(name) for name in LEARNED_FROM)
+
+
 def learn_appearance(
     images: Mapping[str, Sequence[Image]],
     references: Mapping[str, Silhouette],
