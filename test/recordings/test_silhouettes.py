@@ -26,7 +26,7 @@ def test_spans_are_read(text: str, expected: tuple[float, float]) -> None:
 )
 def test_what_is_no_span_is_refused(text: str) -> None:
     with pytest.raises(
-        ValueError, match=r"expected T0:T1 in seconds, T0 before T1, such as 0:4"
+        ValueError, match=r"expected T0:T1 in seconds with T0 before T1, such as 0:4"
     ):
         TimeSpan.parse(text)
 
