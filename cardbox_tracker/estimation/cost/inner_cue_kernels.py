@@ -290,34 +290,17 @@ def arm_gains(
         au, av = (du / length, dv / length) if length > 1e-6 else (0.0, 1.0)
         along, across = 0.5 * _HAND_LENGTH_M * per_m, 0.5 * _HAND_WIDTH_M * per_m
         before = _HAND_BEFORE_END_M / forearm_m
-        hand = _mean(
-            maps[0],
-            hu - before * du,
-            hv - before * dv,
-            au * along,
-            av * along,
-            -av * across,
-            au * across,
-            _HAND_ALONG,
-            _HAND_ACROSS,
-        )
+        u, v = hu - before * du, hv - before * dv
+        du_hand, dv_hand, across_u, across_v = au * along, av * along, -av * across, au * across
+        hand = _mean(maps[0], u, v, du_hand, dv_hand, across_u, across_v, _HAND_ALONG, _HAND_ACROSS)
         if hand > 0.0:
             other = others[i if others.shape[0] > 1 else 0]
             hand *= 1.0 - _CLAIM * _claimed(hu, hv, other, u0, v0)
         gains[i] += weights[0] * hand * _HAND_LENGTH_M * _HAND_WIDTH_M * px_per_m**2
         middle, reach = 0.5 * (_BEGIN + _END), 0.5 * (_END - _BEGIN)
         across = 0.5 * _WIDTH * width_m * per_m
-        forearm = _mean(
-            maps[1],
-            eu + middle * du,
-            ev + middle * dv,
-            reach * du,
-            reach * dv,
-            -av * across,
-            au * across,
-            _ALONG,
-            _ACROSS,
-        )
+        u, v, across_u, across_v = eu + middle * du, ev + middle * dv, -av * across, au * across
+        forearm = _mean(maps[1], u, v, reach * du, reach * dv, across_u, across_v, _ALONG, _ACROSS)
         # A forearm that points to the camera shows less: its length in the image counts.
         area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
         gains[i] += weights[1] * forearm * area_m2 * px_per_m**2
