@@ -170,6 +170,21 @@ def test_installed_data_exist_and_none_is_forgotten() -> None:
     assert "resource/cardbox_tracker" in installed
 
 
+def test_data_inside_the_package_are_installed_with_it() -> None:
+    patterns = setup_arguments()["package_data"]
+    installed = {
+        path
+        for package, names in patterns.items()
+        for name in names
+        for path in (ROOT / package.replace(".", "/")).glob(name)
+    }
+    files = {
+        path for path in SOURCES.rglob("*") if path.is_file() and "__pycache__" not in str(path)
+    }
+    assert {path for path in files if path.suffix != ".py"} == installed
+    assert all(patterns.values())
+
+
 def test_every_folder_is_a_package() -> None:
     folders = {p.parent for p in SOURCES.rglob("*.py")}
     names = {".".join(folder.relative_to(ROOT).parts) for folder in folders}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.prior import RestPrior
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
@@ -146,7 +147,7 @@ def default_preset() -> TrackerConfig:
     return TrackerConfig(
         cycles=2,
         noise_decay=0.5,
-        terms=(RestPrior(0.012),),
+        terms=(RestPrior(0.012), InnerCue()),
         average=20,
         explore=0.2,
         relocalize=True,

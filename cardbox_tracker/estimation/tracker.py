@@ -153,7 +153,8 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        frame = self._silhouette.frame(silhouette, image)
+        before = self._filter.estimate() if self._started else None
+        frame = self._silhouette.frame(silhouette, image, before)
         if frame.foreground_px < self._min_person_px:
             if self.config.relocalize and self._started:
                 # The person may come back elsewhere: search anew as soon as there is one.

@@ -112,8 +112,8 @@ def track_recording(
 def _estimates(
     source: SilhouetteSource, tracker: Tracker, start_s: float
 ) -> Iterator[tuple[Frame, Estimate]]:
-    for frame in source.frames(start_s):
-        yield frame, tracker.track(frame.silhouette)
+    for frame in source.frames(start_s, images=bool(tracker.config.terms)):
+        yield frame, tracker.track(frame.silhouette, frame.image)
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:

@@ -88,4 +88,4 @@ def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> N
         CardboxError,
         match=r"no image lies in the arms span 90:91 s of a bag of 24.2 s; give",
     ):
-        source.silhouettes(TimeSpan(90, 91), "arms")
+        source.held(TimeSpan(90, 91), "arms")

@@ -19,7 +19,8 @@ is reached. Beyond the paper:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,12 +43,14 @@ from cardbox_tracker.body.sizes import (
 )
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Image
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
     check_fit,
 )
 from cardbox_tracker.estimation.initialization.outline import filled
+from cardbox_tracker.estimation.initialization.part_colors import can_learn, learn_appearance
 from cardbox_tracker.estimation.initialization.reference_checks import check_postures
 from cardbox_tracker.estimation.initialization.references import (
     POSTURE_TEXT,
@@ -89,14 +92,17 @@ def initialize_body(
     camera: Camera,
     config: InitializationConfig | None = None,
     progress: Callable[[float], None] | None = None,
+    images: Mapping[str, Sequence[Image]] | None = None,
 ) -> InitializationResult:
-    """Measure a person.
+    """Measure a person, and learn what they look like.
 
     Args:
         references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
         camera: working camera, of the silhouettes' size.
         config: settings.
         progress: called with the finished fraction.
+        images: some of each of the references ``front`` and ``arms``, (H, W, 3) bgr or (H, W), of
+            the camera's size; without them the body has no appearance.
 
     Raises:
         InitializationError: the references are unusable, show other postures than they should, or
@@ -115,7 +121,10 @@ def initialize_body(
             progress((number + 1) / (2 * len(STEPS)))
     result = search.result()
     check_fit(result, config)
-    return result
+    if images is None or not can_learn(images, references):
+        return result
+    appearance = learn_appearance(images, references, result.body, camera, config.seed)
+    return replace(result, body=result.body.with_values(appearance=appearance))
 
 
 class _Search:

@@ -58,6 +58,8 @@ class InitializerNode(CardboxNode):
         self._topic = self.resolve("silhouette")
         self._references = ReferenceCapture(self._topic)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
+        add_image = self._references.add_image
+        self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
@@ -119,7 +121,7 @@ class InitializerNode(CardboxNode):
     def _measure(self) -> str:
         settings, references = self.parameters.value, self._references
         references.check_running()
-        before = dict(references.captured)
+        before = dict(references.captured), dict(references.images)
         try:
             Guidance(self._guide.show, self._capture, self._wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
@@ -130,13 +132,17 @@ class InitializerNode(CardboxNode):
                     "silhouettes from the background node, which publishes it"
                 )
             result = initialize_body(
-                references.captured, self._camera, settings.config(), self._progress
+                references.captured,
+                self._camera,
+                settings.config(),
+                self._progress,
+                references.images,
             )
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
-            references.captured = before
+            references.captured, references.images = before
             raise
-        references.captured = {}
+        references.captured, references.images = {}, {}
         answer = _answer(result)
         self._result.publish(measured_message(result, answer))
         self._publish(result.body)

@@ -15,6 +15,7 @@ from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
@@ -45,7 +46,12 @@ class TrackerNode(CardboxNode):
         self._info_topic = self.resolve("silhouette/camera_info")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
-        self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
+        self._pairing = ImagePairing(self._on_silhouette)
+        if self.parameters.value.use_image:
+            add_image = self._pairing.add_image
+            self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
+        add_silhouette = self._pairing.add_silhouette
+        self.subscribe(Image, "silhouette", add_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
         self._report = TrackerReport(self)
         if self.parameters.value.model_file:
@@ -80,6 +86,7 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
+        self._pairing.waits = body.appearance is not None
         self._build("new body model")
         self._wait()
 
@@ -111,7 +118,7 @@ class TrackerNode(CardboxNode):
         self._build("reset")
         return "tracking starts again from the front reference posture"
 
-    def _on_silhouette(self, message: Image, sent_ns: int) -> None:
+    def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
         header = message.header
         if not self.diagnostics.input.add(conversions.stamp_ns(header.stamp)) and self._tracker:
             self._build("an image is older than the one before (a bag that loops?)")
@@ -126,7 +133,8 @@ class TrackerNode(CardboxNode):
                 f"the silhouette is {width}x{height} but {self._info_topic} describes "
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
-        estimate = self._tracker.track(silhouette)
+        image = conversions.image_behind(silhouette, seen)
+        estimate = self._tracker.track(silhouette, image)
         self._outputs.publish(header, estimate, silhouette, self._tracker)
         self._report.add(estimate)
         self.diagnostics.working(sent_ns)

@@ -73,6 +73,12 @@ class TrackerParameters(NodeParameters):
         "the initializer's torso_place_in_urdf",
         read_only=True,
     )
+    use_image: bool = parameter(
+        True,
+        "also take silhouette/image, to see hands and forearms before the torso by the colours "
+        "that the body model has of them",
+        read_only=True,
+    )
     rep155_id: str = parameter(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
