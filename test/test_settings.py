@@ -13,7 +13,7 @@ from cardbox_tracker import settings
 from cardbox_tracker.estimation.config import FilterConfig, TrackerConfig
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.settings import Setting, setting
 from cardbox_tracker.vision.background import BackgroundConfig
 

@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_preset, add_seed, process_count, run_count
+from cardbox_tracker.commands.arguments import (
+    add_preset,
+    add_seed,
+    process_count,
+    run_count,
+    seed_count,
+)
 
 NAME = "evaluate"
 HELP = "repeat the paper's experiments, or compare recorded sessions with their truth"
@@ -42,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seeds",
-        type=run_count,
+        type=seed_count,
         default=3,
         metavar="N",
         help="with --sessions: seeds, each a run of its own, from --seed on",

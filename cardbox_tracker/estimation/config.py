@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
@@ -156,7 +157,7 @@ def paper_preset() -> TrackerConfig:
 
 def default_preset() -> TrackerConfig:
     """Return what tracks best: the whole-body filter (``docs/architecture.md``)."""
-    return TrackerConfig(filter="whole_body", relocalize=True)
+    return TrackerConfig(filter="whole_body", terms=(InnerCue(),), relocalize=True)
 
 
 PRESETS = MappingProxyType({"paper": paper_preset, "default": default_preset})

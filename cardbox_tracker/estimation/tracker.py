@@ -109,6 +109,8 @@ class Tracker:
         make_filter = self._make_filter or FILTERS[self.config.filter]
         self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
         self._poor_frames = 0
+        # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
+        self._before: FloatArray | None = None
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next silhouette on.
@@ -137,8 +139,9 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        sight = self._filter.look(self._silhouette.frame(silhouette, image))
+        sight = self._filter.look(self._silhouette.frame(silhouette, image, self._before))
         if sight is Sight.NOBODY:
+            self._before = None
             if self.config.relocalize:
                 # The person may come back elsewhere.
                 self._filter.forget()
@@ -147,6 +150,8 @@ class Tracker:
             # A lamp goes on, a door opens: soon the person is where they were.
             return Estimate(LOST)
         fit = self._filter.follow(self._terms)
+        offset = () if fit.offset_m is None else fit.offset_m
+        self._before = np.concatenate([fit.posture, offset])
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:

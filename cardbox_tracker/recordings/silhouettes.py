@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagImage, BagReader
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
@@ -57,12 +57,15 @@ class Frame(NamedTuple):
         time_s: seconds from the bag's start.
         brightness: (H, W) uint8, undistorted, at the working resolution.
         silhouette: (H, W) uint8, 0 or 255.
+        image: (H, W, 3) bgr, or (H, W) of a camera without colour, as ``brightness`` otherwise;
+            None if it was not asked for.
     """
 
     stamp_ns: int
     time_s: float
     brightness: NDArray[np.uint8]
     silhouette: NDArray[np.uint8]
+    image: NDArray[np.uint8] | None = None
 
 
 class SilhouetteSource:
@@ -97,7 +100,7 @@ class SilhouetteSource:
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
-        for _, time_s, brightness in self._images():
+        for _, time_s, brightness, _ in self._images():
             if time_s > background.end_s:
                 break
             if background.contains(time_s):
@@ -110,22 +113,31 @@ class SilhouetteSource:
             )
         self._pipeline.finish_learning()
 
-    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
-        """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
-        for stamp_ns, time_s, brightness in self._images():
+    def frames(
+        self, start_s: float = 0.0, end_s: float = float("inf"), *, images: bool = False
+    ) -> Iterator[Frame]:
+        """Yield every image from ``start_s`` to ``end_s``, in order, none left out.
+
+        Args:
+            start_s: seconds from the bag's start.
+            end_s: the same; the end belongs to the span.
+            images: fill in ``Frame.image``, too.
+        """
+        for stamp_ns, time_s, brightness, of_bag in self._images():
             if time_s > end_s:
                 break
             if time_s >= start_s:
                 silhouette = self._pipeline.silhouette(brightness)
-                yield Frame(stamp_ns, time_s, brightness, silhouette)
+                image = self._pipeline.prepare(of_bag.as_sent) if images else None
+                yield Frame(stamp_ns, time_s, brightness, silhouette, image)
 
-    def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:
-        """Return the silhouettes of a span.
+    def held(self, span: TimeSpan, what: str, *, images: bool = False) -> list[Frame]:
+        """Return the frames of a span in which a posture is held.
 
         Raises:
             CardboxError: no image lies in it; the text names ``what``.
         """
-        found = [frame.silhouette for frame in self.frames(*span)]
+        found = list(self.frames(*span, images=images))
         if not found:
             raise CardboxError(
                 f"no image lies in the {what} span {span} s of a bag of "
@@ -133,7 +145,7 @@ class SilhouetteSource:
             )
         return found
 
-    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
+    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8], BagImage]]:
         for image in self._bag.images():
             brightness = self._pipeline.prepare(image.grey)
-            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness
+            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness, image

@@ -25,7 +25,9 @@ def test_spans_are_read(text: str, expected: tuple[float, float]) -> None:
     "text", ["5", "9:3", "3:3", "-1:3", ":", "1:", ":2", "", "a:b", "1:2:3", "nan:3", "0:nan"]
 )
 def test_what_is_no_span_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"expected T0:T1 in seconds, T0 before T1, such as 0:4"):
+    with pytest.raises(
+        ValueError, match=r"expected T0:T1 in seconds with T0 before T1, such as 0:4"
+    ):
         TimeSpan.parse(text)
 
 
@@ -86,4 +88,4 @@ def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> N
         CardboxError,
         match=r"no image lies in the arms span 90:91 s of a bag of 24.2 s; give",
     ):
-        source.silhouettes(TimeSpan(90, 91), "arms")
+        source.held(TimeSpan(90, 91), "arms")

@@ -55,12 +55,15 @@ class Frame:
         rows: rows that count, from the top: those above the hips.
         foreground_px: foreground pixels in those rows.
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
+        posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
+            metres; None where tracking starts.
     """
 
     silhouette: Silhouette
     rows: int
     foreground_px: int
     image: Image | None = None
+    posture: FloatArray | None = None
 
 
 class TermObservation(Protocol):
@@ -93,6 +96,26 @@ class TermSettings(Protocol):
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
         """Return the term for a measured person before a working camera."""
+
+
+class Silence:
+    """A term, and its observation, that says nothing."""
+
+    def observe(self, frame: Frame) -> TermObservation:
+        """See :class:`Term`."""
+        return self
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`TermObservation`."""
+        return self.postures
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`TermObservation`."""
+        return lambda side, arms: self.postures(arms)
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """See :class:`TermObservation`."""
+        return np.zeros(len(postures))
 
 
 @dataclass(frozen=True)

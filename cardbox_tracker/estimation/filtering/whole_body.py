@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, reference_posture
+from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, PLACE_LIMITS, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.pose_prior import sample_bank
@@ -30,6 +30,7 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     angles_of_arms,
 )
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.loss import (
     Evidence,
     chance_of_loss,
@@ -38,9 +39,7 @@ from cardbox_tracker.estimation.filtering.loss import (
 )
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
 
-OFFSET_LIMITS_M = ((-0.9, 0.9), (-0.3, 0.3))
-"""Lowest and highest ``torso_x`` and ``torso_z``: a step or two, and a stretch or a crouch."""
-STATE_LIMITS: FloatArray = np.vstack([JOINT_LIMITS, OFFSET_LIMITS_M])
+STATE_LIMITS: FloatArray = np.vstack([JOINT_LIMITS, PLACE_LIMITS])
 """Shape (14, 2)."""
 _ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 _HOME_LIMIT_M = 0.7
@@ -60,18 +59,6 @@ def _bank() -> FloatArray:
     return arms
 
 
-class _Draws:
-    """Random numbers of one search, drawn at once and handed out in pieces."""
-
-    def __init__(self, values: FloatArray) -> None:
-        self._values, self._next = values, 0
-
-    def take(self, rows: int, columns: int) -> FloatArray:
-        """Return the next numbers as (rows, columns)."""
-        start, self._next = self._next, self._next + rows * columns
-        return self._values[start : self._next].reshape(rows, columns)
-
-
 class WholeBodyFilter:
     """Follows states (14,); a :class:`~.pose_filter.PoseFilter`.
 
@@ -87,12 +74,8 @@ class WholeBodyFilter:
         self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
         self._bank = _bank()
         self._torso_sigma = np.zeros(N_STATE)
-        self._torso_sigma[:4] = (
-            c.y_noise_m,
-            c.roll_noise_rad,
-            c.pitch_noise_rad,
-            c.yaw_noise_rad,
-        )
+        angles_rad = (c.roll_noise_rad, c.pitch_noise_rad, c.yaw_noise_rad)
+        self._torso_sigma[:4] = c.y_noise_m, *angles_rad
         self._torso_sigma[12:] = c.x_noise_m, c.z_noise_m
         self._sigma = self._torso_sigma.copy()
         self._sigma[4:12] = c.arm_noise_rad
@@ -162,8 +145,8 @@ class WholeBodyFilter:
     def _search(self) -> None:
         """Run all stages once."""
         config, cost = self._config, self._cost
-        normals = _Draws(self._rng.standard_normal(self._normals))
-        uniforms = _Draws(self._rng.random(self._uniforms))
+        normals = Draws(self._rng.standard_normal(self._normals))
+        uniforms = Draws(self._rng.random(self._uniforms))
         before = self._survivors[0].copy()
         self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
         self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
@@ -182,7 +165,7 @@ class WholeBodyFilter:
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(states, ratings, normals, uniforms)
 
-    def _torsos(self, before: FloatArray, normals: _Draws, uniforms: _Draws) -> FloatArray:
+    def _torsos(self, before: FloatArray, normals: Draws, uniforms: Draws) -> FloatArray:
         """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
         config, cost = self._config, self._cost
         fresh = self._reference.copy()
@@ -216,7 +199,7 @@ class WholeBodyFilter:
         return pool
 
     def _arm(
-        self, pool: FloatArray, arm: int, normals: _Draws, uniforms: _Draws
+        self, pool: FloatArray, arm: int, normals: Draws, uniforms: Draws
     ) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
         config, cost = self._config, self._cost
@@ -254,7 +237,7 @@ class WholeBodyFilter:
         return np.concatenate([arms, again]), both
 
     def _together(
-        self, states: FloatArray, ratings: FloatArray, normals: _Draws, uniforms: _Draws
+        self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
     ) -> None:
         """Move all joints of the best together; then choose who survives."""
         config, cost = self._config, self._cost
@@ -282,16 +265,9 @@ class WholeBodyFilter:
         self._survivors = self._apart(states, ratings)
 
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
-        config, cost = self._config, self._cost
-        chosen = moves.choose_apart(
-            states,
-            ratings,
-            config.survivors,
-            config.alike,
-            config.apart_m,
-            cost.parts,
-            cost.girdle,
-        )
+        c, cost = self._config, self._cost
+        kept = (c.survivors, c.alike, c.apart_m)
+        chosen = moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)
         return states[chosen]
 
     def _fit(self) -> Fit:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
@@ -63,12 +63,12 @@ def track_session(
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
-        for frame in source.frames(session.start_s + offset_s):
+        for frame in source.frames(session.start_s + offset_s, images=bool(config.terms)):
             for tracker, estimates, spent in zip(trackers, found, times, strict=True):
                 if tracker is None:
                     continue
                 start = time.perf_counter()
-                estimates[frame.stamp_ns] = tracker.track(frame.silhouette)
+                estimates[frame.stamp_ns] = tracker.track(frame.silhouette, frame.image)
                 spent.append(1e3 * (time.perf_counter() - start))
     return [
         _run(session, body, failure, estimates, spent)

@@ -44,6 +44,7 @@ class BackgroundNode(CardboxNode):
         self._covered = 0.0
 
         self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
         self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
@@ -119,7 +120,7 @@ class BackgroundNode(CardboxNode):
         if not pipeline.is_ready:
             self._learn_from(message.header, pipeline, image)
         if pipeline.is_ready:
-            self._publish(message.header, pipeline, image)
+            self._publish(message, pipeline, image)
             self.diagnostics.working(sent_ns)
 
     def _learn_from(
@@ -138,9 +139,18 @@ class BackgroundNode(CardboxNode):
         self.get_logger().info(f"background learned from {pipeline.learned_images} images")
 
     def _publish(
-        self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
+        self,
+        message: Image | CompressedImage,
+        pipeline: SilhouettePipeline,
+        brightness: conversions.ImageArray,
     ) -> None:
-        silhouette = pipeline.silhouette(image)
+        header = message.header
+        if self._images.get_subscription_count():
+            # Before the silhouette, so that nobody who needs both has to wait.
+            image = conversions.image_of(message)
+            small = brightness if image.ndim == 2 else pipeline.prepare(image)
+            self._images.publish(conversions.image_message(header, small))
+        silhouette = pipeline.silhouette(brightness)
         # The image first, so that the tracker does not wait for a CameraInfo that rarely changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
