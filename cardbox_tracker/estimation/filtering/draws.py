@@ -1,4 +1,4 @@
-"""Random numbers that are drawn at once and handed out in pieces: a call costs more than numbers."""
+"""Random numbers drawn at once and handed out in pieces: a call costs more than the numbers."""
 
 from __future__ import annotations
 
