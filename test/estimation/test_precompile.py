@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import kernels, row_sums
+from cardbox_tracker.estimation.cost import inner_cue_kernels, kernels, row_sums
 from cardbox_tracker.estimation.filtering import particle_kernels
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
@@ -27,7 +28,10 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels, contrast, regions)
+    modules: tuple[ModuleType, ...] = (
+        *(kernels, inner_cue_kernels, row_sums),
+        *(particle_kernels, contrast, regions),
+    )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules
@@ -36,12 +40,15 @@ def compiled() -> dict[str, int]:
     }
 
 
+@pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("preset", PRESETS)
-def test_no_image_waits_for_the_compiler(preset: str) -> None:
+def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
-    body = BodyModel()
+    assert before["cardbox_tracker.estimation.cost.inner_cue_kernels.ratio_maps"] > 0
+    levels = np.random.default_rng(0).integers(0, 255, (5, bins_of(channels))).astype(np.uint8)
+    body = BodyModel.of(appearance=Appearance(levels, np.full(channels, 100.0)))
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     mean = np.full((240, 320), 90, np.float32)
     extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
@@ -50,7 +57,9 @@ def test_no_image_waits_for_the_compiler(preset: str) -> None:
     for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
         silhouette = extractor(image)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
+        seen = image if channels == 1 else np.repeat(image[..., None], 3, axis=2)
+        seen.setflags(write=image.flags.writeable)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
-            state = tracker.track(pixels).state
+            state = tracker.track(pixels, seen).state
         assert state == TRACKING
     assert compiled() == before
