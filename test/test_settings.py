@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker import settings
 from cardbox_tracker.estimation.config import FilterConfig, TrackerConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.settings import Setting, setting
 from cardbox_tracker.vision.background import BackgroundConfig
 

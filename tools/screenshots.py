@@ -24,8 +24,8 @@ from cardbox_tracker.drawing.guidance import draw_guidance
 from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.guidance import instruction
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar

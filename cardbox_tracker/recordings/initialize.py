@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
-    initialize_body,
 )
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.part_colors import LEARNED_FROM
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
@@ -27,7 +27,8 @@ def initialize_from_recording(
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: the references are unusable, or the model does not fit them.
+        InitializationError: the references are unusable, show other postures than they should, or
+            the model does not fit them.
     """
     references, images = {}, {}
     for name, span in spans.items():

@@ -10,7 +10,8 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig, initialize_body
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth, tracking_error

@@ -69,6 +69,28 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
     return drawn
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
+    """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm; ``away`` is scratch."""
+    density = rest
+    for k in range(gmm.shape[0]):
+        for row in range(_D):
+            away[row] = directions[row] - gmm[k, 1 + row]
+        squares = 0.0
+        place = 1 + _D
+        for row in range(_D):
+            y = 0.0
+            for column in range(row + 1):
+                y += gmm[k, place] * away[column]
+                place += 1
+            squares += y * y
+        log_density = gmm[k, 0] - 0.5 * squares
+        # Less would not change a sum that is exp(-FLOOR_NATS) at least.
+        if log_density > -20.0:
+            density += exp(log_density)
+    return -log(density)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def add_arm_prior(arms: Any, gmm: Any, floor_nats: float, weight: float, costs: Any) -> None:
     """Add ``weight`` times -log p, nats, of arms (N, 4), rad, to ``costs`` (N,), in place."""
@@ -85,23 +107,7 @@ def add_arm_prior(arms: Any, gmm: Any, floor_nats: float, weight: float, costs: 
         z = sf * u + cf * w
         x[4] = ca * v - sa * z
         x[5] = sa * v + ca * z
-        density = rest
-        for k in range(gmm.shape[0]):
-            for row in range(_D):
-                away[row] = x[row] - gmm[k, 1 + row]
-            squares = 0.0
-            place = 1 + _D
-            for row in range(_D):
-                y = 0.0
-                for column in range(row + 1):
-                    y += gmm[k, place] * away[column]
-                    place += 1
-                squares += y * y
-            log_density = gmm[k, 0] - 0.5 * squares
-            # Less would not change a sum that is exp(-FLOOR_NATS) at least.
-            if log_density > -20.0:
-                density += exp(log_density)
-        costs[i] -= weight * log(density)
+        costs[i] += weight * nats_of(x, gmm, rest, away)
 
 
 class ArmPrior:

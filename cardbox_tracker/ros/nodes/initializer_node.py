@@ -22,8 +22,9 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
+from cardbox_tracker.estimation.initialization.config import InitializationResult
 from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
-from cardbox_tracker.estimation.initialization.measure import InitializationResult, initialize_body
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
@@ -164,8 +165,10 @@ class InitializerNode(CardboxNode):
         self._describe(body)
 
     def _describe(self, body: BodyModel) -> None:
-        frame_id = self._frame_id if self.parameters.value.optical_frame_in_urdf else None
-        self._description.publish(String(data=urdf_from_body(body, frame_id or None)))
+        settings = self.parameters.value
+        frame_id = self._frame_id if settings.optical_frame_in_urdf else None
+        urdf = urdf_from_body(body, frame_id or None, torso_place=settings.torso_place_in_urdf)
+        self._description.publish(String(data=urdf))
 
     def _values(self) -> dict[str, str]:
         return {
