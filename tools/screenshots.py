@@ -85,8 +85,9 @@ def _shots(
     frames: dict[str, Frame] = {}
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
-    for frame in source.frames(segments["neutral"].start_s, max(moments.values()) + 1.0):
-        estimate = tracker.track(frame.silhouette)
+    span = segments["neutral"].start_s, max(moments.values()) + 1.0
+    for frame in source.frames(*span, images=True):
+        estimate = tracker.track(frame.silhouette, frame.image)
         for motion, time_s in moments.items():
             if motion not in overlays and frame.time_s >= time_s - 1e-6:
                 frames[motion] = frame

@@ -8,11 +8,18 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import kernels, pose_prior, row_sums, whole_body_kernels
+from cardbox_tracker.estimation.cost import (
+    inner_cue_kernels,
+    kernels,
+    pose_prior,
+    row_sums,
+    whole_body_kernels,
+)
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
@@ -28,14 +35,14 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (
-        kernels,
-        pose_prior,
-        row_sums,
-        whole_body_kernels,
-        particle_kernels,
-        whole_body_moves,
-        contrast,
-        regions,
+from cardbox_tracker.estimation.cost import (
+    inner_cue_kernels,
+    kernels,
+    pose_prior,
+    row_sums,
+    whole_body_kernels,
+)
+from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
     )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
@@ -45,13 +52,20 @@ def compiled() -> dict[str, int]:
     }
 
 
+@pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("preset", PRESETS)
-def test_no_image_waits_for_the_compiler(preset: str) -> None:
+def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
-    assert before["cardbox_tracker.estimation.filtering.whole_body_moves.move_all"] > 0
-    body = BodyModel()
+from cardbox_tracker.estimation.cost import (
+    inner_cue_kernels,
+    kernels,
+    pose_prior,
+    row_sums,
+    whole_body_kernels,
+)
+from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
     mean = np.full((240, 320), 90, np.float32)
     extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
@@ -60,7 +74,9 @@ def test_no_image_waits_for_the_compiler(preset: str) -> None:
     for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
         silhouette = extractor(image)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
+        seen = image if channels == 1 else np.repeat(image[..., None], 3, axis=2)
+        seen.setflags(write=image.flags.writeable)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
-            state = tracker.track(pixels).state
+            state = tracker.track(pixels, seen).state
         assert state == TRACKING
     assert compiled() == before

@@ -60,6 +60,32 @@ def test_the_person_of_a_recording_is_measured(recording: Any) -> None:
         assert recording.body.size(name) == pytest.approx(expected_m, rel=0.08), name
 
 
+def test_the_persons_looks_are_learned(recording: Any) -> None:
+    assert recording.body.appearance is not None
+    assert recording.body.appearance.is_grey
+
+
+def test_the_tracker_gets_the_images(
+    recording: Any,
+    source: SilhouetteSource,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = []
+    follow = Tracker.track
+
+    def spy(tracker: Tracker, silhouette: Any, image: Any = None) -> Any:
+        seen.append(image)
+        return follow(tracker, silhouette, image)
+
+    monkeypatch.setattr(Tracker, "track", spy)
+    config = default_preset().with_particles(20)
+    with_cue = tmp_path / "cue.csv"
+    track_recording(source, recording.body, config, 0, recording.start_s(), with_cue)
+    assert seen
+    assert all(image.shape == (240, 320) for image in seen)
+
+
 def test_the_measures_are_described_for_a_person(recording: Any) -> None:
     text = describe(recording.result)
     for part in (

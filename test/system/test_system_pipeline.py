@@ -242,6 +242,9 @@ def test_body_model_message_is_the_saved_file(measured: tuple[Session, str, str]
     assert session.model_file.read_text() == text
     body = loads_body_model(text)
     assert body.placement.distance_m == pytest.approx(2.3)
+    # The images behind the silhouettes were there, and the camera is grey.
+    assert body.appearance is not None
+    assert body.appearance.is_grey
     assert body.size("upper_arm_length") == pytest.approx(
         session.scene.body.size("upper_arm_length"), abs=0.06
     )

@@ -81,6 +81,11 @@ class InnerCue:
         "not change",
         limits=(0.0, 1.0),
     )
+    lifts_shoulders: bool = setting(
+        True,
+        "shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as in "
+        "the filter hierarchical",
+    )
 
     def __post_init__(self) -> None:
         """Check the ranges.
@@ -113,7 +118,9 @@ class InnerCueTerm:
         self._appearance = body.appearance
         self._ratios = ratios_of(body.appearance.histograms)
         self._brightness = body.appearance.brightness.copy()
-        self._arms = ArmView.of(body, camera, np.array([config.hand, config.forearm]))
+        self._arms = ArmView.of(
+            body, camera, np.array([config.hand, config.forearm]), config.lifts_shoulders
+        )
         self._warm_up(camera)
 
     def _warm_up(self, camera: Camera) -> None:

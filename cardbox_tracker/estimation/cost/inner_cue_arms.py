@@ -13,6 +13,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import inner_cue_kernels as kernels
 from cardbox_tracker.estimation.cost.kernel_arguments import place_of, view_of
 from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
 
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
@@ -37,10 +38,16 @@ class ArmView:
     weights: FloatArray
 
     @classmethod
-    def of(cls, body: BodyModel, camera: Camera, weights: FloatArray) -> ArmView:
-        """Return the view of ``body`` before a working camera, pitched as it stands."""
+    def of(
+        cls, body: BodyModel, camera: Camera, weights: FloatArray, lifts_shoulders: bool
+    ) -> ArmView:
+        """Return the view of ``body`` before a working camera, pitched as it stands.
+
+        With ``lifts_shoulders`` they rise with the arms as in the whole-body filter by default.
+        """
         px_per_m = float(camera.fx) / body.placement.distance_m
-        return cls(_lengths(body), place_of(body), view_of(camera), px_per_m, weights)
+        lengths = _lengths(body, lifts_shoulders)
+        return cls(lengths, place_of(body), view_of(camera), px_per_m, weights)
 
     def project(
         self, torsos: FloatArray, arms: FloatArray, side: str
@@ -111,7 +118,8 @@ def torsos_of(postures: FloatArray) -> FloatArray:
     return torsos
 
 
-def _lengths(body: BodyModel) -> kernels.LengthsTuple:
+def _lengths(body: BodyModel, lifts_shoulders: bool) -> kernels.LengthsTuple:
+    girdle = WholeBodyCostConfig()
     parts = body_parts(body.sizes)
     return tuple(
         kernels.Lengths(
@@ -127,5 +135,8 @@ def _lengths(body: BodyModel) -> kernels.LengthsTuple:
             parts.head.top_width_m,
             parts.head.height_m,
             parts.waist.height_m,
+            girdle.clavicle * body.size("shoulder_breadth"),
+            girdle.lift_gain if lifts_shoulders else 0.0,
+            float(np.radians(girdle.lift_from_deg)),
         )
     )

@@ -8,7 +8,7 @@ and the optical frame as in ``cost/kernels.py``.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import acos, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,10 +19,10 @@ from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
 # The forearm's patch: where it begins and ends, as fractions of elbow to fist (then comes the
 # hand), and its width as a fraction of the forearm's, for a wider one samples what lies beside.
 _BEGIN, _END, _WIDTH = 0.04, 0.76, 0.7
-_ALONG, _ACROSS = 6, 3
+_POINTS = (6, 3)
 # The hand's patch: a fist is nearly as long as wide, and its middle lies before the forearm's end.
 _HAND_LENGTH_M, _HAND_WIDTH_M, _HAND_BEFORE_END_M = 0.09, 0.075, 0.02
-_HAND_ALONG, _HAND_ACROSS = 4, 3
+_HAND_POINTS = (4, 3)
 # Half of a hand's gain goes where the other forearm covers it: the pixels are one hand's only.
 _CLAIM = 0.5
 # How far from the axis of the other forearm it, or its hand, still covers anything.
@@ -38,7 +38,11 @@ _inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 class Lengths(NamedTuple):
-    """Lengths of a body, metres; a plain tuple to the kernels."""
+    """Lengths of a body, metres, and how its shoulders rise; a plain tuple to the kernels.
+
+    ``clavicle`` is the radius of the circle on which the girdle lifts a shoulder joint, by
+    ``lift_gain`` times the elevation of the upper arm beyond ``lift_from``, rad.
+    """
 
     shoulder_aside: float
     shoulder_height: float
@@ -52,9 +56,13 @@ class Lengths(NamedTuple):
     head_width: float
     head_height: float
     waist_height: float
+    clavicle: float
+    lift_gain: float
+    lift_from: float
 
 
 LengthsTuple = tuple[float, ...]
+Pair = tuple[float, float]
 
 
 @_inline
@@ -166,17 +174,11 @@ def project_arms(
     points: Any,
     hidden: Any,
 ) -> None:
-    """Write where arms are in the image.
+    """Write where arms are in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
 
-    Args:
-        torsos: (N, 6), or (1, 6) for all arms.
-        arms: (N, 4), rad.
-        side: 1 for the left arm, -1 for the right.
-        lengths: of the body.
-        place: where the hips are.
-        view: the camera.
-        points: (N, 2, 3), written: u, v, px a metre of elbow and hand (the forearm's end).
-        hidden: (N,), written: whether the hand is behind the torso.
+    Points are u, v, px a metre of elbow and hand (the forearm's end) of ``arms`` (N, 4), rad, at
+    ``torsos`` (N, 6), or (1, 6) for all of them; hidden is a hand behind the torso. ``side`` is 1
+    for left arms, -1 for right ones.
     """
     body = Lengths(*lengths)
     torso, upper, fore = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -185,9 +187,17 @@ def project_arms(
         if i == 0 or torsos.shape[0] > 1:
             _torso_pose(torsos[i], place, view, torso, hip)
         _turn_limb(torso, side * arms[i, 0], arms[i, 1], upper)
+        aside, height = body.shoulder_aside, body.shoulder_height
+        if body.lift_gain > 0.0:
+            upright = 0.0
+            for c in range(3):
+                upright += upper[c, 2] * torso[c, 2]
+            elevation = acos(min(max(upright, -1.0), 1.0))
+            lift = body.lift_gain * max(elevation - body.lift_from, 0.0)
+            aside -= body.clavicle * (1.0 - cos(lift))
+            height += body.clavicle * sin(lift)
         for c in range(3):
-            aside = side * body.shoulder_aside * torso[c, 1]
-            joint[c] = hip[c] + aside + body.shoulder_height * torso[c, 2]
+            joint[c] = hip[c] + side * aside * torso[c, 1] + height * torso[c, 2]
             joint[c] -= body.upper_arm * upper[c, 2]
         _turn_limb(upper, side * arms[i, 2], arms[i, 3], fore)
         for j in range(2):
@@ -208,29 +218,20 @@ def project_arms(
 
 
 @_compile
-def _mean(
-    ratios: Any,
-    u: float,
-    v: float,
-    du: float,
-    dv: float,
-    wu: float,
-    wv: float,
-    along: int,
-    across: int,
-) -> float:
-    """Mean of ``ratios`` (h, w) over along x across points of a patch centred at (u, v).
+def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
+    """Mean of ``ratios`` (h, w) over a grid of so many points, along and across, of a patch.
 
-    (du, dv) is half the patch along the limb, (wu, wv) half of it across; outside is 0.
+    ``half`` is half the patch along the limb, ``aside`` half of it across, px; outside is 0.
     """
     h, w = ratios.shape
+    along, across = points
     total = 0.0
     for i in range(along):
         s = (2.0 * i + 1.0) / along - 1.0
         for j in range(across):
             t = (2.0 * j + 1.0) / across - 1.0
-            x = int(u + s * du + t * wu + 0.5)
-            y = int(v + s * dv + t * wv + 0.5)
+            x = int(centre[0] + s * half[0] + t * aside[0] + 0.5)
+            y = int(centre[1] + s * half[1] + t * aside[1] + 0.5)
             if 0 <= x < w and 0 <= y < h:
                 total += ratios[y, x]
     return total / (along * across)
@@ -290,17 +291,18 @@ def arm_gains(
         au, av = (du / length, dv / length) if length > 1e-6 else (0.0, 1.0)
         along, across = 0.5 * _HAND_LENGTH_M * per_m, 0.5 * _HAND_WIDTH_M * per_m
         before = _HAND_BEFORE_END_M / forearm_m
-        u, v = hu - before * du, hv - before * dv
-        du_hand, dv_hand, across_u, across_v = au * along, av * along, -av * across, au * across
-        hand = _mean(maps[0], u, v, du_hand, dv_hand, across_u, across_v, _HAND_ALONG, _HAND_ACROSS)
+        centre = (hu - before * du, hv - before * dv)
+        half, aside = (au * along, av * along), (-av * across, au * across)
+        hand = _mean(maps[0], centre, half, aside, _HAND_POINTS)
         if hand > 0.0:
             other = others[i if others.shape[0] > 1 else 0]
             hand *= 1.0 - _CLAIM * _claimed(hu, hv, other, u0, v0)
         gains[i] += weights[0] * hand * _HAND_LENGTH_M * _HAND_WIDTH_M * px_per_m**2
         middle, reach = 0.5 * (_BEGIN + _END), 0.5 * (_END - _BEGIN)
         across = 0.5 * _WIDTH * width_m * per_m
-        u, v, across_u, across_v = eu + middle * du, ev + middle * dv, -av * across, au * across
-        forearm = _mean(maps[1], u, v, reach * du, reach * dv, across_u, across_v, _ALONG, _ACROSS)
+        centre = (eu + middle * du, ev + middle * dv)
+        half, aside = (reach * du, reach * dv), (-av * across, au * across)
+        forearm = _mean(maps[1], centre, half, aside, _POINTS)
         # A forearm that points to the camera shows less: its length in the image counts.
         area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
         gains[i] += weights[1] * forearm * area_m2 * px_per_m**2

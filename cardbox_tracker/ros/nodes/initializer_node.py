@@ -126,17 +126,13 @@ class InitializerNode(CardboxNode):
             Guidance(self._guide.show, self._capture, self._wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
             )
-            if self._camera is None:
+            if (camera := self._camera) is None:
                 raise InitializationError(
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
                     "silhouettes from the background node, which publishes it"
                 )
             result = initialize_body(
-                references.captured,
-                self._camera,
-                settings.config(),
-                self._progress,
-                references.images,
+                references.captured, camera, settings.config(), self._progress, references.images
             )
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
