@@ -18,7 +18,12 @@ from rosbags.typesys import Stores, get_typestore
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
-from cardbox_tracker.vision.encodings import decode_bgr, decode_compressed, decode_grey
+from cardbox_tracker.vision.encodings import (
+    decode_as_sent,
+    decode_bgr,
+    decode_compressed,
+    decode_grey,
+)
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
@@ -46,7 +51,7 @@ class BagImage:
 
     stamp_ns: int
     frame_id: str
-    _decode: Callable[[bool], NDArray[np.uint8]]
+    _decode: Callable[[bool | None], NDArray[np.uint8]]
 
     @property
     def grey(self) -> NDArray[np.uint8]:
@@ -57,6 +62,11 @@ class BagImage:
     def color(self) -> NDArray[np.uint8]:
         """Colours (H, W, 3) uint8, bgr."""
         return self._decode(False)
+
+    @property
+    def as_sent(self) -> NDArray[np.uint8]:
+        """Colours (H, W, 3), bgr, if the camera has them, else brightness (H, W), uint8."""
+        return self._decode(None)
 
 
 class BagReader:
@@ -226,11 +236,13 @@ def _reason(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def _decoder(image: Any) -> Callable[[bool], NDArray[np.uint8]]:
-    def decode(grey: bool) -> NDArray[np.uint8]:
+def _decoder(image: Any) -> Callable[[bool | None], NDArray[np.uint8]]:
+    decoders = {True: decode_grey, False: decode_bgr, None: decode_as_sent}
+
+    def decode(grey: bool | None) -> NDArray[np.uint8]:
         if not hasattr(image, "encoding"):
             return decode_compressed(image.data, grey)
-        return (decode_grey if grey else decode_bgr)(
+        return decoders[grey](
             image.data,
             image.height,
             image.width,

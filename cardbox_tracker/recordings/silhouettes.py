@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background import BackgroundConfig, brightness_of
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
@@ -97,11 +97,11 @@ class SilhouetteSource:
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
-        for _, time_s, brightness in self._images():
+        for _, time_s, image in self._images():
             if time_s > background.end_s:
                 break
             if background.contains(time_s):
-                self._pipeline.learn(brightness)
+                self._pipeline.learn(image)
         count = self._pipeline.learned_images
         if count < 2:
             raise BagError(
@@ -112,12 +112,12 @@ class SilhouetteSource:
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
-        for stamp_ns, time_s, brightness in self._images():
+        for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
                 break
             if time_s >= start_s:
-                silhouette = self._pipeline.silhouette(brightness)
-                yield Frame(stamp_ns, time_s, brightness, silhouette)
+                silhouette = self._pipeline.silhouette(image)
+                yield Frame(stamp_ns, time_s, brightness_of(image), silhouette)
 
     def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:
         """Return the silhouettes of a span.
@@ -135,5 +135,5 @@ class SilhouetteSource:
 
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
         for image in self._bag.images():
-            brightness = self._pipeline.prepare(image.grey)
-            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness
+            prepared = self._pipeline.prepare(image.as_sent)
+            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, prepared

@@ -80,14 +80,30 @@ def decode_bgr(
     return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
 
 
-def decode_compressed(data: Any, grey: bool = True) -> ImageArray:
+def decode_as_sent(
+    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
+) -> ImageArray:
+    """Return (H, W, 3) bgr of an image with colours, (H, W) of one without: see the two above.
+
+    Raises:
+        EncodingError: the encoding is not supported, or the bytes do not fit it.
+    """
+    decode = decode_grey if encoding.startswith("mono") else decode_bgr
+    return decode(data, height, width, step, encoding, is_bigendian)
+
+
+def decode_compressed(data: Any, grey: bool | None = True) -> ImageArray:
     """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
+
+    Args:
+        data: its bytes.
+        grey: True for brightness, False for colours, None for what the image has.
 
     Raises:
         EncodingError: the bytes cannot be decoded as an image.
     """
     raw = np.frombuffer(data, np.uint8)
-    flag = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
+    flag = {True: cv2.IMREAD_GRAYSCALE, False: cv2.IMREAD_COLOR, None: cv2.IMREAD_ANYCOLOR}[grey]
     try:
         image = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
     except cv2.error:

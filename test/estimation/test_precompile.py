@@ -16,9 +16,9 @@ from cardbox_tracker.estimation.cost import kernels, row_sums
 from cardbox_tracker.estimation.filtering import particle_kernels
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
+from cardbox_tracker.vision import chroma, regions, shadows
 from cardbox_tracker.vision import foreground as contrast
-from cardbox_tracker.vision import regions
-from cardbox_tracker.vision.background import BackgroundModel, SilhouetteExtractor
+from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -27,7 +27,8 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels, contrast, regions)
+    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels)
+    modules += (contrast, regions, chroma, shadows)
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules
@@ -43,11 +44,14 @@ def test_no_image_waits_for_the_compiler(preset: str) -> None:
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
     body = BodyModel()
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
-    mean = np.full((240, 320), 90, np.float32)
-    extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
+    learner = BackgroundLearner()
+    for _ in range(2):
+        learner.add(np.full((240, 320, 3), 90, np.uint8))
+    extractor = SilhouetteExtractor(learner.model())
     tracker = Tracker(body, CAMERA, PRESETS[preset]())
     received = np.frombuffer(np.where(person > 0, 200, 90).astype(np.uint8).tobytes(), np.uint8)
-    for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
+    grey = received.reshape(240, 320)
+    for image in (grey, grey.copy(), np.dstack([grey] * 3)):
         silhouette = extractor(image)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):

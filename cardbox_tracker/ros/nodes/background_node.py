@@ -113,7 +113,7 @@ class BackgroundNode(CardboxNode):
                     f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
             return
-        full = conversions.brightness_of(message)
+        full = conversions.image_of(message)
         conversions.check_shape(full, pipeline.calibration, self._image_topic, self._info_topic)
         self._image = image = pipeline.prepare(full)
         if not pipeline.is_ready:
