@@ -112,11 +112,13 @@ class SilhouetteSource:
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
+        # From the first image on, so that a frame does not depend on where the span begins.
+        self._pipeline.restart()
         for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
                 break
+            silhouette = self._pipeline.silhouette(image)
             if time_s >= start_s:
-                silhouette = self._pipeline.silhouette(image)
                 yield Frame(stamp_ns, time_s, brightness_of(image), silhouette)
 
     def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:

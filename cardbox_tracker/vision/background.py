@@ -24,6 +24,7 @@ from cardbox_tracker.settings import check, setting
 from cardbox_tracker.vision.chroma import ChromaScore
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.light import LightFollower
 from cardbox_tracker.vision.regions import remove_small_regions
 from cardbox_tracker.vision.shadows import decide_shadows
 
@@ -122,8 +123,14 @@ class BackgroundConfig:
     )
     flicker: float = setting(
         0.1,
-        "a brightness change of the whole scene up to this fraction is compensated; 0 is off",
+        "with follow off: a brightness change of the whole scene up to this fraction is "
+        "compensated; 0 is off",
         limits=(0.0, 1.0),
+    )
+    follow: bool = setting(
+        True,
+        "follow the light of the scene: drift, automatic gain, a lamp; the person never becomes "
+        "background",
     )
     min_area: float = setting(
         0.004,
@@ -170,6 +177,10 @@ class SilhouetteExtractor:
             self._chroma = ChromaScore(
                 model.chroma, config.threshold, config.min_color_contrast, config.color_edge
             )
+        self._light: LightFollower | None = None
+        if config.follow and config.clean_up:
+            chroma = None if model.chroma is None else model.chroma.mean
+            self._light = LightFollower(model.mean, chroma)
         self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
         # Allocated once: new memory for each image takes longer than the arithmetic on it.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
@@ -192,10 +203,17 @@ class SilhouetteExtractor:
         if not config.clean_up:
             difference = np.abs(brightness - self.model.mean)
             return np.where(difference < self._limit, 0, 255).astype(np.uint8)
-        self.gain = self._scene_gain(brightness)
         signed, score = self._scratch
+        if self._light is None:
+            self.gain = self._scene_gain(brightness)
+            expected, shares = self.model.mean, (1.0, -self.gain)
+        else:
+            expected = self._light.follow(brightness)
+            self.gain = self._light.level
+            # In more light contrasts are larger, too: the limits are those of the learned light.
+            shares = 1.0 / max(self.gain, 1.0), -1.0 / max(self.gain, 1.0)
         cv2.addWeighted(
-            brightness, 1.0, self.model.mean, -self.gain, 0.0, dst=signed, dtype=cv2.CV_32F
+            brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
         )
         if config.smoothing_px > 0:
             cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
@@ -214,7 +232,15 @@ class SilhouetteExtractor:
             )
         elif colored is not None:
             foreground[colored >= 0] = 255
-        return clean_silhouette(foreground, config.min_area, config.max_hole)
+        silhouette = clean_silhouette(foreground, config.min_area, config.max_hole)
+        if self._light is not None:
+            self._light.exclude(silhouette)
+        return silhouette
+
+    def restart(self) -> None:
+        """Forget what was followed: the next image is not the one after the last."""
+        if self._light is not None:
+            self._light.restart()
 
     def _scene_gain(self, brightness: ImageArray) -> float:
         """How much brighter the whole scene is now: the person covers less than half of it."""

@@ -28,6 +28,8 @@ _NEUTRAL = 128.0
 # Dark pixels have hardly any colour: the proportion below this brightness is not trusted.
 _DARKEST = 8.0
 _RATIOS = (0.2, 1.6)
+# A channel that the camera cuts off at 255 changes the colour: it is expected from here on.
+_CUT_OFF = 245.0
 
 
 class ChromaModel(NamedTuple):
@@ -52,6 +54,15 @@ def chroma_planes(image: ImageArray) -> ImageArray:
     return planes
 
 
+def bgr_of(planes: FloatImage) -> FloatImage:
+    """Return blue, green, red (3, h, w), not cut off, of brightness, Cr and Cb (3, h, w)."""
+    brightness, red_part, blue_part = planes[0], planes[1] - _NEUTRAL, planes[2] - _NEUTRAL
+    red = brightness + 1.403 * red_part
+    blue = brightness + 1.773 * blue_part
+    green = brightness - 0.714 * red_part - 0.344 * blue_part
+    return np.stack([blue, green, red]).astype(np.float32)
+
+
 class ChromaScore:
     """Compares images with one learned :class:`ChromaModel`."""
 
@@ -69,6 +80,9 @@ class ChromaScore:
         self._mean = model.mean
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
         self._weights = np.asarray(1.0 / limits, np.float32)
+        # Beside a bright place, averaged pixels have something of it.
+        highest = cv2.dilate(bgr_of(model.mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))
+        self._brightest = np.asarray(highest, np.float32).reshape(model.mean.shape[1:])
         self._edge = np.float32(edge)
         self._scratch = tuple(np.empty(model.mean.shape[1:], np.float32) for _ in range(2))
 
@@ -76,18 +90,19 @@ class ChromaScore:
         """Return a margin (H, W) for a bgr image (H, W, 3): not negative where it is foreground."""
         height, width = image.shape[:2]
         score, highest = self._scratch
-        _score(chroma_planes(image), self._mean, self._weights, score)
+        _score(chroma_planes(image), self._mean, self._brightest, self._weights, score)
         cv2.dilate(score, _WINDOW, dst=highest)
         _margin(score, highest, self._edge)
         return np.asarray(cv2.resize(score, (width, height)), np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _score(planes: Any, mean: Any, weights: Any, score: Any) -> None:
+def _score(planes: Any, mean: Any, brightest: Any, weights: Any, score: Any) -> None:
     """Distance of each pixel's chroma from the background's, in units of its limit."""
     neutral = np.float32(_NEUTRAL)
     darkest = np.float32(_DARKEST)
     lowest, highest = np.float32(_RATIOS[0]), np.float32(_RATIOS[1])
+    cut_off, zero = np.float32(_CUT_OFF), np.float32(0)
     height, width = score.shape
     for v in range(height):
         for u in range(width):
@@ -97,7 +112,8 @@ def _score(planes: Any, mean: Any, weights: Any, score: Any) -> None:
             blue = np.float32(planes[2, v, u]) - neutral - ratio * (mean[2, v, u] - neutral)
             red *= weights[0, v, u]
             blue *= weights[1, v, u]
-            score[v, u] = np.sqrt(red * red + blue * blue)
+            distance = np.sqrt(red * red + blue * blue)
+            score[v, u] = distance if ratio * brightest[v, u] < cut_off else zero
 
 
 @njit(cache=True, nogil=True)

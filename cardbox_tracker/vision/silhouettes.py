@@ -119,6 +119,11 @@ class SilhouettePipeline:
             raise RuntimeError("no background is learned yet; call finish_learning() first")
         return self._extractor(image)
 
+    def restart(self) -> None:
+        """Say that the next image is not the one after the last, so that no light is followed."""
+        if self._extractor is not None:
+            self._extractor.restart()
+
     def drift(self, image: ImageArray) -> float:
         """Return how much brighter a prepared image is than the background, grey levels.
 

@@ -13,7 +13,7 @@ from cardbox_tracker.vision.background import (
     BackgroundLearner,
     SilhouetteExtractor,
 )
-from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, chroma_planes
+from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, bgr_of, chroma_planes
 
 H, W = 120, 160
 PERSON = (slice(30, 110), slice(60, 100))
@@ -75,6 +75,15 @@ def test_another_brightness_is_no_colour(factor: float) -> None:
     assert score((scene() * factor).astype(np.uint8)).max() < 0
 
 
+def test_planes_turn_back_into_channels() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (20, 20, 3)).astype(np.uint8)
+    planes = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb).astype(np.float32).transpose(2, 0, 1)
+    within = ((planes[1:] > 0) & (planes[1:] < 255)).all(axis=0)
+    np.testing.assert_allclose(
+        bgr_of(planes)[:, within], image.transpose(2, 0, 1)[:, within], atol=2
+    )
+
+
 def test_grey_images_still_work_before_a_background_in_colour() -> None:
     grey = cv2.cvtColor(scene((40, 40, 40)), cv2.COLOR_BGR2GRAY)
     assert wrong(extractor()(grey)) <= 8
@@ -110,6 +119,8 @@ def test_equal_to_numpy(seed: int, shape: tuple[int, int], edge: float) -> None:
     ratio = np.clip(planes[0] / np.maximum(mean[0], 8), 0.2, 1.6)
     apart = planes[1:] - 128 - ratio * (mean[1:] - 128)
     score = np.hypot(*(apart / np.maximum(2 * stddev[1:], 7)))
+    brightest = cv2.dilate(bgr_of(mean).max(axis=0), np.ones((3, 3), np.uint8))
+    score[ratio * brightest.reshape(score.shape) >= 245] = 0
     highest = cv2.dilate(score, np.ones((7, 7), np.uint8)).reshape(score.shape)
     margin = np.minimum(score - 1, score - edge * highest).astype(np.float32)
     expected = np.asarray(cv2.resize(margin, shape[::-1])).reshape(shape)

@@ -70,9 +70,9 @@ def test_dark_clothes_in_noise_stay() -> None:
 def test_what_is_darker_than_a_shadow_can_be_is_the_person() -> None:
     # Across the whole image from bright to half as bright, without any edge.
     picture = np.tile(np.linspace(LEVEL, LEVEL / 2, W), (H, 1)).round().astype(np.uint8)
-    found = extractor(darkest_shadow=0.4, flicker=0.0)(picture)
+    found = extractor(darkest_shadow=0.4, follow=False, flicker=0.0)(picture)
     assert not found[:, : int(0.75 * W)].any() and found[:, int(0.85 * W) :].all()
-    assert not extractor(darkest_shadow=0.6, flicker=0.0)(picture).any()
+    assert not extractor(darkest_shadow=0.6, follow=False, flicker=0.0)(picture).any()
 
 
 def plain(

@@ -168,7 +168,9 @@ class BackgroundNode(CardboxNode):
                 "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
                 "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
             )
-        if abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS or self._covered > _COVERAGE_TO_WARN:
+        follows = self.parameters.value.follow and self.parameters.value.clean_up
+        drifted = not follows and abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS
+        if drifted or self._covered > _COVERAGE_TO_WARN:
             advice.append(
                 "the whole scene changed its brightness: switch the camera's automatic exposure "
                 "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "

@@ -54,6 +54,7 @@ class BackgroundParameters(NodeParameters):
     color_edge: float = shared(BackgroundConfig, "color_edge")
     edge: float = shared(BackgroundConfig, "edge")
     flicker: float = shared(BackgroundConfig, "flicker")
+    follow: bool = shared(BackgroundConfig, "follow")
     min_area: float = shared(BackgroundConfig, "min_area")
     max_hole: float = shared(BackgroundConfig, "max_hole")
 
