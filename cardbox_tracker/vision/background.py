@@ -129,8 +129,8 @@ class BackgroundConfig:
     )
     follow: bool = setting(
         True,
-        "follow the light of the scene: drift, automatic gain, a lamp; the person never becomes "
-        "background",
+        "follow the light of the scene: drift, automatic gain and white balance, a lamp; the "
+        "person never becomes background",
     )
     min_area: float = setting(
         0.004,
@@ -175,7 +175,11 @@ class SilhouetteExtractor:
         self._chroma: ChromaScore | None = None
         if model.chroma is not None and config.color:
             self._chroma = ChromaScore(
-                model.chroma, config.threshold, config.min_color_contrast, config.color_edge
+                model.chroma,
+                config.threshold,
+                config.min_color_contrast,
+                config.color_edge,
+                config.follow,
             )
         self._light: LightFollower | None = None
         if config.follow and config.clean_up:

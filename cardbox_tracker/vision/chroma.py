@@ -30,6 +30,9 @@ _DARKEST = 8.0
 _RATIOS = (0.2, 1.6)
 # A channel that the camera cuts off at 255 changes the colour: it is expected from here on.
 _CUT_OFF = 245.0
+# Pixels whose medians say how the white balance has changed, and the strongest change.
+_SAMPLES = 1200
+_STRONGEST_CAST = 0.2
 
 
 class ChromaModel(NamedTuple):
@@ -67,7 +70,12 @@ class ChromaScore:
     """Compares images with one learned :class:`ChromaModel`."""
 
     def __init__(
-        self, model: ChromaModel, threshold: float, min_contrast: float, edge: float
+        self,
+        model: ChromaModel,
+        threshold: float,
+        min_contrast: float,
+        edge: float,
+        follow: bool = False,
     ) -> None:
         """Prepare the limits of every pixel.
 
@@ -76,6 +84,7 @@ class ChromaScore:
             threshold: standard deviations from which on a difference counts.
             min_contrast: smallest difference that counts, grey levels.
             edge: fraction of the highest score nearby that the outline is put at.
+            follow: allow for a white balance that has changed.
         """
         self._mean = model.mean
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
@@ -84,20 +93,41 @@ class ChromaScore:
         highest = cv2.dilate(bgr_of(model.mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))
         self._brightest = np.asarray(highest, np.float32).reshape(model.mean.shape[1:])
         self._edge = np.float32(edge)
+        self._follow = follow
+        step = max(1, round((model.mean[0].size / _SAMPLES) ** 0.5))
+        self._grid = (slice(None), slice(step // 2, None, step), slice(step // 2, None, step))
+        self._known = self._mean[self._grid]
         self._scratch = tuple(np.empty(model.mean.shape[1:], np.float32) for _ in range(2))
 
     def __call__(self, image: ImageArray) -> FloatImage:
         """Return a margin (H, W) for a bgr image (H, W, 3): not negative where it is foreground."""
         height, width = image.shape[:2]
         score, highest = self._scratch
-        _score(chroma_planes(image), self._mean, self._brightest, self._weights, score)
+        planes = chroma_planes(image)
+        cast = self._cast(planes) if self._follow else (np.float32(0), np.float32(0))
+        _score(planes, self._mean, self._brightest, self._weights, cast, score)
         cv2.dilate(score, _WINDOW, dst=highest)
         _margin(score, highest, self._edge)
         return np.asarray(cv2.resize(score, (width, height)), np.float32)
 
+    def _cast(self, planes: ImageArray) -> tuple[np.float32, np.float32]:
+        """Cr and Cb that the white balance has added, as shares of the brightness.
+
+        Medians over the image: the person covers less than half of it.
+        """
+        now = planes[self._grid].astype(np.float32)
+        brightness = np.maximum(now[0], _DARKEST)
+        ratio = now[0] / np.maximum(self._known[0], _DARKEST)
+        added = now[1:] - _NEUTRAL - ratio * (self._known[1:] - _NEUTRAL)
+        shares = (added / brightness).reshape(2, -1)
+        middle = shares.shape[1] // 2
+        shares = np.partition(shares, middle, axis=1)[:, middle]
+        red, blue = np.clip(shares, -_STRONGEST_CAST, _STRONGEST_CAST).astype(np.float32)
+        return red, blue
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _score(planes: Any, mean: Any, brightest: Any, weights: Any, score: Any) -> None:
+def _score(planes: Any, mean: Any, brightest: Any, weights: Any, cast: Any, score: Any) -> None:
     """Distance of each pixel's chroma from the background's, in units of its limit."""
     neutral = np.float32(_NEUTRAL)
     darkest = np.float32(_DARKEST)
@@ -110,6 +140,8 @@ def _score(planes: Any, mean: Any, brightest: Any, weights: Any, score: Any) -> 
             ratio = min(max(ratio, lowest), highest)
             red = np.float32(planes[1, v, u]) - neutral - ratio * (mean[1, v, u] - neutral)
             blue = np.float32(planes[2, v, u]) - neutral - ratio * (mean[2, v, u] - neutral)
+            red -= cast[0] * np.float32(planes[0, v, u])
+            blue -= cast[1] * np.float32(planes[0, v, u])
             red *= weights[0, v, u]
             blue *= weights[1, v, u]
             distance = np.sqrt(red * red + blue * blue)

@@ -7,8 +7,11 @@ pixels outside the person, so that nobody who stands still becomes background.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cardbox_tracker.vision.chroma import bgr_of
@@ -16,8 +19,8 @@ from cardbox_tracker.vision.chroma import bgr_of
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-# Light is estimated on an image smaller by this factor.
-_SHRINK = 4
+# Light is estimated from every fourth pixel of every fourth row.
+_GRID = (slice(1, None, 4), slice(1, None, 4))
 # Cells of the coarse field, and the standard deviation of its smoothing in cells.
 _CELLS = (20, 15)
 _SMOOTHING_CELLS = 2.0
@@ -37,6 +40,9 @@ _STEP = 0.04
 _SETTLING = 8
 # Share of the pixels that must be known to be background.
 _ENOUGH = 0.15
+# Weight of no change, as a share of a cell's pixels.
+_DOUBT = 0.02
+_LEAST = 1e-3
 _KERNEL = np.ones((5, 5), np.uint8)
 # More of the image than a person covers: the light has changed, not the scene.
 _COVERAGE = 0.5
@@ -56,11 +62,8 @@ class LightFollower:
             mean: brightness of the background, (H, W).
             chroma: brightness, Cr and Cb of it at any resolution, (3, h, w); None: it is grey.
         """
-        height, width = mean.shape
-        self._size = (max(width // _SHRINK, 1), max(height // _SHRINK, 1))
-        small = cv2.resize(mean, self._size, interpolation=cv2.INTER_AREA)
-        self._small = np.asarray(small, np.float32).reshape(self._size[::-1])
-        self._usable = self._small > _DARKEST
+        self._small = np.ascontiguousarray(mean[_GRID], np.float32)
+        self._size = self._small.shape[1], self._small.shape[0]
         self._mean = mean
         self._now = np.empty_like(mean)
         channels = mean[None]
@@ -69,10 +72,14 @@ class LightFollower:
             channels = bgr_of(np.stack([mean, *planes]))
         self._channels = channels.reshape(len(channels), -1)
         self._brightest = self._channels.max(axis=0)
-        brightest = cv2.resize(
-            self._brightest.reshape(mean.shape), self._size, interpolation=cv2.INTER_AREA
+        brightest = self._brightest.reshape(mean.shape)[_GRID]
+        # Ratios of dark pixels are noise: they are never taken as background.
+        self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
+            np.float32
         )
-        self._small_brightest = brightest.reshape(self._size[::-1])
+        self._highest = float(self._brightest.max())
+        self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
+        self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)
         self.restart()
 
     def restart(self) -> None:
@@ -80,7 +87,7 @@ class LightFollower:
         self.level = 1.0
         self._field = np.ones(_CELLS[::-1], np.float32)
         self._fine = np.ones(self._size[::-1], np.float32)
-        self._person = np.zeros(self._size[::-1], bool)
+        self._person = np.zeros(self._size[::-1], np.uint8)
         self._settling = 0
         self._started = False
 
@@ -101,7 +108,7 @@ class LightFollower:
     def _cut_off(self) -> None:
         """Let no channel of what is expected be brighter than a camera can tell."""
         factor = self.level * float(self._field.max())
-        if factor * float(self._brightest.max()) < _BRIGHTEST:
+        if factor * self._highest < _BRIGHTEST:
             return
         where = np.flatnonzero(self._brightest > _BRIGHTEST / factor)
         now = self._now.ravel()
@@ -110,21 +117,29 @@ class LightFollower:
         now[where] = _WEIGHTS @ channels if len(channels) == 3 else channels[0]
 
     def _estimate(self, brightness: ImageArray) -> None:
-        small = cv2.resize(brightness, self._size, interpolation=cv2.INTER_AREA)
-        small = small.reshape(self._size[::-1]).astype(np.float32)
-        ratio = small / np.maximum(self._small, np.float32(1))
-        known = self._usable & (ratio * self._small_brightest < _BRIGHTEST)
-        if not known.any():
+        small = np.ascontiguousarray(brightness[_GRID])
+        parts = small, self._small, self._small_brightest
+        ratios = self._ratios
+        count = collect_ratios(*parts, self._fine, self._person, ratios)
+        if count < _ENOUGH * ratios.size:
+            count = collect_ratios(*parts, self._fine, np.zeros_like(self._person), ratios)
+        if count == 0:
             return
-        outside = known & ~self._person
-        if np.count_nonzero(outside) < _ENOUGH * outside.size:
-            outside = known
-        level = float(np.median((ratio / self._fine)[outside]))
-        if self._started and abs(level / max(self.level, 1e-3) - 1.0) > _STEP:
+        level = max(float(np.partition(ratios[:count], count // 2)[count // 2]), _LEAST)
+        if self._started and abs(level / self.level - 1.0) > _STEP:
             self._settling = _SETTLING
         self._started = True
-        self.level = max(level, 1e-3)
-        self._adapt(np.asarray(ratio / self.level, np.float32), outside)
+        self.level = level
+        person, rate, tolerance, around = self._person, _RATE, _TOLERANCE, self._fine
+        if self._settling > 0:
+            # The person may have moved since.
+            person = cv2.dilate(self._person, _KERNEL).reshape(person.shape)
+            rate, tolerance, around = 1.0, _TOLERANCE_AFTER_STEP, np.ones_like(self._fine)
+        sum_cells(*parts, around, person, level, tolerance, self._cells)
+        change, weight = (cv2.GaussianBlur(c, (0, 0), _SMOOTHING_CELLS) for c in self._cells)
+        # Where nothing is known, there is no change.
+        self._field += np.float32(rate) * (1.0 + change / (weight + _DOUBT) - self._field)
+        self._fine = cv2.resize(self._field, self._size).reshape(small.shape)
 
     def exclude(self, silhouette: ImageArray) -> None:
         """Take the person's place (H, W) from the silhouette found in the last image."""
@@ -133,28 +148,68 @@ class LightFollower:
         if self._settling > 0:
             self._settling -= 1
             return
-        small = cv2.resize(silhouette, self._size, interpolation=cv2.INTER_AREA)
-        person = (small.reshape(self._size[::-1]) > 0).astype(np.uint8)
-        self._person = cv2.dilate(person, _KERNEL).reshape(self._size[::-1]) > 0
-
-    def _adapt(self, relative: FloatImage, outside: NDArray[np.bool_]) -> None:
-        if self._settling > 0:
-            # The person may have moved since.
-            wider = cv2.dilate(self._person.astype(np.uint8), _KERNEL).reshape(outside.shape)
-            near, rate, tolerance = wider > 0, 1.0, _TOLERANCE_AFTER_STEP
-            usable = outside & ~near & (np.abs(relative - 1.0) < tolerance)
-        else:
-            rate, tolerance = _RATE, _TOLERANCE
-            usable = outside & (np.abs(relative / self._fine - 1.0) < tolerance)
-        weights = usable.astype(np.float32)
-        change = (relative - 1.0) * weights
-        cells = [_coarse(one) for one in (change, weights)]
-        # Where nothing is known, there is no change.
-        estimate = 1.0 + cells[0] / (cells[1] + 0.02)
-        self._field += np.float32(rate) * (estimate - self._field)
-        self._fine = cv2.resize(self._field, self._size).reshape(outside.shape)
+        person = np.ascontiguousarray(silhouette[_GRID])
+        self._person = cv2.dilate(person, _KERNEL).reshape(person.shape)
 
 
-def _coarse(values: FloatImage) -> FloatImage:
-    cells = cv2.resize(values, _CELLS, interpolation=cv2.INTER_AREA)
-    return np.asarray(cv2.GaussianBlur(cells, (0, 0), _SMOOTHING_CELLS), np.float32)
+@njit(cache=True, nogil=True, error_model="numpy")
+def collect_ratios(
+    small: Any, mean: Any, brightest: Any, field: Any, person: Any, ratios: Any
+) -> Any:
+    """Write how bright the background's pixels are as a factor of expected; return how many.
+
+    Args:
+        small: brightness of an image, (h, w) uint8.
+        mean: brightness of the background.
+        brightest: its brightest channel; infinite where it is not to be used.
+        field: what is expected of each pixel as a factor of the level.
+        person: not 0 where the person is.
+        ratios: result, h * w numbers at least.
+    """
+    count = 0
+    height, width = small.shape
+    for v in range(height):
+        for u in range(width):
+            ratio = np.float32(small[v, u]) / max(mean[v, u], np.float32(1))
+            if person[v, u] == 0 and ratio * brightest[v, u] < _BRIGHTEST:
+                ratios[count] = ratio / field[v, u]
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sum_cells(
+    small: Any,
+    mean: Any,
+    brightest: Any,
+    around: Any,
+    person: Any,
+    level: Any,
+    tolerance: Any,
+    cells: Any,
+) -> None:
+    """Write the mean change of each cell times its share of usable pixels, and that share.
+
+    Args:
+        small: as for :func:`collect_ratios`, like the next two.
+        mean: brightness of the background.
+        brightest: its brightest channel.
+        around: factors of the level that background lies around, (h, w).
+        person: not 0 where the person is.
+        level: brightness of the scene as a factor.
+        tolerance: a pixel farther from ``around`` than this fraction is not used.
+        cells: result, (2, rows, columns).
+    """
+    cells[:] = 0
+    height, width = small.shape
+    rows, columns = cells.shape[1:]
+    share = np.float32(rows * columns / (height * width))
+    for v in range(height):
+        for u in range(width):
+            ratio = np.float32(small[v, u]) / max(mean[v, u], np.float32(1))
+            relative = np.float32(ratio / level)
+            known = person[v, u] == 0 and ratio * brightest[v, u] < _BRIGHTEST
+            if known and abs(relative / around[v, u] - 1) < tolerance:
+                row, column = v * rows // height, u * columns // width
+                cells[0, row, column] += share * (relative - 1)
+                cells[1, row, column] += share

@@ -16,7 +16,7 @@ from cardbox_tracker.estimation.cost import kernels, row_sums
 from cardbox_tracker.estimation.filtering import particle_kernels
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
-from cardbox_tracker.vision import chroma, regions, shadows
+from cardbox_tracker.vision import chroma, light, regions, shadows
 from cardbox_tracker.vision import foreground as contrast
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
@@ -28,7 +28,7 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels)
-    modules += (contrast, regions, chroma, shadows)
+    modules += (contrast, regions, chroma, shadows, light)
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules

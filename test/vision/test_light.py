@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from cardbox_tracker.vision.background import (
     BackgroundConfig,
     BackgroundLearner,
     SilhouetteExtractor,
 )
-from cardbox_tracker.vision.light import LightFollower
+from cardbox_tracker.vision.light import LightFollower, collect_ratios, sum_cells
 
 H, W = 120, 160
 PERSON = (slice(30, 120), slice(60, 95))
@@ -31,14 +33,14 @@ def truth() -> np.ndarray:
 class Room:
     """A textured wall, learned in its first light, then images of it in other lights."""
 
-    def __init__(self, grey: bool, seed: int = 0, **settings: object) -> None:
+    def __init__(self, grey: bool, seed: int = 0, **config: object) -> None:
         self.rng = np.random.default_rng(seed)
         self.grey = grey
         self.wall = WALL * self.rng.uniform(0.9, 1.1, (H, W, 1))
         learner = BackgroundLearner()
         for _ in range(20):
             learner.add(self.image(1.0, None))
-        self.extractor = SilhouetteExtractor(learner.model(), BackgroundConfig(**settings))  # type: ignore[arg-type]
+        self.extractor = SilhouetteExtractor(learner.model(), BackgroundConfig(**config))  # type: ignore[arg-type]
 
     def image(self, light: Factor, person: np.ndarray | None) -> np.ndarray:
         made = self.wall.copy()
@@ -117,6 +119,16 @@ def test_a_channel_that_is_cut_off_is_expected() -> None:
         assert np.count_nonzero(found) < 0.02 * H * W
 
 
+def test_another_white_balance_is_followed() -> None:
+    room = Room(grey=False)
+    balance = np.array([0.85, 1.0, 1.15])
+    room.wall = room.wall * balance
+    assert min(room.iou(1.0, SHIRT * balance) for _ in range(5)) > 0.93
+    rigid = Room(grey=False, follow=False)
+    rigid.wall = rigid.wall * balance
+    assert rigid.iou(1.0, SHIRT * balance) < 0.5
+
+
 def test_a_scene_wholly_covered_or_black_does_no_harm() -> None:
     room = Room(grey=False)
     for value in (0, 255, 128):
@@ -142,3 +154,24 @@ def test_the_level_by_hand() -> None:
     assert follower.level == 1.0
     dark = LightFollower(np.full((H, W), 2, np.float32))
     np.testing.assert_allclose(dark.follow(np.full((H, W), 4, np.uint8)), 2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.tuples(st.integers(1, 30), st.integers(1, 40)))
+def test_the_sums_are_those_of_numpy(seed: int, shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(seed)
+    small = rng.integers(0, 256, shape, np.uint8)
+    mean, brightest = rng.uniform(0, 255, (2, *shape)).astype(np.float32)
+    field = rng.uniform(0.7, 1.4, shape).astype(np.float32)
+    person = (rng.random(shape) < 0.3).astype(np.uint8)
+    ratio = small / np.maximum(mean, np.float32(1))
+    known = (person == 0) & (ratio * brightest < 250)
+    ratios = np.zeros(small.size, np.float32)
+    count = collect_ratios(small, mean, brightest, field, person, ratios)
+    np.testing.assert_allclose(ratios[:count], (ratio / field)[known], rtol=1e-5)
+    cells = np.empty((2, 3, 4), np.float32)
+    sum_cells(small, mean, brightest, field, person, 1.2, 0.4, cells)
+    used = known & (np.abs(ratio / 1.2 / field - 1) < 0.4)
+    share = 12 / small.size
+    assert cells[1].sum() == pytest.approx(share * used.sum(), abs=1e-3)
+    assert cells[0].sum() == pytest.approx(share * (ratio / 1.2 - 1)[used].sum(), abs=1e-2)
