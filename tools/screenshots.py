@@ -86,7 +86,7 @@ def _shots(
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
     span = segments["neutral"].start_s, max(moments.values()) + 1.0
-    for frame in source.frames(*span, images=True):
+    for frame in source.frames(*span):
         estimate = tracker.track(frame.silhouette, frame.image)
         for motion, time_s in moments.items():
             if motion not in overlays and frame.time_s >= time_s - 1e-6:

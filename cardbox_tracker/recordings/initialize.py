@@ -9,7 +9,6 @@ from cardbox_tracker.estimation.initialization.config import (
     InitializationResult,
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
-from cardbox_tracker.estimation.initialization.part_colors import LEARNED_FROM
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
@@ -32,7 +31,7 @@ def initialize_from_recording(
     """
     references, images = {}, {}
     for name, span in spans.items():
-        frames = source.held(span, name, images=name in LEARNED_FROM)
+        frames = source.held(span, name)
         references[name] = average_silhouette([frame.silhouette for frame in frames])
         every = -(-len(frames) // _MOST_IMAGES)
         images[name] = [frame.image for frame in frames[::every] if frame.image is not None]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, CardboxError
-from cardbox_tracker.recordings.bag_reader import BagImage, BagReader
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.vision.background import BackgroundConfig, brightness_of
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
@@ -100,11 +100,11 @@ class SilhouetteSource:
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
-        for _, time_s, brightness, _ in self._images():
+        for _, time_s, image in self._images():
             if time_s > background.end_s:
                 break
             if background.contains(time_s):
-                self._pipeline.learn(brightness)
+                self._pipeline.learn(image)
         count = self._pipeline.learned_images
         if count < 2:
             raise BagError(
@@ -113,31 +113,24 @@ class SilhouetteSource:
             )
         self._pipeline.finish_learning()
 
-    def frames(
-        self, start_s: float = 0.0, end_s: float = float("inf"), *, images: bool = False
-    ) -> Iterator[Frame]:
-        """Yield every image from ``start_s`` to ``end_s``, in order, none left out.
-
-        Args:
-            start_s: seconds from the bag's start.
-            end_s: the same; the end belongs to the span.
-            images: fill in ``Frame.image``, too.
-        """
-        for stamp_ns, time_s, brightness, of_bag in self._images():
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
+        """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
+        # From the first image on, so that a frame does not depend on where the span begins.
+        self._pipeline.restart()
+        for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
                 break
+            silhouette = self._pipeline.silhouette(image)
             if time_s >= start_s:
-                silhouette = self._pipeline.silhouette(brightness)
-                image = self._pipeline.prepare(of_bag.as_sent) if images else None
-                yield Frame(stamp_ns, time_s, brightness, silhouette, image)
+                yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
 
-    def held(self, span: TimeSpan, what: str, *, images: bool = False) -> list[Frame]:
+    def held(self, span: TimeSpan, what: str) -> list[Frame]:
         """Return the frames of a span in which a posture is held.
 
         Raises:
             CardboxError: no image lies in it; the text names ``what``.
         """
-        found = list(self.frames(*span, images=images))
+        found = list(self.frames(*span))
         if not found:
             raise CardboxError(
                 f"no image lies in the {what} span {span} s of a bag of "
@@ -145,7 +138,7 @@ class SilhouetteSource:
             )
         return found
 
-    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8], BagImage]]:
+    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
         for image in self._bag.images():
-            brightness = self._pipeline.prepare(image.grey)
-            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, brightness, image
+            prepared = self._pipeline.prepare(image.as_sent)
+            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, prepared

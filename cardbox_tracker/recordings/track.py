@@ -112,7 +112,7 @@ def track_recording(
 def _estimates(
     source: SilhouetteSource, tracker: Tracker, start_s: float
 ) -> Iterator[tuple[Frame, Estimate]]:
-    for frame in source.frames(start_s, images=bool(tracker.config.terms)):
+    for frame in source.frames(start_s):
         yield frame, tracker.track(frame.silhouette, frame.image)
 
 

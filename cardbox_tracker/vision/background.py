@@ -7,7 +7,8 @@ of the empty scene. A pixel of a later image I_t is foreground where
 
 with a threshold of 2. A pixel that happened to be free of noise while learning has a sigma near 0
 and would fire on a single grey level, so sigma_B has a floor. The rule alone flags one noisy pixel
-in twenty; a clean-up follows, which can be turned off.
+in twenty; a clean-up follows, which can be turned off. Images in colour add a comparison of their
+chroma, and soft shadows are told from dark clothes.
 """
 
 from __future__ import annotations
@@ -20,16 +21,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.settings import check, setting
+from cardbox_tracker.vision.chroma import ChromaScore
+from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.light import LightFollower
 from cardbox_tracker.vision.regions import remove_small_regions
+from cardbox_tracker.vision.shadows import decide_shadows
 
-FloatImage = NDArray[np.float32]
+__all__ = [
+    "BackgroundConfig",
+    "BackgroundLearner",
+    "BackgroundModel",
+    "SilhouetteExtractor",
+    "brightness_of",
+    "clean_silhouette",
+    "warm_up",
+]
+
 ImageArray = NDArray[np.uint8]
 
 # The smallest kernel that closes a gap of one pixel, in all eight directions.
 _CLOSING_KERNEL = np.ones((3, 3), np.uint8)
 # Pixels whose median says how bright the scene is: its error is about 4 % of their spread.
 _BRIGHTNESS_SAMPLES = 1000
+# A fraction of a darker brightness than this is all noise, grey levels.
+_DARKEST = 8.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +87,33 @@ class BackgroundConfig:
         "the person; 0 is off",
         limits=(0.0, 1.0),
     )
+    soft_shadow: float = setting(
+        0.07,
+        "a darker pixel is also a shadow where the brightness relative to the background changes "
+        "by less than this fraction within 5x5 px, all the way from the background; 0 is off",
+        limits=(0.0, 1.0),
+    )
+    darkest_shadow: float = setting(
+        0.4,
+        "a pixel that is darker than the background by more than this fraction is no soft shadow",
+        limits=(0.0, 1.0),
+    )
+    color: bool = setting(
+        True,
+        "a pixel is also foreground if its colour differs; only for images in colour",
+    )
+    min_color_contrast: float = setting(
+        7.0,
+        "a colour difference (Cr, Cb) below this is never foreground",
+        unit="grey levels",
+        limits=(0.1, 255.0),
+    )
+    color_edge: float = setting(
+        0.45,
+        "a colour difference is dropped if it is less than this fraction of the largest within "
+        "6 px, because JPEG smears colours over an outline",
+        limits=(0.0, 1.0),
+    )
     # Smoothing spreads a strong contrast beyond the outline.
     edge: float = setting(
         0.35,
@@ -80,8 +123,14 @@ class BackgroundConfig:
     )
     flicker: float = setting(
         0.1,
-        "a brightness change of the whole scene up to this fraction is compensated; 0 is off",
+        "with follow off: a brightness change of the whole scene up to this fraction is "
+        "compensated; 0 is off",
         limits=(0.0, 1.0),
+    )
+    follow: bool = setting(
+        True,
+        "follow the light of the scene: drift, automatic gain and white balance, a lamp; the "
+        "person never becomes background",
     )
     min_area: float = setting(
         0.004,
@@ -103,52 +152,6 @@ class BackgroundConfig:
         check(self)
 
 
-@dataclass(frozen=True)
-class BackgroundModel:
-    """Mean and standard deviation of the empty scene's brightness, each (H, W) float32."""
-
-    mean: FloatImage
-    stddev: FloatImage
-
-
-class BackgroundLearner:
-    """Averages images of the empty scene, one at a time (Welford's algorithm)."""
-
-    def __init__(self) -> None:
-        """Start with nothing learned."""
-        self.count = 0
-        self._mean: FloatImage | None = None
-        self._squares: FloatImage | None = None
-
-    def add(self, brightness: NDArray[np.uint8] | FloatImage) -> None:
-        """Learn from one image (H, W).
-
-        Raises:
-            ValueError: its size differs from that of the images before it.
-        """
-        image = np.asarray(brightness, dtype=np.float32)
-        if self._mean is None or self._squares is None:
-            self._mean = np.zeros_like(image)
-            self._squares = np.zeros_like(image)
-        if image.shape != self._mean.shape:
-            raise ValueError(f"image has shape {image.shape}, those before it {self._mean.shape}")
-        self.count += 1
-        delta = image - self._mean
-        self._mean += delta / self.count
-        self._squares += delta * (image - self._mean)
-
-    def model(self) -> BackgroundModel:
-        """Return what was learned.
-
-        Raises:
-            ValueError: fewer than two images were added.
-        """
-        if self._mean is None or self._squares is None or self.count < 2:
-            raise ValueError(f"{self.count} images learned; a deviation needs two or more")
-        stddev = np.sqrt(self._squares / (self.count - 1))
-        return BackgroundModel(self._mean.copy(), stddev.astype(np.float32))
-
-
 class SilhouetteExtractor:
     """Cuts the person out of images before one learned background."""
 
@@ -166,15 +169,36 @@ class SilhouetteExtractor:
         step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
+        # As far as three standard deviations; OpenCV's own choice is wider and takes longer.
+        size = 2 * math.ceil(3 * config.smoothing_px) + 1
+        self._kernel_size = (size, size)
+        self._chroma: ChromaScore | None = None
+        if model.chroma is not None and config.color:
+            self._chroma = ChromaScore(
+                model.chroma,
+                config.threshold,
+                config.min_color_contrast,
+                config.color_edge,
+                config.follow,
+            )
+        self._light: LightFollower | None = None
+        if config.follow and config.clean_up:
+            chroma = None if model.chroma is None else model.chroma.mean
+            self._light = LightFollower(model.mean, chroma)
+        self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
         # Allocated once: new memory for each image takes longer than the arithmetic on it.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
-    def __call__(self, brightness: ImageArray) -> ImageArray:
-        """Return the silhouette (H, W) of ``brightness`` (H, W): 255 for the person, else 0.
+    def __call__(self, image: ImageArray) -> ImageArray:
+        """Return the silhouette (H, W) of an image: 255 for the person, else 0.
+
+        Args:
+            image: brightness (H, W), or bgr (H, W, 3).
 
         Raises:
             ValueError: the image's size is not the background's.
         """
+        brightness = brightness_of(image)
         if brightness.shape != self.model.mean.shape:
             raise ValueError(
                 f"image has shape {brightness.shape}, the background {self.model.mean.shape}"
@@ -183,15 +207,44 @@ class SilhouetteExtractor:
         if not config.clean_up:
             difference = np.abs(brightness - self.model.mean)
             return np.where(difference < self._limit, 0, 255).astype(np.uint8)
-        self.gain = self._scene_gain(brightness)
         signed, score = self._scratch
+        if self._light is None:
+            self.gain = self._scene_gain(brightness)
+            expected, shares = self.model.mean, (1.0, -self.gain)
+        else:
+            expected = self._light.follow(brightness)
+            self.gain = self._light.level
+            # In more light contrasts are larger, too: the limits are those of the learned light.
+            shares = 1.0 / max(self.gain, 1.0), -1.0 / max(self.gain, 1.0)
         cv2.addWeighted(
-            brightness, 1.0, self.model.mean, -self.gain, 0.0, dst=signed, dtype=cv2.CV_32F
+            brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
         )
         if config.smoothing_px > 0:
-            cv2.GaussianBlur(signed, (0, 0), config.smoothing_px, dst=signed)
+            cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
         foreground = segment_foreground(signed, self._brighter, self._darker, config.edge, score)
-        return clean_silhouette(foreground, config.min_area, config.max_hole)
+        colored = None
+        if self._chroma is not None and image.ndim == 3:
+            colored = self._chroma(image)
+        if config.soft_shadow > 0:
+            decide_shadows(
+                foreground,
+                signed,
+                self._per_level,
+                colored,
+                config.darkest_shadow,
+                config.soft_shadow,
+            )
+        elif colored is not None:
+            foreground[colored >= 0] = 255
+        silhouette = clean_silhouette(foreground, config.min_area, config.max_hole)
+        if self._light is not None:
+            self._light.exclude(silhouette)
+        return silhouette
+
+    def restart(self) -> None:
+        """Forget what was followed: the next image is not the one after the last."""
+        if self._light is not None:
+            self._light.restart()
 
     def _scene_gain(self, brightness: ImageArray) -> float:
         """How much brighter the whole scene is now: the person covers less than half of it."""
@@ -207,8 +260,12 @@ class SilhouetteExtractor:
 
 def warm_up() -> None:
     """Cut one silhouette, so that no live image waits for the compiler."""
-    model = BackgroundModel(np.zeros((8, 8), np.float32), np.ones((8, 8), np.float32))
-    SilhouetteExtractor(model)(np.zeros((8, 8), np.uint8))
+    learner = BackgroundLearner()
+    for _ in range(2):
+        learner.add(np.full((16, 16, 3), 90, np.uint8))
+    extractor = SilhouetteExtractor(learner.model())
+    extractor(np.zeros((16, 16), np.uint8))
+    extractor(np.zeros((16, 16, 3), np.uint8))
 
 
 def clean_silhouette(foreground: ImageArray, min_area: float, max_hole: float) -> ImageArray:

@@ -14,6 +14,7 @@ from cardbox_tracker.vision.background import (
     BackgroundLearner,
     BackgroundModel,
     SilhouetteExtractor,
+    brightness_of,
 )
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.resize import to_working_size
@@ -89,9 +90,9 @@ class SilhouettePipeline:
         small = to_working_size(image, *self._size)
         return small if self._rectifier is None else self._rectifier(small)
 
-    def learn(self, brightness: ImageArray) -> None:
-        """Add a prepared image (H, W) of the empty scene."""
-        self._learner.add(brightness)
+    def learn(self, image: ImageArray) -> None:
+        """Add a prepared image, grey (H, W) or bgr (H, W, 3), of the empty scene."""
+        self._learner.add(image)
 
     def finish_learning(self) -> BackgroundModel:
         """Learn the background from the images added; later images are compared with it.
@@ -108,22 +109,27 @@ class SilhouettePipeline:
         self._learner = BackgroundLearner()
         self._extractor = None
 
-    def silhouette(self, brightness: ImageArray) -> ImageArray:
-        """Return the silhouette (H, W), 0 or 255, of a prepared image (H, W).
+    def silhouette(self, image: ImageArray) -> ImageArray:
+        """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
 
         Raises:
             RuntimeError: no background is learned yet.
         """
         if self._extractor is None:
             raise RuntimeError("no background is learned yet; call finish_learning() first")
-        return self._extractor(brightness)
+        return self._extractor(image)
 
-    def drift(self, brightness: ImageArray) -> float:
-        """Return how much brighter a prepared image (H, W) is than the background, grey levels.
+    def restart(self) -> None:
+        """Say that the next image is not the one after the last, so that no light is followed."""
+        if self._extractor is not None:
+            self._extractor.restart()
+
+    def drift(self, image: ImageArray) -> float:
+        """Return how much brighter a prepared image is than the background, grey levels.
 
         The median over the image, since the person covers less than half of it; 0 before a
         background is learned.
         """
         if self._extractor is None:
             return 0.0
-        return float(np.median(brightness - self._extractor.model.mean))
+        return float(np.median(brightness_of(image) - self._extractor.model.mean))

@@ -23,9 +23,9 @@ from cardbox_tracker.estimation.cost import (
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
+from cardbox_tracker.vision import chroma, light, regions, shadows
 from cardbox_tracker.vision import foreground as contrast
-from cardbox_tracker.vision import regions
-from cardbox_tracker.vision.background import BackgroundModel, SilhouetteExtractor
+from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -35,14 +35,9 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (
-from cardbox_tracker.estimation.cost import (
-    inner_cue_kernels,
-    kernels,
-    pose_prior,
-    row_sums,
-    whole_body_kernels,
-)
-from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
+        *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
+        *(particle_kernels, whole_body_moves),
+        *(contrast, regions, chroma, shadows, light),
     )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
@@ -58,24 +53,22 @@ def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
-from cardbox_tracker.estimation.cost import (
-    inner_cue_kernels,
-    kernels,
-    pose_prior,
-    row_sums,
-    whole_body_kernels,
-)
-from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
+    assert before["cardbox_tracker.estimation.cost.inner_cue_kernels.ratio_maps"] > 0
+    levels = np.random.default_rng(0).integers(0, 255, (5, bins_of(channels))).astype(np.uint8)
+    body = BodyModel.of(appearance=Appearance(levels, np.full(channels, 100.0)))
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
-    mean = np.full((240, 320), 90, np.float32)
-    extractor = SilhouetteExtractor(BackgroundModel(mean, np.full_like(mean, 2)))
+    shape = (240, 320) if channels == 1 else (240, 320, channels)
+    learner = BackgroundLearner()
+    for _ in range(2):
+        learner.add(np.full(shape, 90, np.uint8))
+    extractor = SilhouetteExtractor(learner.model())
     tracker = Tracker(body, CAMERA, PRESETS[preset]())
     received = np.frombuffer(np.where(person > 0, 200, 90).astype(np.uint8).tobytes(), np.uint8)
     for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
-        silhouette = extractor(image)
-        read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
         seen = image if channels == 1 else np.repeat(image[..., None], 3, axis=2)
         seen.setflags(write=image.flags.writeable)
+        silhouette = extractor(seen)
+        read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
             state = tracker.track(pixels, seen).state
         assert state == TRACKING

@@ -69,7 +69,7 @@ def test_silhouettes_are_the_person_and_the_empty_scene_has_none(
 def test_images_come_with_the_silhouettes_when_asked_for(source: SilhouetteSource) -> None:
     """This recording is grey, so an image is its brightness."""
     assert next(source.frames(7.0)).image is None
-    frame = next(source.frames(7.0, images=True))
+    frame = next(source.frames(7.0))
     assert frame.image is not None
     np.testing.assert_array_equal(frame.image, frame.brightness)
 
@@ -83,7 +83,7 @@ def test_images_of_a_camera_with_colours_have_them(tmp_path: Path) -> None:
             bag.write_image("/image_raw", number * 10**8, "optical", pixels, "rgb8")
     with BagReader(tmp_path / "bag") as reader:
         colours = SilhouetteSource(reader, TimeSpan(0, 0.25), size=(64, 48))
-        frame = next(colours.frames(0.3, images=True))
+        frame = next(colours.frames(0.3))
     assert frame.image is not None
     np.testing.assert_array_equal(frame.image, pixels[:, :, ::-1])
 

@@ -153,16 +153,16 @@ def test_a_shadow_is_not_the_person() -> None:
 @pytest.mark.parametrize("gain", [0.94, 1.06])
 def test_a_scene_that_flickers_stays_background(gain: float) -> None:
     model = flat(200, 2)
-    extractor = SilhouetteExtractor(model)
+    extractor = SilhouetteExtractor(model, BackgroundConfig(follow=False))
     got = extractor(image(200 * gain, 100 * gain))
     assert extractor.gain == pytest.approx(gain, abs=1e-6)
     assert np.count_nonzero(got != person_mask()) <= 8
-    rigid = SilhouetteExtractor(model, BackgroundConfig(flicker=0.0, shadow=0.0))
+    rigid = SilhouetteExtractor(model, BackgroundConfig(follow=False, flicker=0.0, shadow=0.0))
     assert np.all(rigid(image(200 * gain)) == 255)
 
 
 def test_a_larger_change_than_flicker_is_not_followed() -> None:
-    extractor = SilhouetteExtractor(flat(100, 2))
+    extractor = SilhouetteExtractor(flat(100, 2), BackgroundConfig(follow=False))
     extractor(image(130))
     assert extractor.gain == 1.0
 

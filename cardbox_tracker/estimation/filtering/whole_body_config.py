@@ -105,7 +105,7 @@ class WholeBodyConfig:
         0.6, "factor on the noise from one round to the next", limits=(0.0, 1.0), restarts=True
     )
     home_rate: float = setting(
-        0.05,
+        0.02,
         "how fast the home of the torso's x follows it, a frame",
         limits=(0.0, 1.0),
         restarts=True,

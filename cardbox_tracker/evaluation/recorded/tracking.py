@@ -63,7 +63,7 @@ def track_session(
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
-        for frame in source.frames(session.start_s + offset_s, images=bool(config.terms)):
+        for frame in source.frames(session.start_s + offset_s):
             for tracker, estimates, spent in zip(trackers, found, times, strict=True):
                 if tracker is None:
                     continue

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError, EncodingError
 from cardbox_tracker.vision.camera import Calibration, Camera
-from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed, decode_grey
+from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed
 
 ImageArray = NDArray[np.uint8]
 
@@ -25,24 +25,6 @@ ImageArray = NDArray[np.uint8]
 def stamp_ns(stamp: Time) -> int:
     """Return a stamp in nanoseconds."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
-
-
-def brightness_of(message: Image | CompressedImage) -> ImageArray:
-    """Return the brightness (H, W) of an image message.
-
-    Raises:
-        EncodingError: the encoding is not supported or the bytes do not match it.
-    """
-    if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, grey=True)
-    return decode_grey(
-        message.data,
-        message.height,
-        message.width,
-        message.step,
-        message.encoding,
-        bool(message.is_bigendian),
-    )
 
 
 def image_of(message: Image | CompressedImage) -> ImageArray:
@@ -130,12 +112,12 @@ def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Im
 def check_shape(
     image: ImageArray, calibration: Calibration, image_topic: str, info_topic: str
 ) -> None:
-    """Check that an image (H, W) has the aspect ratio of its calibration.
+    """Check that an image, (H, W) or (H, W, 3), has the aspect ratio of its calibration.
 
     Raises:
         CameraError: it has not, so that the CameraInfo is not that of the image.
     """
-    height, width = image.shape
+    height, width = image.shape[:2]
     if abs(width * calibration.height - height * calibration.width) > max(width, height):
         raise CameraError(
             f"the images on {image_topic} are {width}x{height} but {info_topic} describes "

@@ -114,13 +114,13 @@ class BackgroundNode(CardboxNode):
                     f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
             return
-        full = conversions.brightness_of(message)
+        full = conversions.image_of(message)
         conversions.check_shape(full, pipeline.calibration, self._image_topic, self._info_topic)
         self._image = image = pipeline.prepare(full)
         if not pipeline.is_ready:
             self._learn_from(message.header, pipeline, image)
         if pipeline.is_ready:
-            self._publish(message, pipeline, image)
+            self._publish(message.header, pipeline, image)
             self.diagnostics.working(sent_ns)
 
     def _learn_from(
@@ -139,19 +139,14 @@ class BackgroundNode(CardboxNode):
         self.get_logger().info(f"background learned from {pipeline.learned_images} images")
 
     def _publish(
-        self,
-        message: Image | CompressedImage,
-        pipeline: SilhouettePipeline,
-        brightness: conversions.ImageArray,
+        self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
-        header = message.header
         if self._images.get_subscription_count():
             # Before the silhouette, so that nobody who needs both has to wait.
-            image = conversions.image_of(message)
-            small = brightness if image.ndim == 2 else pipeline.prepare(image)
-            self._images.publish(conversions.image_message(header, small))
-        silhouette = pipeline.silhouette(brightness)
-        # The image first, so that the tracker does not wait for a CameraInfo that rarely changes.
+            self._images.publish(conversions.image_message(header, image))
+        silhouette = pipeline.silhouette(image)
+        # The silhouette first, so that the tracker does not wait for a CameraInfo that rarely
+        # changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size
@@ -178,7 +173,9 @@ class BackgroundNode(CardboxNode):
                 "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
                 "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
             )
-        if abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS or self._covered > _COVERAGE_TO_WARN:
+        follows = self.parameters.value.follow and self.parameters.value.clean_up
+        drifted = not follows and abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS
+        if drifted or self._covered > _COVERAGE_TO_WARN:
             advice.append(
                 "the whole scene changed its brightness: switch the camera's automatic exposure "
                 "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "

@@ -46,7 +46,7 @@ def test_padded_rows_are_read() -> None:
     message = Image(height=2, width=3, step=4, encoding="mono8", data=bytes(range(8)))
     expected = [[0, 1, 2], [4, 5, 6]]
     np.testing.assert_array_equal(conversions.silhouette_of(message), expected)
-    np.testing.assert_array_equal(conversions.brightness_of(message), expected)
+    np.testing.assert_array_equal(conversions.image_of(message), expected)
 
 
 @pytest.mark.parametrize(
@@ -69,10 +69,11 @@ def test_a_malformed_silhouette_is_refused(
         assert word in str(caught.value)
 
 
-def test_compressed_image_becomes_brightness() -> None:
-    image = np.full((24, 32), 120, np.uint8)
+@pytest.mark.parametrize("size", [(24, 32), (24, 32, 3)])
+def test_a_compressed_image_keeps_the_colours_it_has(size: tuple[int, ...]) -> None:
+    image = np.full(size, 120, np.uint8)
     data = cv2.imencode(".jpg", image)[1].tobytes()
-    got = conversions.brightness_of(CompressedImage(format="jpeg", data=data))
+    got = conversions.image_of(CompressedImage(format="jpeg", data=data))
     np.testing.assert_allclose(got, image, atol=2)
 
 

@@ -1,0 +1,224 @@
+"""Compare silhouettes with the true ones of recorded sessions, before and after an improvement.
+
+python -m tools.silhouette_report --sessions DIR... --output docs/evaluation/silhouettes.md
+
+A session is a folder with ``bag/``, ``ground_truth.json`` and ``masks.npz``. "Before" is brightness
+alone without following the light (``color: false``, ``soft_shadow: 0``, ``follow: false``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
+from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.silhouettes import SilhouettePipeline
+
+Image = NDArray[np.uint8]
+Light = Callable[[float], float]
+
+AFTER = BackgroundConfig()
+BEFORE = replace(AFTER, color=False, soft_shadow=0.0, follow=False)
+# At the ends of the empty scene, somebody may be about to come in.
+_MARGIN_S = 0.2
+# A smaller part of the image is no person to be compared.
+_LEAST = 0.004
+_LIMBS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
+_STEP_S = 6.0
+
+
+def _lamp(time_s: float) -> float:
+    return 1.35 if int(time_s / _STEP_S) % 2 else 1.0
+
+
+def _steps(time_s: float) -> float:
+    return (1.0, 0.8, 1.25, 0.65, 1.1)[int(time_s / _STEP_S) % 5]
+
+
+def _drift(time_s: float) -> float:
+    return 1.0 + 0.3 * float(np.sin(2 * np.pi * time_s / 60.0))
+
+
+LIGHTS: dict[str, Light] = {
+    "drift of 30 % in a minute": _drift,
+    "lamp: 35 % brighter, on or off every 6 s": _lamp,
+    "gain steps between 0.65 and 1.25 every 6 s": _steps,
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """Figures of one image: NaN where there is no person."""
+
+    time_s: float
+    segment: str
+    iou: float
+    missing: float
+    extra: float
+    limbs: float
+
+
+def read_masks(path: Path) -> NDArray[np.bool_]:
+    """Return the true masks (N, H, W) at the working size."""
+    with np.load(path) as stored:
+        count, height, width = (int(value) for value in stored["shape"])
+        bits = np.unpackbits(stored["packed"], axis=1)[:, : height * width]
+    masks = bits.reshape(count, height, width)
+    if (width, height) == WORKING_SIZE:
+        return masks > 0
+    small = [cv2.resize(255 * m, WORKING_SIZE, interpolation=cv2.INTER_AREA) for m in masks]
+    return np.array(small) >= 128
+
+
+def limb_pixels(joints: dict[str, Any], scale: float) -> Image:
+    """Return forearms and hands (H, W), as wide as 0.4 of the longest limb in the picture."""
+    points = np.array([joints[name] for name in _LIMBS], float) * scale
+    image = np.zeros(WORKING_SIZE[::-1], np.uint8)
+    if np.isnan(points).any():
+        return image
+    parts = ((0, 3), (0, 1), (1, 2), (3, 4), (4, 5))
+    longest = max(float(np.linalg.norm(points[a] - points[b])) for a, b in parts)
+    corners = np.clip(points, -2000, 2000).round().astype(int).tolist()
+    for start, end in ((1, 2), (4, 5)):
+        cv2.line(image, corners[start], corners[end], 255, max(3, round(0.4 * longest)))
+    return image
+
+
+def images_of(folder: Path, light: Light | None) -> Iterator[tuple[float, Image]]:
+    """Yield the images of a session, in another light if asked for, and their times."""
+    with BagReader(folder / "bag") as bag:
+        for image in bag.images():
+            time_s = (image.stamp_ns - bag.start_ns) / 1e9
+            sent = image.as_sent
+            if light is not None:
+                sent = np.clip(sent * np.float32(light(time_s)) + 0.5, 0, 255).astype(np.uint8)
+            yield time_s, sent
+
+
+def rows_of(folder: Path, config: BackgroundConfig, light: Light | None = None) -> list[Row]:
+    """Compare every image of a session after its empty scene."""
+    truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
+    masks = read_masks(folder / "masks.npz")
+    empty = next(s for s in truth["segments"] if s["name"] == "empty")
+    with BagReader(folder / "bag") as bag:
+        calibration = bag.calibration()
+    pipeline = SilhouettePipeline(calibration, WORKING_SIZE, config)
+    scale = WORKING_SIZE[0] / float(truth["camera"]["width"])
+    rows = []
+    for number, (time_s, image) in enumerate(images_of(folder, light)):
+        prepared = pipeline.prepare(image)
+        if time_s <= empty["end_s"] - _MARGIN_S:
+            if time_s >= empty["start_s"] + _MARGIN_S:
+                pipeline.learn(prepared)
+            continue
+        if not pipeline.is_ready:
+            pipeline.finish_learning()
+        frame = truth["frames"][number]
+        limbs = limb_pixels(frame["joints_px"], scale) > 0 if "joints_px" in frame else None
+        found = pipeline.silhouette(prepared) > 0
+        rows.append(_compare(time_s, frame["segment"], found, masks[number], limbs))
+    return rows
+
+
+def _compare(
+    time_s: float,
+    segment: str,
+    found: NDArray[np.bool_],
+    mask: NDArray[np.bool_],
+    limbs: NDArray[np.bool_] | None,
+) -> Row:
+    size = np.count_nonzero(mask)
+    if size < _LEAST * mask.size:
+        return Row(time_s, segment, *[float("nan")] * 4)
+    both = np.count_nonzero(found & mask)
+    either = np.count_nonzero(found | mask)
+    recall = float("nan")
+    if limbs is not None and np.count_nonzero(limbs & mask) > 30:
+        recall = np.count_nonzero(limbs & mask & found) / np.count_nonzero(limbs & mask)
+    return Row(time_s, segment, both / either, 1 - both / size, (either - size) / size, recall)
+
+
+def mean(rows: list[Row], figure: str) -> float:
+    """Return the mean of a figure over the images that have it."""
+    values = np.array([getattr(row, figure) for row in rows], float)
+    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
+
+
+def soon_after(rows: list[Row]) -> float:
+    """Return the mean IoU 2 s after each step of the light, over half a second."""
+    chosen = [r for r in rows if r.time_s > _STEP_S and 2.0 <= r.time_s % _STEP_S < 2.5]
+    return mean(chosen, "iou")
+
+
+def session_lines(before: list[Row], after: list[Row], name: str) -> Iterator[str]:
+    """Yield the table's lines of one session: all of it, then each segment."""
+    for segment in (None, *dict.fromkeys(row.segment for row in after)):
+        pair = [[r for r in rows if segment in (None, r.segment)] for rows in (before, after)]
+        if not np.isfinite(mean(pair[1], "iou")):
+            continue
+        cells = [f"**{name}**" if segment is None else f"{segment}"]
+        for figure in ("iou", "missing", "extra", "limbs"):
+            cells += [f"{mean(rows, figure):.3f}" for rows in pair]
+        yield "| " + " | ".join(cells) + " |"
+
+
+def report(sessions: list[Path], lit: Path | None) -> str:
+    """Return the document."""
+    columns = ("IoU", "missing", "extra", "arms found")
+    text = [
+        "# Silhouettes against the true ones",
+        "",
+        "Made by `python -m tools.silhouette_report`. Over all images with a person after the "
+        "empty scene. *Missing* and *extra* pixels as a share of the person; *arms found*: share "
+        "of the true pixels along forearms and hands. Before: brightness alone, light not "
+        "followed (`color: false`, `soft_shadow: 0`, `follow: false`); after: the defaults.",
+        "",
+        "| session, segment | " + " | ".join(f"{c} before | after" for c in columns) + " |",
+        "|---|" + "---|" * 8,
+    ]
+    means: list[tuple[list[Row], list[Row]]] = []
+    for folder in sessions:
+        before, after = rows_of(folder, BEFORE), rows_of(folder, AFTER)
+        means.append((before, after))
+        text += session_lines(before, after, folder.name)
+        print("\n".join(session_lines(before, after, folder.name)).splitlines()[0], flush=True)
+    figures = ("iou", "missing", "extra", "limbs")
+    cells = [f"{np.nanmean([mean(p[k], f) for p in means]):.3f}" for f in figures for k in (0, 1)]
+    text.append(f"| **mean of {len(sessions)} sessions** | " + " | ".join(cells) + " |")
+    if lit is not None:
+        text += ["", f"## `{lit.name}` in changing light", ""]
+        text += ["IoU over all images, and 2 to 2.5 s after each step.", ""]
+        text += ["| light | before | after | after, 2 s after a step |", "|---|---|---|---|"]
+        for name, light in LIGHTS.items():
+            before, after = rows_of(lit, BEFORE, light), rows_of(lit, AFTER, light)
+            late = "-" if light is _drift else f"{soon_after(after):.3f}"
+            line = f"| {name} | {mean(before, 'iou'):.3f} | {mean(after, 'iou'):.3f} | {late} |"
+            text.append(line)
+            print(line, flush=True)
+    return "\n".join(text) + "\n"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the document."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
+    parser.add_argument("--sessions", type=Path, nargs="+", required=True, metavar="DIR")
+    parser.add_argument("--light", type=Path, metavar="DIR", help="session to change the light of")
+    parser.add_argument("--output", type=Path, required=True)
+    options = parser.parse_args(arguments)
+    text = report(options.sessions, options.light)
+    options.output.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
