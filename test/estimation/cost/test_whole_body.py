@@ -180,7 +180,7 @@ def test_the_torsos_prior_by_hand() -> None:
     def capped(square: float, cap: float) -> float:
         return cap * (1.0 - np.exp(-square / cap))
 
-    rest = state(d3=np.radians(3.0), x=0.1)
+    rest = state(x=0.1)
     # Half a unit of 0.2 m from home.
     home = capped(0.25, 4.0)
     assert prior(rest) == pytest.approx(home)
