@@ -2,6 +2,7 @@
 # make demo    the whole chain on a synthetic recording; results in demo_output/
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
+# make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove all that the above made
@@ -78,6 +79,14 @@ demo: setup
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
 	$(BIN)/python -m tools.readme_figures
+
+# All recorded sessions that lie beside the checkout, against their ground truth.
+DATA ?= ../shared/data
+SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json))
+.PHONY: sessions
+sessions: setup
+	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
+		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation; fi
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

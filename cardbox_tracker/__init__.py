@@ -27,11 +27,11 @@ if TYPE_CHECKING:
         RosMissingError,
     )
     from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
-    from cardbox_tracker.estimation.initialization.measure import (
+    from cardbox_tracker.estimation.initialization.config import (
         InitializationConfig,
         InitializationResult,
-        initialize_body,
     )
+    from cardbox_tracker.estimation.initialization.measure import initialize_body
     from cardbox_tracker.estimation.tracker import Estimate, Tracker
     from cardbox_tracker.vision.background import (
         BackgroundConfig,
@@ -87,11 +87,8 @@ _MODULES = {
         "RosMissingError",
     ),
     "estimation.config": ("PRESETS", "TrackerConfig"),
-    "estimation.initialization.measure": (
-        "InitializationConfig",
-        "InitializationResult",
-        "initialize_body",
-    ),
+    "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
+    "estimation.initialization.measure": ("initialize_body",),
     "estimation.tracker": ("Estimate", "Tracker"),
     "vision.background": (
         "BackgroundConfig",

@@ -3,7 +3,7 @@
 The nodes, the bag of results, the CSV file and the demo encode what stands here:
 :mod:`.ros.messages.results` as messages, :mod:`.recordings.result_bag` as messages of a bag,
 :mod:`.recordings.track` as rows. A further joint goes into ``JOINT_STATE_NAMES`` and the two
-functions after it, a further topic into ``OUTPUTS``, a further number into ``FIGURES``.
+functions after it, a further topic into ``outputs``, a further number into ``FIGURES``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
@@ -39,7 +39,13 @@ class Markers(NamedTuple):
     shapes: tuple[MarkerShape, ...]
 
 
-Value = JointValues | Points | Markers
+class Text(NamedTuple):
+    """A word."""
+
+    text: str
+
+
+Value = JointValues | Points | Markers | Text
 
 
 @dataclass(frozen=True)
@@ -51,12 +57,14 @@ class Output:
         kind: class of the values, which decides the message type.
         of: value for an estimate that has a posture; None if it has no such value.
         absent: value that says that there is no posture any more; None: nothing is sent.
+        needs_posture: False if ``of`` has a value for every estimate, which is always sent.
     """
 
     topic: str
     kind: type[Value]
     of: Callable[[Estimate, Tracker], Value | None]
     absent: Value | None = None
+    needs_posture: bool = True
 
 
 @dataclass(frozen=True)
@@ -86,19 +94,39 @@ class Figure:
         return "" if value is None else format(value, self.format)
 
 
-JOINT_STATE_NAMES: tuple[str, ...] = JOINT_NAMES
-"""Joints of ``joint_states``, in order."""
+JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES)
+"""Joints of ``joint_states``, in order: the posture's, then where the person stands."""
 
 
-def joint_values(estimate: Estimate) -> JointValues | None:
-    """Return the joints of an estimate; None without a posture."""
-    return None if estimate.posture is None else JointValues(JOINT_STATE_NAMES, estimate.posture)
+def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
+    """Return the joints of an estimate; None without a posture.
+
+    Without ``torso_place`` they are the posture's 12.
+    """
+    return _joints(estimate.posture, place_of(estimate) if torso_place else None)
 
 
-def joint_deviations(estimate: Estimate) -> JointValues | None:
+def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the standard deviation of each joint; None if it is not known."""
-    stddev = estimate.posture_stddev
-    return None if stddev is None else JointValues(JOINT_STATE_NAMES, stddev)
+    place = _or_zeros(estimate.offset_stddev_m)
+    return _joints(estimate.posture_stddev, place if torso_place else None)
+
+
+def place_of(estimate: Estimate) -> FloatArray:
+    """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 where the filter keeps them constant."""
+    return _or_zeros(estimate.offset_m)
+
+
+def _or_zeros(place_m: FloatArray | None) -> FloatArray:
+    return np.zeros(len(PLACE_NAMES)) if place_m is None else place_m
+
+
+def _joints(posture: FloatArray | None, place_m: FloatArray | None) -> JointValues | None:
+    if posture is None:
+        return None
+    if place_m is None:
+        return JointValues(JOINT_NAMES, posture)
+    return JointValues(JOINT_STATE_NAMES, np.concatenate([posture, place_m]))
 
 
 def posture_from(joints: JointValues) -> FloatArray:
@@ -107,11 +135,23 @@ def posture_from(joints: JointValues) -> FloatArray:
     Raises:
         ValueError: a joint of the posture is missing.
     """
-    by_name = dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
+    by_name = _by_name(joints)
     missing = [name for name in JOINT_NAMES if name not in by_name]
     if missing:
         raise ValueError(f"joints {', '.join(missing)} are missing")
     return np.array([by_name[name] for name in JOINT_NAMES])
+
+
+def place_from(joints: JointValues) -> FloatArray | None:
+    """Return ``torso_x`` and ``torso_z`` (2,) among named joints; None unless both are there."""
+    by_name = _by_name(joints)
+    if not by_name.keys() >= set(PLACE_NAMES):
+        return None
+    return np.array([by_name[name] for name in PLACE_NAMES])
+
+
+def _by_name(joints: JointValues) -> dict[str, float]:
+    return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
 def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
@@ -121,17 +161,34 @@ def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
 def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
-    return Markers(marker_shapes(tracker.body, tracker.camera, estimate.posture))
+    body = estimate.placed(tracker.body)
+    return Markers(marker_shapes(body, tracker.camera, estimate.posture))
 
 
-OUTPUTS: tuple[Output, ...] = (
-    Output("joint_states", JointValues, lambda estimate, _: joint_values(estimate)),
-    Output("joint_states_stddev", JointValues, lambda estimate, _: joint_deviations(estimate)),
-    Output("keypoints", Points, _keypoints),
-    # What is not removed stays in the air when the person has gone.
-    Output("markers", Markers, _markers, absent=Markers(())),
-)
-"""Topics of the tracker, in the order in which they are sent."""
+def outputs(torso_place: bool = True) -> tuple[Output, ...]:
+    """Return the topics of the tracker, in the order in which they are sent.
+
+    ``torso_place`` puts ``torso_x`` and ``torso_z`` among the joints.
+    """
+    return (
+        # First, so that who gets a posture knows already whether it may be wrong.
+        Output(
+            "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
+        ),
+        Output("joint_states", JointValues, lambda found, _: joint_values(found, torso_place)),
+        Output(
+            "joint_states_stddev",
+            JointValues,
+            lambda found, _: joint_deviations(found, torso_place),
+        ),
+        Output("keypoints", Points, _keypoints),
+        # What is not removed stays in the air when the person has gone.
+        Output("markers", Markers, _markers, absent=Markers(())),
+    )
+
+
+OUTPUTS: tuple[Output, ...] = outputs()
+"""All topics, with all joints."""
 
 FIGURES: tuple[Figure, ...] = (
     Figure("cost", "px", "d", lambda estimate: estimate.cost_px),
@@ -141,10 +198,11 @@ FIGURES: tuple[Figure, ...] = (
 
 
 class OutputStream:
-    """The values of one image after the other: a posture's, or once what says that it is gone."""
+    """The values of one image after the other: state and posture, or once that there is none."""
 
-    def __init__(self) -> None:
-        """Start before the first image."""
+    def __init__(self, topics: tuple[Output, ...] = OUTPUTS) -> None:
+        """Start before the first image; ``topics`` are those of :func:`outputs`."""
+        self._topics = topics
         self._state = ""
 
     def values(
@@ -155,11 +213,12 @@ class OutputStream:
     ) -> Iterator[tuple[Output, Value]]:
         """Yield what is to be sent of an image; what is not ``wanted`` is not computed."""
         is_new, self._state = estimate.state != self._state, estimate.state
-        for output in OUTPUTS:
-            if estimate.posture is None and not (is_new and output.absent):
+        for output in self._topics:
+            has_value = estimate.posture is not None or not output.needs_posture
+            if not has_value and not (is_new and output.absent):
                 continue
             if not wanted(output):
                 continue
-            value = output.absent if estimate.posture is None else output.of(estimate, tracker)
+            value = output.of(estimate, tracker) if has_value else output.absent
             if value is not None:
                 yield output, value

@@ -236,14 +236,19 @@ def test_each_common_complaint_has_an_entry_with_cause_and_remedy(complaint: str
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
-    from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+    from cardbox_tracker.body.posture import (
+        JOINT_LIMITS,
+        JOINT_NAMES,
+        PLACE_LIMITS,
+        PLACE_NAMES,
+    )
 
     rows = re.findall(
-        r"(?m)^\| `(\w+)`.*\| (-?\d+) to (\d+) \|$", text_of(Path("docs/conventions.md"))
+        r"(?m)^\| `(\w+)`.*\| (-?[\d.]+) to ([\d.]+) \|$", text_of(Path("docs/conventions.md"))
     )
-    limits = np.degrees(JOINT_LIMITS)
-    limits[0] = JOINT_LIMITS[0]
-    assert len(rows) == 8
+    limits = dict(zip(JOINT_NAMES, np.degrees(JOINT_LIMITS), strict=True))
+    limits["torso_y"] = JOINT_LIMITS[0]
+    limits |= dict(zip(PLACE_NAMES, PLACE_LIMITS, strict=True))
+    assert len(rows) == 10
     for name, lowest, highest in rows:
-        found = limits[JOINT_NAMES.index(name)]
-        assert (float(lowest), float(highest)) == pytest.approx(tuple(found)), name
+        assert (float(lowest), float(highest)) == pytest.approx(tuple(limits[name])), name

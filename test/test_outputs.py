@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -12,13 +13,25 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.tracker import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    Tracker,
+)
 from cardbox_tracker.outputs import (
     FIGURES,
     OUTPUTS,
     JointValues,
     Markers,
     OutputStream,
+    Text,
+    joint_deviations,
+    joint_values,
+    outputs,
+    place_from,
     posture_from,
 )
 from cardbox_tracker.vision.camera import Camera
@@ -27,7 +40,9 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TRACKER = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
 POSTURE = reference_posture("arms")
 FOUND = Estimate(TRACKING, POSTURE, np.full(12, 0.1), np.zeros((6, 3)), 812, 0.87654)
-TOPICS = ["joint_states", "joint_states_stddev", "keypoints", "markers"]
+PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
+ALL_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
+TOPICS = ["tracking_state", "joint_states", "joint_states_stddev", "keypoints", "markers"]
 
 
 def topics(stream: OutputStream, estimate: Estimate, **options: Any) -> list[str]:
@@ -40,10 +55,11 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert {output.topic: output.kind for output in OUTPUTS} == {
         topic: type(value) for topic, value in found.items()
     }
-    joints, deviations, points, markers = cast(Any, list(found.values()))
-    assert joints.names == deviations.names == JOINT_NAMES
-    np.testing.assert_array_equal(joints.values, POSTURE)
-    np.testing.assert_array_equal(deviations.values, 0.1)
+    state, joints, deviations, points, markers = cast(Any, list(found.values()))
+    assert state == Text(TRACKING)
+    assert joints.names == deviations.names == ALL_NAMES
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.0, 0.0])
+    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0, 0.0])
     assert points.points_m.shape == (6, 3)
     patches, skeleton = markers.shapes
     assert (patches.namespace, patches.kind, patches.points_m.shape) == ("patches", 11, (90, 3))
@@ -54,7 +70,45 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
 
 def test_what_is_not_known_is_not_sent() -> None:
     only_posture = Estimate(TRACKING, POSTURE)
-    assert topics(OutputStream(), only_posture) == ["joint_states", "markers"]
+    assert topics(OutputStream(), only_posture) == ["tracking_state", "joint_states", "markers"]
+
+
+def test_joints_have_the_place_after_the_posture() -> None:
+    joints, deviations = joint_values(PLACED), joint_deviations(PLACED)
+    assert joints is not None
+    assert deviations is not None
+    assert joints.names == deviations.names == ALL_NAMES
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05])
+    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.03, 0.01])
+
+
+def test_without_the_place_there_are_the_twelve_joints() -> None:
+    stream = OutputStream(outputs(torso_place=False))
+    found = {output.topic: cast(Any, value) for output, value in stream.values(PLACED, TRACKER)}
+    assert list(found) == TOPICS
+    for topic, expected in (("joint_states", POSTURE), ("joint_states_stddev", 0.1)):
+        assert found[topic].names == JOINT_NAMES
+        np.testing.assert_array_equal(found[topic].values, np.full(12, expected))
+
+
+def test_markers_are_where_the_estimate_is() -> None:
+    """0.25 m nearer is less z of a level camera, 0.05 m lower is more y."""
+    at_rest, moved = (
+        cast(Any, {o.topic: v for o, v in OutputStream().values(e, TRACKER)}["markers"])
+        for e in (FOUND, PLACED)
+    )
+    for before, after in zip(at_rest.shapes, moved.shapes, strict=True):
+        shift = np.broadcast_to((0.0, 0.05, -0.25), after.points_m.shape)
+        np.testing.assert_allclose(after.points_m - before.points_m, shift, atol=1e-12)
+
+
+def test_an_uncertain_posture_is_sent_with_its_state() -> None:
+    found = [
+        (output.topic, value)
+        for output, value in OutputStream().values(replace(FOUND, state=UNCERTAIN), TRACKER)
+    ]
+    assert found[0] == ("tracking_state", Text("uncertain"))
+    assert [topic for topic, _ in found] == TOPICS
 
 
 @pytest.mark.parametrize("state", [NO_PERSON, LOST])
@@ -62,8 +116,11 @@ def test_markers_go_once_when_the_posture_does(state: str) -> None:
     stream = OutputStream()
     topics(stream, FOUND)
     gone = list(stream.values(Estimate(state), TRACKER))
-    assert [(output.topic, value) for output, value in gone] == [("markers", Markers(()))]
-    assert topics(stream, Estimate(state)) == []
+    assert [(output.topic, value) for output, value in gone] == [
+        ("tracking_state", Text(state)),
+        ("markers", Markers(())),
+    ]
+    assert topics(stream, Estimate(state)) == ["tracking_state"]
     assert topics(stream, FOUND) == TOPICS
 
 
@@ -88,6 +145,13 @@ def test_a_posture_is_found_by_names_in_any_order(order: list[int]) -> None:
     names = ("torso_x", *(JOINT_NAMES[i] for i in order))
     values = np.concatenate([[9.0], POSTURE[order]])
     np.testing.assert_array_equal(posture_from(JointValues(names, values)), POSTURE)
+
+
+def test_the_place_is_found_by_its_names() -> None:
+    names = ("torso_z", *JOINT_NAMES, "torso_x")
+    place = place_from(JointValues(names, np.array([-0.1, *POSTURE, 0.3])))
+    np.testing.assert_array_equal(cast(Any, place), [0.3, -0.1])
+    assert place_from(JointValues(JOINT_NAMES, POSTURE)) is None
 
 
 def test_a_missing_joint_is_named() -> None:

@@ -11,11 +11,21 @@ from hypothesis import strategies as st
 
 from cardbox_tracker import settings
 from cardbox_tracker.estimation.config import FilterConfig, TrackerConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.settings import Setting, setting
 from cardbox_tracker.vision.background import BackgroundConfig
 
-CORE = (BackgroundConfig, InitializationConfig, FilterConfig, TrackerConfig)
+CORE = (
+    BackgroundConfig,
+    InitializationConfig,
+    FilterConfig,
+    TrackerConfig,
+    WholeBodyConfig,
+    WholeBodyCostConfig,
+)
+PLAIN = {TrackerConfig: {"torso", "arm", "terms", "whole_body"}, WholeBodyConfig: {"cost"}}
 
 
 @dataclass(frozen=True)
@@ -70,7 +80,7 @@ def test_only_what_must_restarts(changes: dict[str, Any], expected: bool) -> Non
 
 @pytest.mark.parametrize("kind", CORE)
 def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
-    plain = {"torso", "arm", "terms"} if kind is TrackerConfig else set()
+    plain = PLAIN.get(kind, set())
     assert {f for f in kind.__dataclass_fields__ if f not in plain} == set(
         settings.settings_of(kind)
     )

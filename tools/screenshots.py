@@ -24,8 +24,8 @@ from cardbox_tracker.drawing.guidance import draw_guidance
 from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.guidance import instruction
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
@@ -85,8 +85,9 @@ def _shots(
     frames: dict[str, Frame] = {}
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
-    for frame in source.frames(segments["neutral"].start_s, max(moments.values()) + 1.0):
-        estimate = tracker.track(frame.silhouette)
+    span = segments["neutral"].start_s, max(moments.values()) + 1.0
+    for frame in source.frames(*span):
+        estimate = tracker.track(frame.silhouette, frame.image)
         for motion, time_s in moments.items():
             if motion not in overlays and frame.time_s >= time_s - 1e-6:
                 frames[motion] = frame

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from cardbox_tracker.body.appearance import Appearance
 from cardbox_tracker.body.person import Person
 from cardbox_tracker.body.placement import CAMERA_POSE, PLACEMENT, CameraPose, Placement
 from cardbox_tracker.body.posture import SIDE_TURNS
@@ -29,6 +30,7 @@ class BodyModel:
         placement: where mid-hip is.
         camera_pose: how the camera stands.
         side_turn: the way the person turned for the side reference, ``left`` or ``right``.
+        appearance: the colours of the person's parts; None if they were not learned.
 
     Raises:
         BodyModelError: ``side_turn`` is neither.
@@ -38,6 +40,7 @@ class BodyModel:
     placement: Placement = Placement()
     camera_pose: CameraPose = CameraPose()
     side_turn: str = "left"
+    appearance: Appearance | None = None
 
     def __post_init__(self) -> None:
         """Check ``side_turn``; the parts check themselves."""
@@ -50,7 +53,8 @@ class BodyModel:
 
         Args:
             sizes: shape (18,), metres; the default sizes without it.
-            values: any of ``CONSTANTS`` and ``side_turn``; what is left out has its default.
+            values: any of ``CONSTANTS``, ``side_turn`` and ``appearance``; what is left out has
+                its default.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -62,7 +66,7 @@ class BodyModel:
         """Return the same model with other numbers.
 
         Args:
-            values: any of ``sizes``, ``CONSTANTS`` and ``side_turn``.
+            values: any of ``sizes``, ``CONSTANTS``, ``side_turn`` and ``appearance``.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.

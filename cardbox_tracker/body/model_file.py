@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 import tempfile
+import textwrap
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from cardbox_tracker.body.appearance import Appearance
 from cardbox_tracker.body.model import CONSTANTS, BodyModel
 from cardbox_tracker.body.sizes import SIZE_NAMES, SIZES
 from cardbox_tracker.errors import BodyModelError
@@ -20,6 +22,9 @@ from cardbox_tracker.errors import BodyModelError
 FORMAT = "cardbox_body_model/1"
 _UNITS = {"length": "m", "angle": "rad"}
 _TOP_KEYS = ("format", "units", *CONSTANTS, "side_turn", "sizes")
+# A file without it is complete: older ones have none, and neither have bodies given by hand.
+_APPEARANCE = "appearance"
+_LINE_LENGTH = 96
 
 
 def dumps_body_model(model: BodyModel) -> str:
@@ -35,6 +40,10 @@ def dumps_body_model(model: BodyModel) -> str:
     lines.append("sizes:")
     for size, value in zip(SIZES, model.sizes, strict=True):
         lines.append(f"  {size.name}: {_yaml_number(value)}  # {size.description}")
+    if model.appearance is not None:
+        lines.append("# colours of hand, forearm, torso, head and legs, compressed")
+        lines.append(f"{_APPEARANCE}: |")
+        lines += [f"  {line}" for line in textwrap.wrap(model.appearance.to_text(), _LINE_LENGTH)]
     return "\n".join(lines) + "\n"
 
 
@@ -126,7 +135,7 @@ class _StrictLoader(yaml.SafeLoader):
 def _from_mapping(data: object) -> BodyModel:
     if not isinstance(data, dict):
         raise BodyModelError("expected a mapping with the keys " + ", ".join(_TOP_KEYS))
-    _check_keys(data, _TOP_KEYS, "")
+    _check_keys(data, _TOP_KEYS, "", optional=(_APPEARANCE,))
     if data["format"] != FORMAT:
         raise BodyModelError(f"format is {data['format']!r}; this version reads '{FORMAT}'")
     if not isinstance(data["units"], dict):
@@ -145,13 +154,28 @@ def _from_mapping(data: object) -> BodyModel:
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
         **{name: _number(data[name], name) for name in CONSTANTS},
         side_turn=data["side_turn"],
+        appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
     )
 
 
-def _check_keys(mapping: dict[Any, Any], expected: tuple[str, ...], prefix: str) -> None:
+def _appearance(value: object) -> Appearance:
+    if not isinstance(value, str):
+        raise BodyModelError(
+            f"{_APPEARANCE} is of type {type(value).__name__}; expected a text in base64"
+        )
+    return Appearance.from_text(value)
+
+
+def _check_keys(
+    mapping: dict[Any, Any],
+    expected: tuple[str, ...],
+    prefix: str,
+    optional: tuple[str, ...] = (),
+) -> None:
+    known = (*expected, *optional)
     for key in mapping:
-        if key not in expected:
-            raise BodyModelError(f"unknown key '{prefix}{key}'; known are {', '.join(expected)}")
+        if key not in known:
+            raise BodyModelError(f"unknown key '{prefix}{key}'; known are {', '.join(known)}")
     for key in expected:
         if key not in mapping:
             raise BodyModelError(f"missing key '{prefix}{key}'")

@@ -1,8 +1,11 @@
-"""The 12 posture angles d1..d12, their limits and the three reference postures.
+"""The 12 posture angles d1..d12, the place beside them, limits and reference postures.
 
 The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
 rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
 reference frame, 0 on the optical axis.
+
+The paper keeps the person's distance and height as they were measured. Where they are estimated
+too, they are ``torso_x`` and ``torso_z``, which are no part of the posture (12,).
 """
 
 from __future__ import annotations
@@ -56,6 +59,20 @@ JOINT_LIMITS: FloatArray = np.vstack(
 )
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``)."""
 JOINT_LIMITS.setflags(write=False)
+
+PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
+"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
+
+TORSO_X_LIMIT_M = 0.9
+"""A step or two to the camera or away from it; beyond that, measure with another distance."""
+TORSO_Z_LIMIT_M = 0.3
+"""Hips move so far up and down between standing on tiptoe and bent knees."""
+
+PLACE_LIMITS: FloatArray = np.array(
+    [[-TORSO_X_LIMIT_M, TORSO_X_LIMIT_M], [-TORSO_Z_LIMIT_M, TORSO_Z_LIMIT_M]]
+)
+"""Shape (2, 2): lowest and highest value of each of ``PLACE_NAMES``, metres."""
+PLACE_LIMITS.setflags(write=False)
 
 REFERENCE_NAMES: tuple[str, ...] = ("front", "side", "arms")
 SIDE_TURNS: tuple[str, ...] = ("left", "right")

@@ -45,7 +45,7 @@ SIZES: tuple[Size, ...] = (
     Size("shoulder_drop", 0.05, -0.05, 0.20, "shoulder joint below the torso's top"),
     Size("upper_arm_length", 0.27, 0.12, 0.45, "shoulder joint to elbow joint"),
     Size("upper_arm_width", 0.10, 0.04, 0.25, "width of the upper arm"),
-    Size("forearm_length", 0.36, 0.15, 0.55, "elbow joint to the end of the fist"),
+    Size("forearm_length", 0.36, 0.15, 0.55, "elbow joint to the knuckles, where a fist ends"),
     Size("forearm_width", 0.085, 0.03, 0.22, "width of the forearm"),
 )
 

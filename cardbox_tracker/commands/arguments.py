@@ -89,6 +89,11 @@ def run_count(text: str) -> int:
     return _integer(text, 2)
 
 
+def seed_count(text: str) -> int:
+    """Return a number of seeds: 1 or more."""
+    return _integer(text, 1)
+
+
 def process_count(text: str) -> int:
     """Return a number of processes: 1 or more."""
     return _integer(text, 1)

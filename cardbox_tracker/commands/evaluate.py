@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_preset, add_seed, process_count, run_count
+from cardbox_tracker.commands.arguments import (
+    add_preset,
+    add_seed,
+    process_count,
+    run_count,
+    seed_count,
+)
 
 NAME = "evaluate"
 HELP = "repeat the paper's experiments, or compare recorded sessions with their truth"
@@ -42,10 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seeds",
-        type=run_count,
+        type=seed_count,
         default=3,
         metavar="N",
         help="with --sessions: seeds, each a run of its own, from --seed on",
+    )
+    parser.add_argument(
+        "--recovery",
+        action="store_true",
+        help="with --sessions: also measure how soon tracking is right again after disturbances",
     )
     add_preset(parser, "default")
     parser.add_argument(
@@ -87,5 +98,13 @@ def _sessions(options: argparse.Namespace, jobs: int) -> None:
 
     seeds = tuple(range(options.seed, options.seed + options.seeds))
     with progress_bar("evaluate") as show:
-        evaluate_sessions(options.sessions, options.output, options.preset, seeds, jobs, show)
+        evaluate_sessions(
+            options.sessions,
+            options.output,
+            options.preset,
+            seeds,
+            jobs,
+            options.recovery,
+            show,
+        )
     print(f"wrote {options.output}/sessions.md and {options.output}/sessions.json")

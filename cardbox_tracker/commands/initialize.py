@@ -15,7 +15,7 @@ HELP = "measure the person in a recording"
 _REFERENCES = {
     "front": "faces the camera, arms hanging 20 degrees away from the body",
     "side": "stands the same, turned by 90 degrees",
-    "arms": "faces the camera, both arms stretched sideways",
+    "arms": "faces the camera, both arms stretched sideways, hands open",
 }
 
 
@@ -63,12 +63,12 @@ def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes.
 
     Raises:
-        CardboxError: the recording cannot be read, its references give no body, or the model cannot
-            be written.
+        CardboxError: the recording cannot be read, its references show other postures than they
+            should or give no body, or the model cannot be written.
     """
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import save_body_model
-    from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+    from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.initialize import describe, initialize_from_recording

@@ -108,8 +108,9 @@ def run(options: argparse.Namespace) -> None:
                     lambda frame, *_: show((frame.time_s - options.start) / total_s),
                 ),
             )
+    doubt = f" ({summary.frames_uncertain} of them uncertain)" if summary.frames_uncertain else ""
     print(
-        f"tracked {summary.frames_tracked} of {summary.frames} images, "
+        f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
     for path in (options.csv, options.video, options.bag):

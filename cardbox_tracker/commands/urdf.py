@@ -12,6 +12,12 @@ HELP = "print the robot description (URDF) of a measured person"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox urdf``."""
     parser.add_argument("model", type=Path, metavar="MODEL.yaml", help="the person")
+    parser.add_argument(
+        "--no-torso-place",
+        dest="torso_place",
+        action="store_false",
+        help="leave out the joints torso_x and torso_z, for joint states without them",
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -23,4 +29,4 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.description.urdf import urdf_from_body
 
-    print(urdf_from_body(load_body_model(options.model)))
+    print(urdf_from_body(load_body_model(options.model), torso_place=options.torso_place))

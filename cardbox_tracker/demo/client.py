@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.outputs import OUTPUTS, posture_from
+from cardbox_tracker.outputs import OUTPUTS, place_from, posture_from
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
@@ -40,6 +40,8 @@ class Client:
         body_model: YAML text of the measured person, once it was published.
         initialization_iou: mean fit of the references, once it was published.
         postures: joint positions (12,) by stamp, ns.
+        places_m: ``torso_x`` and ``torso_z`` (2,) by stamp, ns.
+        states: tracking state of each posture by stamp, ns.
         keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
         silhouettes: (H, W) by stamp, ns.
         arrivals_s: arrival time of each joint state, monotonic seconds.
@@ -50,10 +52,13 @@ class Client:
         self.body_model = ""
         self.initialization_iou: float | None = None
         self.postures: dict[int, NDArray[np.float64]] = {}
+        self.places_m: dict[int, NDArray[np.float64]] = {}
+        self.states: dict[int, str] = {}
         self.keypoints_m: dict[int, NDArray[np.float64]] = {}
         self.silhouettes: dict[int, NDArray[np.uint8]] = {}
         self.arrivals_s: list[float] = []
         self._player_status = ""
+        self._state = ""
         self._nodes = nodes
         self._bag = bag
         self._stamp_ns = 0
@@ -87,8 +92,16 @@ class Client:
         stamp = self._stamp_ns
         if topic == "body_model":
             self.body_model = message.data
+        elif topic == "tracking_state":
+            # It has no stamp; the tracker sends it right before the joint state of its image.
+            self._state = message.data
         elif topic == "joint_states":
-            self.postures[stamp] = posture_from(results.joint_values_of(message))
+            joints = results.joint_values_of(message)
+            self.postures[stamp] = posture_from(joints)
+            place_m = place_from(joints)
+            if place_m is not None:
+                self.places_m[stamp] = place_m
+            self.states[stamp] = self._state
             self.arrivals_s.append(time.monotonic())
         elif topic == "keypoints":
             self.keypoints_m[stamp] = results.points_of(message).points_m

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -15,7 +16,7 @@ from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.tracker import TRACKING, Estimate
+from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.recordings.bag_reader import BagReader
@@ -44,6 +45,7 @@ def write_report(
         "seed": seed,
         "frames": len(expected),
         "frames_tracked": len(tracked),
+        "frames_uncertain": sum(result.states.get(stamp) == UNCERTAIN for stamp in tracked),
         "mean_3d_error_m": error.mean_m,
         "error_by_keypoint_m": error.by_keypoint_m,
         "error_by_segment_m": error.by_segment_m,
@@ -66,16 +68,21 @@ def write_report(
 
 def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int, Estimate]:
     """Cost and IoU of what was published, by stamp, from the silhouettes on the topic."""
-    term = CompiledSilhouette(result.body, camera)
     estimates = {}
+    body, term = result.body, CompiledSilhouette(result.body, camera)
     for stamp in stamps:
         if stamp not in result.silhouettes:
             continue
-        seen = term.look(result.silhouettes[stamp])
-        cost_px, iou = seen.overlap(result.postures[stamp])
-        estimates[stamp] = Estimate(
-            TRACKING, posture=result.postures[stamp], cost_px=cost_px, iou=iou
+        estimate = Estimate(
+            result.states.get(stamp) or TRACKING,
+            posture=result.postures[stamp],
+            offset_m=result.places_m.get(stamp),
         )
+        placed = estimate.placed(result.body)
+        if placed != body:
+            body, term = placed, CompiledSilhouette(placed, camera)
+        cost_px, iou = term.look(result.silhouettes[stamp]).overlap(result.postures[stamp])
+        estimates[stamp] = replace(estimate, cost_px=cost_px, iou=iou)
     return estimates
 
 
@@ -126,6 +133,7 @@ def print_table(report: dict[str, object], output: Path) -> None:
     rows = [
         ("images after initialization", f"{report['frames']}"),
         ("of them tracked", f"{report['frames_tracked']}"),
+        ("  of these uncertain", f"{report['frames_uncertain']}"),
         ("mean 3D error", f"{100 * _number(report, 'mean_3d_error_m'):.1f} cm"),
         ("  of it in depth", f"{100 * _number(report, 'depth_error_m'):.1f} cm"),
         ("mean cost", f"{_number(report, 'mean_cost_px'):.0f} px"),

@@ -24,6 +24,8 @@ class DemoResult:
         silhouettes: (H, W) by stamp.
         fps: joint states that arrived in a second.
         initialization_iou: mean fit of the references, as the initializer reported it.
+        places_m: ``torso_x`` and ``torso_z`` (2,) by stamp; empty if they are kept constant.
+        states: tracking state by stamp; where there is none, ``tracking``.
     """
 
     body: BodyModel
@@ -34,3 +36,5 @@ class DemoResult:
     silhouettes: dict[int, NDArray[np.uint8]] = field(repr=False)
     fps: float
     initialization_iou: float
+    places_m: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    states: dict[int, str] = field(default_factory=dict)

@@ -102,6 +102,8 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
         client.silhouettes,
         (len(arrivals) - 1) / lasted_s,
         client.initialization_iou or 0.0,
+        client.places_m,
+        client.states,
     )
 
 

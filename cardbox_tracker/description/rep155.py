@@ -15,6 +15,10 @@ therefore remembers the last angles and takes the nearer pair; an undefined angl
 The joint ``waist`` is our ``torso_pitch``. The reference model has no other joint of the spine;
 ``body``, ``y_waist`` and ``r_waist`` are added for the position, the turn and the sideways bend, so
 that ``body`` is the middle of the hips, in the sensor's frame. The head does not move on the torso.
+
+Two further joints of ours, ``x_body`` and ``z_body``, lead to ``body``: they are ``torso_x`` and
+``torso_z``. Without them the frame ``body_<id>``, which others take for the person's place, would
+stay at the distance and height at which the person was measured.
 """
 
 from __future__ import annotations
@@ -33,6 +37,8 @@ REP155_JOINTS: tuple[str, ...] = (
     *(f"r_{name}" for name in _ARM_JOINTS),
 )
 """Joint names without the suffix ``_<id>``; the first four are d1..d4, in their order."""
+REP155_PLACE: tuple[str, ...] = ("x_body", "z_body")
+"""The same of ``torso_x`` and ``torso_z``, which follow the others."""
 
 LOWEST_RAISE_RAD = -np.pi / 3
 """An arm swings so far through rest before its other pair of angles is taken."""
@@ -43,9 +49,10 @@ LOWEST_BEND_RAD = -np.pi / 6
 _MEANINGLESS_RAD = 1e-3
 
 
-def joint_names(body_id: str) -> list[str]:
-    """Return the names of the 12 joints of the body ``body_id``."""
-    return [f"{name}_{body_id}" for name in REP155_JOINTS]
+def joint_names(body_id: str, torso_place: bool = True) -> list[str]:
+    """Return the names of the joints of the body ``body_id``: 12, or 14 with the place."""
+    names = (*REP155_JOINTS, *REP155_PLACE) if torso_place else REP155_JOINTS
+    return [f"{name}_{body_id}" for name in names]
 
 
 class Rep155Joints:

@@ -1,13 +1,14 @@
 """A person's URDF after REP-155, with the joints of :mod:`cardbox_tracker.description.rep155`.
 
-    sensor frame -body-> body_ID -y_waist-> -waist-> -r_waist-> -(fixed)-> torso_ID
+    sensor frame -x_body-> -z_body-> -body-> body_ID
+    body_ID -y_waist-> -waist-> -r_waist-> -(fixed)-> torso_ID
     torso_ID -(fixed)-> head_ID
     torso_ID -y_shoulder-> -p_shoulder-> -r_shoulder-> l_shoulder_ID -elbow-> l_elbow_ID
     l_elbow_ID -(fixed)-> l_wrist_ID, and the same with r_
 
 Every link and joint but the sensor's frame ends in ``_ID``. As in the reference model, ``torso`` is
 at the height of the shoulders, ``l_shoulder`` is the upper arm and ``l_elbow`` the forearm. The
-wrist of the reference model is the end of the fist here, where the outline ends.
+wrist of the reference model is at the knuckles here, where the forearm of the body model ends.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_LIMITS
+from cardbox_tracker.body.posture import JOINT_LIMITS, PLACE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
@@ -32,14 +33,17 @@ from cardbox_tracker.description.urdf_elements import (
 
 _FULL = (-2 * math.pi, 2 * math.pi)
 
+_Movable = tuple[str, str, tuple[int, int, int], FloatArray]
 
-def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str) -> str:
+
+def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: bool = True) -> str:
     """Return the URDF of ``body`` as XML text.
 
     Args:
         body: the measured person.
         body_id: ending of all link and joint names; letters, digits and underscores.
         optical_frame: frame of the camera, the root of the tree.
+        torso_place: also have the joints of the person's place, as the joint states must then.
     """
     robot = add_robot(f"human_{body_id}")
     end = f"_{body_id}"
@@ -48,20 +52,22 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str) -> str:
     shoulders_m = parts.shoulder_height_m
     origin, rpy = _seen_from_camera(body)
     parent = optical_frame
-    for index, (name, kind, axis) in enumerate(
-        (
-            ("body", "prismatic", (0, 1, 0)),
-            ("y_waist", "revolute", (0, 0, 1)),
-            ("waist", "revolute", (0, 1, 0)),
-            ("r_waist", "revolute", (1, 0, 0)),
-        )
-    ):
-        lowest, highest = JOINT_LIMITS[(0, 3, 2, 1)[index]]
+    place: tuple[_Movable, ...] = (
+        ("x_body", "prismatic", (1, 0, 0), PLACE_LIMITS[0]),
+        ("z_body", "prismatic", (0, 0, 1), PLACE_LIMITS[1]),
+    )
+    trunk: tuple[_Movable, ...] = (
+        ("body", "prismatic", (0, 1, 0), JOINT_LIMITS[0]),
+        ("y_waist", "revolute", (0, 0, 1), JOINT_LIMITS[3]),
+        ("waist", "revolute", (0, 1, 0), JOINT_LIMITS[2]),
+        ("r_waist", "revolute", (1, 0, 0), JOINT_LIMITS[1]),
+    )
+    for name, kind, axis, limits in (*(place if torso_place else ()), *trunk):
         link = add_link(robot, name + end)
         add_joint(
             *(robot, name + end, kind, parent, name + end, origin, rpy),
             axis=axis,
-            limits=(lowest, highest),
+            limits=limits.tolist(),
         )
         parent, origin, rpy = name + end, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     add_patches(link, "torso", parts.waist, _up(parts.waist.middle_m))

@@ -1,14 +1,16 @@
 """A robot description (URDF) of a measured person.
 
-Its movable joints are the 12 of the posture, by the same names and signs, so that
-robot_state_publisher and RViz show the person from the joint states alone:
+Its movable joints are those of the joint states, by the same names and signs: the posture's 12, and
+``torso_x`` and ``torso_z``. So robot_state_publisher and RViz show the person from them alone:
 
-    camera_level -(fixed)-> hips -torso_y-> -torso_yaw-> -torso_pitch-> -torso_roll-> torso
+    camera_level -(fixed)-> hips -torso_x-> -torso_z-> -torso_y-> -torso_yaw-> -torso_pitch->
+    -torso_roll-> torso
     torso -abduction (X)-> -flexion (Y)-> upper arm -abduction-> -flexion-> forearm -(fixed)-> hand
 
 The root ``camera_level`` follows REP-103: origin at the camera's centre, X forward (away from the
 camera), Y left, Z up, level even when the camera is pitched. The person faces the camera, so the
-hips are turned by half a turn. The visuals are the patches of the cardbox model as thin boxes.
+hips are turned by half a turn; they stay where the person was measured. The visuals are the patches
+of the cardbox model as thin boxes.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES
 from cardbox_tracker.description.urdf_elements import (
     PATCH_THICKNESS_M,
     add_box,
@@ -31,9 +33,16 @@ from cardbox_tracker.description.urdf_elements import (
 
 ROOT_LINK = "camera_level"
 
+_LIMITS = dict(
+    zip((*JOINT_NAMES, *PLACE_NAMES), [*JOINT_LIMITS.tolist(), *PLACE_LIMITS.tolist()], strict=True)
+)
+
 
 def urdf_from_body(
-    body: BodyModel, optical_frame: str | None = None, name: str = "cardbox_person"
+    body: BodyModel,
+    optical_frame: str | None = None,
+    name: str = "cardbox_person",
+    torso_place: bool = True,
 ) -> str:
     """Return the URDF of ``body`` as XML text.
 
@@ -42,6 +51,8 @@ def urdf_from_body(
         optical_frame: if given, also add the camera's optical frame of that name, pitched as the
             body model says, so that markers and keypoints show up in the same tree.
         name: name of the robot.
+        torso_place: also have the joints ``torso_x`` and ``torso_z``; the joint states must then
+            have them too, or there is no transform beyond the hips.
     """
     robot = add_robot(name)
     add_link(robot, ROOT_LINK)
@@ -54,14 +65,24 @@ def urdf_from_body(
     origin = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
     add_joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
     parts = body_parts(body.sizes)
-    _trunk(robot, parts)
+    _trunk(robot, parts, _place(robot) if torso_place else "hips")
     _arm(robot, parts, "left", 1.0)
     _arm(robot, parts, "right", -1.0)
     return xml_text(robot)
 
 
-def _trunk(robot: Xml.Element, parts: BodyParts[float]) -> None:
+def _place(robot: Xml.Element) -> str:
+    """Add the joints of the place behind the hips and return their last link."""
     parent = "hips"
+    for joint, axis in zip(PLACE_NAMES, ((1, 0, 0), (0, 0, 1)), strict=True):
+        child = f"{joint}_link"
+        add_link(robot, child)
+        add_joint(robot, joint, "prismatic", parent, child, axis=axis, limits=_LIMITS[joint])
+        parent = child
+    return parent
+
+
+def _trunk(robot: Xml.Element, parts: BodyParts[float], parent: str) -> None:
     for joint, axis in (
         ("torso_y", (0, 1, 0)),
         ("torso_yaw", (0, 0, 1)),
@@ -71,7 +92,7 @@ def _trunk(robot: Xml.Element, parts: BodyParts[float]) -> None:
         child = "torso" if joint == "torso_roll" else f"{joint}_link"
         kind = "prismatic" if joint == "torso_y" else "revolute"
         link = add_link(robot, child)
-        add_joint(robot, joint, kind, parent, child, axis=axis, limits=_limits(joint))
+        add_joint(robot, joint, kind, parent, child, axis=axis, limits=_LIMITS[joint])
         parent = child
     torso, waist = parts.torso, parts.waist
     add_patches(link, "torso", torso, (0.0, 0.0, torso.middle_m))
@@ -98,20 +119,15 @@ def _arm(robot: Xml.Element, parts: BodyParts[float], name: str, side: float) ->
         add_joint(
             *(robot, abduction, "revolute", parent, turned, origin),
             axis=(side, 0, 0),
-            limits=_limits(abduction),
+            limits=_LIMITS[abduction],
         )
         link = add_link(robot, limb)
         add_joint(
             *(robot, flexion, "revolute", turned, limb),
             axis=(0, -1, 0),
-            limits=_limits(flexion),
+            limits=_LIMITS[flexion],
         )
         add_patches(link, name, part, (0.0, 0.0, part.middle_m))
         parent, origin = limb, (0.0, 0.0, part.bottom_m)
     add_link(robot, f"{name}_hand")
     add_joint(robot, f"{name}_wrist", "fixed", parent, f"{name}_hand", origin)
-
-
-def _limits(name: str) -> tuple[float, float]:
-    lowest, highest = JOINT_LIMITS[JOINT_NAMES.index(name)]
-    return float(lowest), float(highest)

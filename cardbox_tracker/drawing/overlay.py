@@ -26,7 +26,12 @@ TEXT_BGR = (255, 255, 255)
 _PART_BGR = {"left": (102, 179, 51), "right": (51, 115, 217)}
 _TORSO_BGR = (191, 115, 64)
 _FILL = 0.4
-_STATE_BGR = {"tracking": (120, 255, 120), "lost": (90, 110, 255)}
+UNCERTAIN_BGR = (40, 170, 255)
+_STATE_BGR = {
+    "tracking": (120, 255, 120),
+    "uncertain": UNCERTAIN_BGR,
+    "lost": (90, 110, 255),
+}
 
 _SHIFT = 4
 OUTLINE_SHIFT = 1
@@ -51,6 +56,9 @@ class Drawable(Protocol):
     def iou(self) -> float | None:
         """Fit, or None."""
 
+    def placed(self, body: BodyModel) -> BodyModel:
+        """Return ``body`` where the estimate finds it."""
+
 
 def draw_overlay(
     image: ImageArray, body: BodyModel, camera: Camera, estimate: Drawable, scale: int = 1
@@ -61,7 +69,8 @@ def draw_overlay(
         image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
         body: the measured person.
         camera: working camera, pitched as the body model says.
-        estimate: what to draw; without a posture only its state is written.
+        estimate: what to draw; without a posture only its state is written, and where the posture
+            may be wrong, outline and state are amber.
         scale: enlargement of the result, so that thin lines and text stay readable.
 
     Returns:
@@ -70,7 +79,9 @@ def draw_overlay(
     canvas = enlarged(image, scale)
     text = estimate.state.replace("_", " ")
     if estimate.posture is not None:
-        draw_model(canvas, body, camera.scaled(*canvas.shape[1::-1]), estimate.posture)
+        view = camera.scaled(*canvas.shape[1::-1])
+        outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
+        draw_model(canvas, estimate.placed(body), view, estimate.posture, outline)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
@@ -83,10 +94,16 @@ def draw_message(image: ImageArray, text: str) -> ImageArray:
     return canvas
 
 
-def draw_model(canvas: ImageArray, body: BodyModel, camera: Camera, posture: FloatArray) -> None:
+def draw_model(
+    canvas: ImageArray,
+    body: BodyModel,
+    camera: Camera,
+    posture: FloatArray,
+    outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
+) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
-    Tinted patches by side, the outline of them all, and the skeleton.
+    Tinted patches by side, the outline of them all in ``outline_bgr``, and the skeleton.
     """
     tint = canvas.copy()
     # The torso first, so that an arm in front of it stays visible.
@@ -98,7 +115,7 @@ def draw_model(canvas: ImageArray, body: BodyModel, camera: Camera, posture: Flo
         cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
     cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
     thickness = max(1, round(camera.width / 400))
-    draw_outline(canvas, camera, cardbox_patches(body, posture), OUTLINE_BGR, thickness)
+    draw_outline(canvas, camera, cardbox_patches(body, posture), outline_bgr, thickness)
     _draw_skeleton(canvas, body, camera, posture, thickness)
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from cardbox_tracker.estimation.cost.prior import RestPrior
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.settings import check, setting
+
+FILTERS = ("hierarchical", "whole_body")
+"""Every name that ``filter`` may have."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,19 @@ class TrackerConfig:
         torso: filter of d1..d4 (Table I).
         arm: filter of each arm (Table I).
         terms: settings of the cost's terms beside that of the silhouette (``estimation/cost``).
+        whole_body: settings of the filter ``whole_body``.
+
+    The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
+    ``whole_body`` uses those, ``terms``, ``relocalize`` and ``lost_frames``.
     """
+
+    filter: str = setting(
+        "hierarchical",
+        "hierarchical: the paper's, one for the torso and one for each arm; whole_body: all joints "
+        "and the torso's place, with a rounded model and learned postures",
+        choices=FILTERS,
+        restarts=True,
+    )
 
     torso: FilterConfig = FilterConfig(200, 0.2, 0.1, 0.02, 8000.0)
     arm: FilterConfig = FilterConfig(200, 0.4, 0.25, 0.0, 4000.0)
@@ -74,6 +90,7 @@ class TrackerConfig:
         1.0, "factor on the noise from one cycle of an image to the next", limits=(0.0, 1.0)
     )
     terms: tuple[TermSettings, ...] = ()
+    whole_body: WholeBodyConfig = WholeBodyConfig()
     average: int = setting(
         1,
         "best particles whose weighted mean is the result; 1: the best one",
@@ -139,18 +156,8 @@ def paper_preset() -> TrackerConfig:
 
 
 def default_preset() -> TrackerConfig:
-    """Return what tracks best: cycles with falling noise, a weak prior, a mean of the best.
-
-    A third cycle does not track better (``docs/architecture.md``).
-    """
-    return TrackerConfig(
-        cycles=2,
-        noise_decay=0.5,
-        terms=(RestPrior(0.012),),
-        average=20,
-        explore=0.2,
-        relocalize=True,
-    )
+    """Return what tracks best: the whole-body filter (``docs/architecture.md``)."""
+    return TrackerConfig(filter="whole_body", terms=(InnerCue(),), relocalize=True)
 
 
 PRESETS = MappingProxyType({"paper": paper_preset, "default": default_preset})

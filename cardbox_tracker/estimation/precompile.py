@@ -5,6 +5,9 @@ Installation, the tests and the tracker's node do so before their work begins.
 
 from __future__ import annotations
 
+import numpy as np
+
+from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
@@ -22,9 +25,16 @@ def compile_all() -> None:
     camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
     for make_config in PRESETS.values():
-        tracker = Tracker(body, camera, make_config().with_particles(2))
-        tracker.track(silhouette)
-        tracker.track(silhouette)
+        # Images with and without colour, since terms that use them are compiled for both.
+        for shape in (silhouette.shape, (*silhouette.shape, 3)):
+            channels = shape[2] if len(shape) == 3 else 1
+            looks = Appearance(
+                np.zeros((len(PARTS), bins_of(channels)), np.uint8), np.full(channels, 128.0)
+            )
+            config = make_config().with_particles(2)
+            tracker = Tracker(body.with_values(appearance=looks), camera, config)
+            for _ in range(2):
+                tracker.track(silhouette, np.full(shape, 128, np.uint8))
 
 
 if __name__ == "__main__":

@@ -7,37 +7,29 @@ Only ``tracking`` and ``uncertain`` have a posture.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import clip_to_limits, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import (
-    Image,
-    Silhouette,
-    SumOfTerms,
-    Term,
-    TermObservation,
-)
-from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
-from cardbox_tracker.estimation.filtering.pose_filter import PoseFilter
+from cardbox_tracker.estimation.cost.terms import Image, Silhouette, Term
+from cardbox_tracker.estimation.filtering.cycles import Cycles
+from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
 
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 
-# Somebody sideways shows about half the area of the front view, at the image's border less.
-_PERSON_FRACTION = 0.25
-_RECOVERY_CYCLES = 4
-_RECOVERY_NOISE = 2.0
+FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
+    {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
+)
+"""The filters by the names that ``TrackerConfig.filter`` may have."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +70,6 @@ class Estimate:
         )
 
 
-MakeFilter = Callable[[TrackerConfig, int, np.random.Generator], PoseFilter]
-"""Takes settings, pixels of an image and the source of random numbers; returns a new filter."""
-
-
 class Tracker:
     """Tracks one measured person before one camera (paper, algorithm "Online Motion Tracking")."""
 
@@ -92,7 +80,7 @@ class Tracker:
         config: TrackerConfig | None = None,
         rng: np.random.Generator | None = None,
         silhouette: SilhouetteTerm | None = None,
-        make_filter: MakeFilter = HierarchicalFilter,
+        make_filter: MakeFilter | None = None,
     ) -> None:
         """Set up for ``body``; the camera is pitched as the body model says.
 
@@ -102,7 +90,7 @@ class Tracker:
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
             silhouette: another implementation of the silhouette's term, for comparison.
-            make_filter: another filter than the hierarchical one.
+            make_filter: another filter than that of the settings.
         """
         self.body = body
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
@@ -111,11 +99,6 @@ class Tracker:
         self._silhouette = silhouette or CompiledSilhouette(body, self.camera)
         self._terms = self._built(self.config)
         self._make_filter = make_filter
-        self._keypoints = CompiledKeypoints(body, self.camera)
-        self._reference = reference_posture("front")
-        self._reference[0] = body.placement.lateral_m
-        model = render(cardbox_patches(body, self._reference), self.camera, self._silhouette.rows)
-        self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self.reset()
 
     def _built(self, config: TrackerConfig) -> list[Term]:
@@ -123,10 +106,11 @@ class Tracker:
 
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
-        image_px = self.camera.width * self.camera.height
-        self._filter = self._make_filter(self.config, image_px, self._rng.spawn(1)[0])
-        self._started = False
+        make_filter = self._make_filter or FILTERS[self.config.filter]
+        self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
         self._poor_frames = 0
+        # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
+        self._before: FloatArray | None = None
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next silhouette on.
@@ -141,6 +125,8 @@ class Tracker:
         self.config = config
         if is_new_start:
             self.reset()
+        else:
+            self._filter.configure(config)
         return is_new_start
 
     def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
@@ -153,50 +139,31 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        frame = self._silhouette.frame(silhouette, image)
-        if frame.foreground_px < self._min_person_px:
-            if self.config.relocalize and self._started:
-                # The person may come back elsewhere: search anew as soon as there is one.
-                self._started = False
+        sight = self._filter.look(self._silhouette.frame(silhouette, image, self._before))
+        if sight is Sight.NOBODY:
+            self._before = None
+            if self.config.relocalize:
+                # The person may come back elsewhere.
+                self._filter.forget()
             return Estimate(NO_PERSON)
-        seen = self._silhouette.observe(frame)
-        observation = SumOfTerms((seen, *(term.observe(frame) for term in self._terms)))
-        if self._started:
-            self._follow(observation)
-        else:
-            self._start(observation, silhouette)
-        posture = self._filter.estimate()
-        cost_px, iou = seen.overlap(posture)
-        self._poor_frames = self._poor_frames + 1 if iou < self.config.lost_iou else 0
+        if sight is Sight.TOO_MUCH:
+            # A lamp goes on, a door opens: soon the person is where they were.
+            return Estimate(LOST)
+        fit = self._filter.follow(self._terms)
+        offset = () if fit.offset_m is None else fit.offset_m
+        self._before = np.concatenate([fit.posture, offset])
+        self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:
-                self._started = False
+                self._filter.recover()
             return Estimate(LOST)
         return Estimate(
-            TRACKING, posture, self._filter.stddev(), self._keypoints(posture), cost_px, iou
+            UNCERTAIN if fit.is_uncertain else TRACKING,
+            fit.posture,
+            fit.posture_stddev,
+            fit.keypoints_m,
+            fit.cost_px,
+            fit.iou,
+            fit.offset_m,
+            fit.offset_stddev_m,
         )
-
-    def _follow(self, observation: TermObservation) -> None:
-        """Run the cycles of one frame, with falling noise; the first one explores."""
-        for cycle in range(self.config.cycles):
-            explore = self.config.explore if cycle == 0 else 0.0
-            self._filter.iterate(observation, self.config.noise_decay**cycle, explore)
-
-    def _start(self, observation: TermObservation, silhouette: Silhouette) -> None:
-        """Start around the front reference where the person stands, then settle."""
-        self._started = True
-        reference = self._reference.copy()
-        if self.config.relocalize:
-            reference[0] = self._lateral_m(silhouette)
-        self._filter.initialize(observation, clip_to_limits(reference))
-        if self.config.relocalize:
-            for cycle in range(_RECOVERY_CYCLES):
-                noise_scale = _RECOVERY_NOISE * self.config.noise_decay**cycle
-                self._filter.iterate(observation, noise_scale)
-
-    def _lateral_m(self, silhouette: Silhouette) -> float:
-        """``torso_y`` under which the silhouette's median column lies."""
-        columns = np.count_nonzero(silhouette[: self._silhouette.rows], axis=0).cumsum()
-        middle = int(np.searchsorted(columns, columns[-1] / 2))
-        offset_m = (middle - self.camera.cx) / self.camera.fx * self.body.placement.distance_m
-        return float(offset_m)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
-    initialize_body,
 )
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+
+# More of one posture look alike.
+_MOST_IMAGES = 20
 
 
 def initialize_from_recording(
@@ -23,12 +26,16 @@ def initialize_from_recording(
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: the references are unusable, or the model does not fit them.
+        InitializationError: the references are unusable, show other postures than they should, or
+            the model does not fit them.
     """
-    references = {
-        name: average_silhouette(source.silhouettes(span, name)) for name, span in spans.items()
-    }
-    return initialize_body(references, source.camera, config, progress)
+    references, images = {}, {}
+    for name, span in spans.items():
+        frames = source.held(span, name)
+        references[name] = average_silhouette([frame.silhouette for frame in frames])
+        every = -(-len(frames) // _MOST_IMAGES)
+        images[name] = [frame.image for frame in frames[::every] if frame.image is not None]
+    return initialize_body(references, source.camera, config, progress, images)
 
 
 def describe(result: InitializationResult) -> str:

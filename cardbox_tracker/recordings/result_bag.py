@@ -10,7 +10,7 @@ from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
-from cardbox_tracker.outputs import JointValues, Markers, OutputStream, Points, Value
+from cardbox_tracker.outputs import JointValues, Markers, OutputStream, Points, Text, Value
 from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import Frame
@@ -75,3 +75,5 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
             bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
         case Markers():
             write_markers(bag, topic, stamp_ns, frame_id, value)
+        case Text(text):
+            bag.write_string(topic, stamp_ns, text)

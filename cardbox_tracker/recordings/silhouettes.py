@@ -57,12 +57,15 @@ class Frame(NamedTuple):
         time_s: seconds from the bag's start.
         brightness: (H, W) uint8, undistorted, at the working resolution.
         silhouette: (H, W) uint8, 0 or 255.
+        image: (H, W, 3) bgr, or (H, W) of a camera without colour, as ``brightness`` otherwise;
+            None if it was not asked for.
     """
 
     stamp_ns: int
     time_s: float
     brightness: NDArray[np.uint8]
     silhouette: NDArray[np.uint8]
+    image: NDArray[np.uint8] | None = None
 
 
 class SilhouetteSource:
@@ -119,15 +122,15 @@ class SilhouetteSource:
                 break
             silhouette = self._pipeline.silhouette(image)
             if time_s >= start_s:
-                yield Frame(stamp_ns, time_s, brightness_of(image), silhouette)
+                yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
 
-    def silhouettes(self, span: TimeSpan, what: str) -> list[NDArray[np.uint8]]:
-        """Return the silhouettes of a span.
+    def held(self, span: TimeSpan, what: str) -> list[Frame]:
+        """Return the frames of a span in which a posture is held.
 
         Raises:
             CardboxError: no image lies in it; the text names ``what``.
         """
-        found = [frame.silhouette for frame in self.frames(*span)]
+        found = list(self.frames(*span))
         if not found:
             raise CardboxError(
                 f"no image lies in the {what} span {span} s of a bag of "

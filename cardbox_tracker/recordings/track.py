@@ -17,7 +17,7 @@ from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.tracker import UNCERTAIN, Estimate, Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
@@ -37,12 +37,16 @@ _VIDEO_SCALE = 2
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """What a run did: images seen and tracked, and means over the tracked ones."""
+    """What a run did: images seen and tracked, and means over the tracked ones.
+
+    ``frames_uncertain`` of the tracked ones have a posture that may be wrong.
+    """
 
     frames: int
     frames_tracked: int
     mean_cost_px: float
     mean_iou: float
+    frames_uncertain: int = 0
 
 
 def track_recording(
@@ -75,7 +79,7 @@ def track_recording(
     tracker = Tracker(body, source.camera, config, np.random.default_rng(seed))
     costs: list[int] = []
     ious: list[float] = []
-    frames = 0
+    frames = frames_uncertain = 0
     with ExitStack() as stack:
         table = stack.enter_context(
             stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
@@ -88,6 +92,7 @@ def track_recording(
             draw = stack.enter_context(video_file(video_path, size, fps))
         for frame, estimate in _estimates(source, tracker, start_s):
             frames += 1
+            frames_uncertain += estimate.state == UNCERTAIN
             rows.writerow(csv_row(frame.stamp_ns, estimate))
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
@@ -101,14 +106,14 @@ def track_recording(
                 f"no image lies after --start {start_s:g} s; give seconds from the bag's start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
-    return TrackSummary(frames, len(costs), *mean)
+    return TrackSummary(frames, len(costs), *mean, frames_uncertain)
 
 
 def _estimates(
     source: SilhouetteSource, tracker: Tracker, start_s: float
 ) -> Iterator[tuple[Frame, Estimate]]:
     for frame in source.frames(start_s):
-        yield frame, tracker.track(frame.silhouette)
+        yield frame, tracker.track(frame.silhouette, frame.image)
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:

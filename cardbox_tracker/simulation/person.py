@@ -2,8 +2,9 @@
 
 Each part is a stack of elliptical rings; between two neighbouring rings it is their convex hull.
 The rings follow the sizes of a :class:`BodyModel` roughly: limbs taper, the torso narrows at waist
-and shoulders, and there are a neck, fists and legs. The cardbox model therefore never matches
-perfectly, while the skeleton is known exactly.
+and shoulders, and there are a neck, open hands and legs. As in people, the shoulder joints rise
+with the arms. The cardbox model therefore never matches perfectly, while the skeleton is known
+exactly: :func:`person_frames`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
+from cardbox_tracker.body.kinematics import Arm, BodyFrames, forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
@@ -23,11 +24,22 @@ FloatArray = NDArray[np.float64]
 _RING_POINTS = 16
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)
 
+FINGER_REACH = 0.247
+"""How far open fingers reach beyond the knuckles, of elbow to knuckles: mean of rendered bodies.
+0.28 after de Leva, "Adjustments to Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996."""
+
 _FOREARM = [
     *((-0.1, 0.6), (0.0, 1.05), (0.25, 1.15), (0.62, 0.85), (0.72, 0.75)),
-    *((0.8, 1.0), (0.92, 1.0), (1.0, 0.6)),
+    *((0.8, 0.95), (0.92, 1.0), (1.0, 0.9)),
+    *((1.0 + 0.5 * FINGER_REACH, 0.6), (1.0 + FINGER_REACH, 0.25)),
 ]
-"""Profile of forearm and fist: place along it, factor on its radius."""
+"""Profile of forearm, palm and fingers: place along it, factor on its radius. The keypoint of the
+hand is at 1, where the fingers begin and a fist would end."""
+
+# The clavicle is 0.43 of the breadth long. Beyond an elevation of the arm of 30 degrees it rises by
+# 0.18 of what the arm does (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder
+# Joint", 1944, rounded).
+_CLAVICLE_OF_BREADTH, _CLAVICLE_RISE, _SETTING_RAD = 0.43, 0.18, np.radians(30.0)
 
 SKIN, SHIRT, TROUSERS = 125, 70, 45
 """Brightness of the parts, grey levels."""
@@ -42,7 +54,7 @@ class VolumePart(NamedTuple):
 
 def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
     """Return the parts of ``body`` in ``posture`` (12,)."""
-    frames = forward_kinematics(body, posture)
+    frames = person_frames(body, posture)
     shapes = body_parts(body.sizes)
     parts = [*_legs(body, frames)]
     parts += [_trunk(body, frames), _neck(body, frames), _head(body, frames)]
@@ -58,6 +70,55 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
         )
         parts.append(_tube(arm.elbow, arm.hand, _FOREARM, shapes.forearm.top_width_m / 2, SKIN))
     return parts
+
+
+def person_frames(body: BodyModel, postures: FloatArray) -> BodyFrames:
+    """Return where the parts of a person are, whose shoulders rise with the arms.
+
+    Args:
+        body: the person.
+        postures: shape (..., 12), rad and metres.
+
+    Returns:
+        Frames in the reference frame, with the leading shape of ``postures``.
+    """
+    frames = forward_kinematics(body, postures)
+    left, right = (_with_girdle(body, frames, arm) for arm in (frames.left, frames.right))
+    return frames._replace(left=left, right=right)
+
+
+def person_keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
+    """Return shoulder, elbow and hand (the knuckles) of the left, then the right arm.
+
+    Args:
+        body: the person.
+        postures: shape (..., 12), rad and metres.
+
+    Returns:
+        Shape (..., 6, 3), metres in the reference frame, ordered as ``KEYPOINT_NAMES``.
+    """
+    frames = person_frames(body, postures)
+    return np.stack([*frames.left[:3], *frames.right[:3]], axis=-2)
+
+
+def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
+    """Return how much higher along the torso a shoulder joint is, (...), metres.
+
+    Args:
+        breadth_m: distance of the shoulder joints while the arms hang.
+        elevation_rad: angle (...) of the upper arm to the torso's axis, 0 where it hangs.
+    """
+    rise_rad = _CLAVICLE_RISE * np.maximum(0.0, np.asarray(elevation_rad) - _SETTING_RAD)
+    lift: FloatArray = _CLAVICLE_OF_BREADTH * breadth_m * np.sin(rise_rad)
+    return lift
+
+
+def _with_girdle(body: BodyModel, frames: BodyFrames, arm: Arm) -> Arm:
+    up = frames.torso_rotation[..., 2]
+    along = np.sum(up * arm.upper_arm_rotation[..., 2], axis=-1)
+    elevation_rad = np.arccos(np.clip(along, -1.0, 1.0))
+    lift = girdle_lift_m(body.size("shoulder_breadth"), elevation_rad)[..., None] * up
+    return arm._replace(shoulder=arm.shoulder + lift, elbow=arm.elbow + lift, hand=arm.hand + lift)
 
 
 def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:

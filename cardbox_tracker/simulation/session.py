@@ -15,13 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.motions import Segment, timeline
+from cardbox_tracker.simulation.person import person_frames, person_keypoints_m
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
 
@@ -142,9 +143,9 @@ def _write_image(
 def _truth(
     body: BodyModel, camera: Camera, posture: NDArray[np.float64], mask: NDArray[np.uint8]
 ) -> dict[str, Any]:
-    frames = forward_kinematics(body, posture)
+    frames = person_frames(body, posture)
     names = ("hips", "neck", "head", *KEYPOINT_NAMES)
-    points = np.vstack([frames.hip, frames.neck, frames.head, keypoints_m(body, posture)])
+    points = np.vstack([frames.hip, frames.neck, frames.head, person_keypoints_m(body, posture)])
     optical = camera.reference_to_optical(points)
     return {
         "joints_m": dict(zip(names, np.round(optical, 4).tolist(), strict=True)),

@@ -73,6 +73,11 @@ class Camera:
         turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation().T
         return turned
 
+    def optical_to_reference(self, points_m: FloatArray) -> FloatArray:
+        """Turn points (..., 3) from the optical frame into the reference frame (level), metres."""
+        turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation()
+        return turned
+
     def project(self, points_m: FloatArray) -> FloatArray:
         """Project points (..., 3) of the optical frame, z > 0, to pixels (..., 2)."""
         points = np.asarray(points_m, dtype=np.float64)

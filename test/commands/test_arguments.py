@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     process_count,
     run_count,
     seed,
+    seed_count,
     span,
     time,
 )
@@ -20,7 +21,8 @@ from cardbox_tracker.commands.arguments import (
 def test_what_is_right_is_read() -> None:
     assert span("0:3.9") == (0.0, 3.9)
     assert time("15.6") == 15.6
-    assert [seed("0"), particle_count("2"), run_count("2"), process_count("1")] == [0, 2, 2, 1]
+    assert [seed("0"), particle_count("2"), run_count("2")] == [0, 2, 2]
+    assert [process_count("1"), seed_count("1")] == [1, 1]
 
 
 @pytest.mark.parametrize("text", ["5", "9:3", "3:3", "a:b", "1:", "-2:3", "nan:4", ""])
@@ -41,7 +43,8 @@ def test_times_that_are_none(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["-1", "2.5", "many", ""])
 @pytest.mark.parametrize(
-    ("kind", "lowest"), [(seed, 0), (particle_count, 2), (run_count, 2), (process_count, 1)]
+    ("kind", "lowest"),
+    [(seed, 0), (particle_count, 2), (run_count, 2), (process_count, 1), (seed_count, 1)],
 )
 def test_numbers_that_are_none(kind: Callable[[str], int], lowest: int, text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as caught:

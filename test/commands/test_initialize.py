@@ -43,6 +43,17 @@ def test_mistakes_of_initialize(
     assert sorted(path.name for path in files.iterdir()) == before
 
 
+def test_references_taken_for_each_other_are_named(
+    files: Path, spans: dict[str, str], cardbox: Callable
+) -> None:
+    options = spans | {"--distance": "2", "--output": f"{files / 'new.yaml'}"}
+    options["--front"], options["--side"] = spans["--side"], spans["--front"]
+    done = cardbox("initialize", files / "session", *(f"{n}={text}" for n, text in options.items()))
+    expected = "references 'front' and 'side' look swapped; capture both again"
+    done.assert_refused("initialize", expected)
+    assert not (files / "new.yaml").exists()
+
+
 def test_a_missing_output_folder_is_told_before_the_recording_is_read(
     tmp_path: Path, spans: dict[str, str], cardbox: Callable
 ) -> None:

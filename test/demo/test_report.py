@@ -109,3 +109,23 @@ def test_an_image_without_its_silhouette_has_no_cost(
     assert report["frames_tracked"] == LAST
     assert report["mean_cost_px"] != whole["mean_cost_px"]
     assert report["mean_3d_error_m"] == whole["mean_3d_error_m"]
+
+
+def test_places_and_doubts_of_the_nodes_are_in_the_report(
+    session: Path, result: DemoResult, tmp_path: Path
+) -> None:
+    """The same person, whose body model has them 0.3 m too far away, and torso_x says so."""
+    report = write_report(result, session, tmp_path, "paper", 0)
+    assert report["frames_uncertain"] == 0
+    stamps = list(result.postures)
+    misplaced = replace(
+        result,
+        body=BODY.with_values(distance_m=BODY.placement.distance_m + 0.3),
+        places_m=dict.fromkeys(stamps, np.array([0.3, 0.0])),
+        states=dict.fromkeys(stamps[:5], "uncertain"),
+    )
+    again = write_report(misplaced, session, tmp_path, "paper", 0)
+    assert again["frames_tracked"] == LAST
+    assert again["frames_uncertain"] == 5
+    assert again["mean_iou"] == pytest.approx(report["mean_iou"])
+    assert again["mean_cost_px"] == pytest.approx(report["mean_cost_px"])

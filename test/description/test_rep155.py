@@ -12,9 +12,16 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, reference_posture
+from cardbox_tracker.body.posture import (
+    JOINT_LIMITS,
+    LEFT_ARM,
+    PLACE_LIMITS,
+    RIGHT_ARM,
+    reference_posture,
+)
 from cardbox_tracker.description.rep155 import REP155_JOINTS, Rep155Joints, joint_names
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
+from cardbox_tracker.estimation.tracker import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
 
 yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
@@ -23,8 +30,9 @@ BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1, camera_pit
 LINKS = ("l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist")
 
 
-def load(body: BodyModel) -> yourdfpy.URDF:
-    robot = yourdfpy.URDF.load(io.BytesIO(rep155_urdf(body, "p1", "eye").encode()))
+def load(body: BodyModel, torso_place: bool = True) -> yourdfpy.URDF:
+    text = rep155_urdf(body, "p1", "eye", torso_place)
+    robot = yourdfpy.URDF.load(io.BytesIO(text.encode()))
     assert robot.validate()
     return robot
 
@@ -40,11 +48,14 @@ def places(robot: yourdfpy.URDF, values: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def assert_agrees(posture: np.ndarray, values: np.ndarray) -> None:
+def assert_agrees(
+    posture: np.ndarray, values: np.ndarray, place: tuple[float, float] = (0.0, 0.0)
+) -> None:
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pose.pitch_rad)
-    frames = forward_kinematics(BODY, posture)
-    found = places(ROBOT, values)
-    expected = dict(zip(LINKS, keypoints_m(BODY, posture), strict=True))
+    body = Estimate(TRACKING, posture, offset_m=np.array(place)).placed(BODY)
+    frames = forward_kinematics(body, posture)
+    found = places(ROBOT, np.array([*values, *place]))
+    expected = dict(zip(LINKS, keypoints_m(body, posture), strict=True))
     for name, point in {**expected, "head": frames.head, "body": frames.hip}.items():
         optical = camera.reference_to_optical(point)
         # Where a limb's angle means nothing, it is left as it was.
@@ -64,13 +75,25 @@ def test_joints_of_any_sequence_put_the_limbs_where_they_are(postures: list[np.n
         assert_agrees(posture, convert(posture))
 
 
+@settings(max_examples=10)
+@given(within_limits(), st.tuples(*(st.floats(*limits) for limits in PLACE_LIMITS.tolist())))
+def test_the_place_moves_all_of_the_body(posture: np.ndarray, place: tuple[float, float]) -> None:
+    assert_agrees(posture, Rep155Joints()(posture), place)
+
+
+def test_without_the_place_there_are_twelve_joints() -> None:
+    robot = load(BODY, torso_place=False)
+    assert set(robot.actuated_joint_names) == set(joint_names("p1", torso_place=False))
+    assert len(robot.actuated_joint_names) == 12
+
+
 @settings(max_examples=25)
 @given(st.lists(within_limits(), min_size=1, max_size=6))
 def test_values_stay_within_the_limits_of_the_urdf(postures: list[np.ndarray]) -> None:
     convert = Rep155Joints()
     for posture in postures:
         values = convert(posture)
-        for name, value in zip(joint_names("p1"), values, strict=True):
+        for name, value in zip(joint_names("p1", torso_place=False), values, strict=True):
             limit = ROBOT.joint_map[name].limit
             assert limit.lower - 1e-6 <= value <= limit.upper + 1e-6, name
 
@@ -148,7 +171,11 @@ def test_every_name_but_the_sensors_has_the_suffix() -> None:
         joint.find("child").attrib["link"]: joint.find("parent").attrib["link"]  # type: ignore[union-attr]
         for joint in robot.findall("joint")
     }
-    assert parents["body_p1"] == "eye"
+    assert [parents[f"{name}_p1"] for name in ("body", "z_body", "x_body")] == [
+        "z_body_p1",
+        "x_body_p1",
+        "eye",
+    ]
 
 
 @pytest.mark.parametrize("pitch", [0.0, 1e-9, 0.2, -0.7])

@@ -15,10 +15,11 @@ import pytest
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
-from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.estimation.tracker import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
 
 KEYPOINT_LINKS = (
@@ -31,6 +32,8 @@ KEYPOINT_LINKS = (
 )
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
+ALL_LIMITS = np.vstack([JOINT_LIMITS, PLACE_LIMITS])
 
 
 def child(element: Xml.Element, tag: str) -> dict[str, str]:
@@ -84,11 +87,55 @@ def random_postures(count: int) -> np.ndarray:
     return rng.uniform(JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1], (count, 12))
 
 
+def random_places(count: int) -> np.ndarray:
+    rng = np.random.default_rng(6)
+    return rng.uniform(PLACE_LIMITS[:, 0], PLACE_LIMITS[:, 1], (count, 2))
+
+
 @pytest.mark.parametrize("posture", random_postures(8))
 def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -> None:
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
-    poses = link_poses(urdf_from_body(body), dict(zip(JOINT_NAMES, posture, strict=True)))
+    xml = urdf_from_body(body, torso_place=False)
+    assert_agrees(xml, body, posture, dict(zip(JOINT_NAMES, posture, strict=True)))
 
+
+@pytest.mark.parametrize(
+    ("posture", "place"), list(zip(random_postures(8), random_places(8), strict=True))
+)
+def test_torso_x_and_z_move_the_person_as_the_estimate_does(
+    posture: np.ndarray, place: np.ndarray
+) -> None:
+    body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
+    placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
+    joints = dict(zip(ALL_NAMES, [*posture, *place], strict=True))
+    assert_agrees(urdf_from_body(body), placed, posture, joints)
+
+
+def test_torso_x_is_nearer_to_the_camera_and_torso_z_is_higher() -> None:
+    """By hand: 2.3 m away and 0.4 m below, then 0.5 m nearer and 0.1 m higher."""
+    body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
+    moved = dict.fromkeys(JOINT_NAMES, 0.0) | {"torso_x": 0.5, "torso_z": 0.1}
+    poses = link_poses(urdf_from_body(body), moved)
+    np.testing.assert_allclose(poses["torso"][:3, 3], (1.8, 0.0, -0.3), atol=1e-12)
+    np.testing.assert_allclose(poses["hips"][:3, 3], (2.3, 0.0, -0.4), atol=1e-12)
+
+
+def test_without_the_place_only_its_two_joints_are_missing() -> None:
+    full = Xml.fromstring(urdf_from_body(BodyModel(), "eye"))
+    for element in [*full.findall("link"), *full.findall("joint")]:
+        if element.attrib["name"].removesuffix("_link") in PLACE_NAMES:
+            full.remove(element)
+    (parent,) = full.findall("joint[@name='torso_y']/parent")
+    parent.attrib["link"] = "hips"
+    short = Xml.fromstring(urdf_from_body(BodyModel(), "eye", torso_place=False))
+    assert Xml.canonicalize(Xml.tostring(full), strip_text=True) == Xml.canonicalize(
+        Xml.tostring(short), strip_text=True
+    )
+
+
+def assert_agrees(xml: str, body: BodyModel, posture: np.ndarray, joints: dict[str, float]) -> None:
+    """The links of the URDF are where our kinematics has them for ``body``."""
+    poses = link_poses(xml, joints)
     frames = forward_kinematics(body, posture)
     for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(poses[link][:3, 3], TO_ROOT @ point, atol=1e-9)
@@ -99,7 +146,7 @@ def test_urdf_and_joint_state_give_our_forward_kinematics(posture: np.ndarray) -
 def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
     body = BodyModel.of(camera_pitch_rad=0.2)
     xml = urdf_from_body(body, optical_frame="cam_optical")
-    poses = link_poses(xml, dict.fromkeys(JOINT_NAMES, 0.0))
+    poses = link_poses(xml, dict.fromkeys(ALL_NAMES, 0.0))
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.2)
     for point in np.array([(1.0, 0, 0), (0, 1.0, 0), (-2.0, 0.3, 0.5)]):
         optical = camera.reference_to_optical(point)
@@ -111,15 +158,16 @@ def test_optical_frame_is_pitched_as_the_body_model_says() -> None:
 def test_movable_joints_are_those_of_the_joint_state_with_limits() -> None:
     robot = Xml.fromstring(urdf_from_body(BodyModel()))
     movable = {j.attrib["name"]: j for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
-    assert set(movable) == set(JOINT_NAMES)
-    for name, (lower, upper) in zip(JOINT_NAMES, JOINT_LIMITS, strict=True):
+    assert set(movable) == set(ALL_NAMES)
+    for name, (lower, upper) in zip(ALL_NAMES, ALL_LIMITS, strict=True):
         limit = child(movable[name], "limit")
         assert float(limit["lower"]) == pytest.approx(lower)
         assert float(limit["upper"]) == pytest.approx(upper)
 
 
-def test_links_form_one_tree() -> None:
-    robot = Xml.fromstring(urdf_from_body(BodyModel(), optical_frame="optical"))
+@pytest.mark.parametrize("torso_place", [True, False])
+def test_links_form_one_tree(torso_place: bool) -> None:
+    robot = Xml.fromstring(urdf_from_body(BodyModel(), "optical", torso_place=torso_place))
     links = {link.attrib["name"] for link in robot.findall("link")}
     children = [child(joint, "child")["link"] for joint in robot.findall("joint")]
     assert sorted([*children, ROOT_LINK]) == sorted(links)
@@ -133,11 +181,12 @@ def test_visuals_are_the_fifteen_patches() -> None:
 def test_yourdfpy_loads_it_and_agrees() -> None:
     yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")
     body = BodyModel.of(distance_m=2.3)
-    posture = random_postures(1)[0]
+    posture, place = random_postures(1)[0], random_places(1)[0]
     robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
     assert robot.validate()
-    robot.update_cfg(dict(zip(JOINT_NAMES, posture, strict=True)))
-    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+    robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place], strict=True)))
+    placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
+    for point, link in zip(keypoints_m(placed, posture), KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(
             robot.get_transform(link, ROOT_LINK)[:3, 3], TO_ROOT @ point, atol=1e-6
         )
@@ -149,6 +198,9 @@ def test_the_example_body_is_a_person_to_try_it_with(capsys: pytest.CaptureFixtu
     assert main(["urdf", str(example)]) == 0
     robot = yourdfpy.URDF.load(io.BytesIO(capsys.readouterr().out.encode()))
     assert robot.validate()
+    assert set(robot.actuated_joint_names) == set(ALL_NAMES)
+    assert main(["urdf", str(example), "--no-torso-place"]) == 0
+    robot = yourdfpy.URDF.load(io.BytesIO(capsys.readouterr().out.encode()))
     assert set(robot.actuated_joint_names) == set(JOINT_NAMES)
     assert len(load_body_model(example).sizes) == 18
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from cardbox_tracker.drawing.overlay import (
     JOINT_BGR,
     OUTLINE_BGR,
     SKELETON_BGR,
+    UNCERTAIN_BGR,
     draw_model,
     draw_overlay,
     draw_text,
@@ -49,6 +52,26 @@ def test_the_skeleton_is_where_the_joints_are(scale: int) -> None:
     pixels = view.project(view.reference_to_optical(keypoints_m(BODY, FRONT)))
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
+
+
+def test_the_person_is_drawn_where_the_estimate_is() -> None:
+    """0.4 m nearer and 0.1 m lower: larger, and the joints where they project to."""
+    moved = replace(FOUND, offset_m=np.array([0.4, -0.1]))
+    overlay = draw_overlay(GREY, BODY, CAMERA, moved)
+    body = BODY.with_values(distance_m=1.6, hip_height_m=-0.6)
+    pixels = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(body, FRONT)))
+    for u, v in pixels.round().astype(int):
+        assert near(overlay, JOINT_BGR)[v, u]
+    assert np.any(overlay != draw_overlay(GREY, BODY, CAMERA, FOUND))
+
+
+def test_what_may_be_wrong_is_amber() -> None:
+    overlay = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, state="uncertain"))
+    assert near(overlay, UNCERTAIN_BGR)[:40].any(), "the text"
+    assert near(overlay, UNCERTAIN_BGR)[80:].sum() > 100, "the outline"
+    assert not near(overlay, OUTLINE_BGR).any()
+    sure = draw_overlay(GREY, BODY, CAMERA, FOUND)
+    assert not near(sure, UNCERTAIN_BGR)[:40].any()
 
 
 def test_the_outline_frames_the_head_and_nothing_far_from_it() -> None:

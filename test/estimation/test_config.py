@@ -7,13 +7,16 @@ from typing import Any
 
 import pytest
 
+from cardbox_tracker.estimation import tracker
 from cardbox_tracker.estimation.config import (
+    FILTERS,
     PRESETS,
     FilterConfig,
     TrackerConfig,
     default_preset,
     paper_preset,
 )
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
 
 def test_the_paper_preset_is_table_one() -> None:
@@ -29,11 +32,25 @@ def test_the_paper_preset_is_table_one() -> None:
     assert not config.relocalize
 
 
-def test_the_default_preset_has_the_filters_of_table_one() -> None:
+def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
     default, paper = default_preset(), paper_preset()
-    assert (default.torso, default.arm) == (paper.torso, paper.arm)
-    assert default.cycles > 1
+    assert (paper.filter, default.filter) == ("hierarchical", "whole_body")
+    assert set(FILTERS) == {"hierarchical", "whole_body"} == set(tracker.FILTERS)
     assert default.relocalize
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected more than the 58 special ones"),
+        ({"fresh_torsos": 17}, "fresh_torsos, torso_explorers and torsos are 17, 16, 70"),
+        ({"best_torsos": 71}, "best_torsos is 71; expected 1 to 70"),
+        ({"alike": 17}, "alike is 17; expected 1 to 16"),
+    ],
+)
+def test_whole_body_values_that_do_not_go_together(values: dict[str, Any], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        WholeBodyConfig(**values)
 
 
 def test_presets_by_name() -> None:
@@ -105,7 +122,7 @@ def test_no_more_particles_are_averaged_than_the_smaller_filter_has() -> None:
 
 
 def test_the_number_of_particles_changes_in_all_filters_and_nothing_else() -> None:
-    config = default_preset()
+    config = replace(paper_preset(), average=20)
     many = config.with_particles(1000)
     assert (many.torso.particles, many.arm.particles) == (1000, 1000)
     assert many.with_particles(200) == config

@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost import kernels, row_sums
-from cardbox_tracker.estimation.filtering import particle_kernels
+from cardbox_tracker.estimation.cost import (
+    inner_cue_kernels,
+    kernels,
+    pose_prior,
+    row_sums,
+    whole_body_kernels,
+)
+from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
 from cardbox_tracker.vision import chroma, light, regions, shadows
@@ -27,8 +34,11 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
-    modules: tuple[ModuleType, ...] = (kernels, row_sums, particle_kernels)
-    modules += (contrast, regions, chroma, shadows, light)
+    modules: tuple[ModuleType, ...] = (
+        *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
+        *(particle_kernels, whole_body_moves),
+        *(contrast, regions, chroma, shadows, light),
+    )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
         for module in modules
@@ -37,24 +47,29 @@ def compiled() -> dict[str, int]:
     }
 
 
+@pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("preset", PRESETS)
-def test_no_image_waits_for_the_compiler(preset: str) -> None:
+def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
     assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
-    body = BodyModel()
+    assert before["cardbox_tracker.estimation.cost.inner_cue_kernels.ratio_maps"] > 0
+    levels = np.random.default_rng(0).integers(0, 255, (5, bins_of(channels))).astype(np.uint8)
+    body = BodyModel.of(appearance=Appearance(levels, np.full(channels, 100.0)))
     person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
+    shape = (240, 320) if channels == 1 else (240, 320, channels)
     learner = BackgroundLearner()
     for _ in range(2):
-        learner.add(np.full((240, 320, 3), 90, np.uint8))
+        learner.add(np.full(shape, 90, np.uint8))
     extractor = SilhouetteExtractor(learner.model())
     tracker = Tracker(body, CAMERA, PRESETS[preset]())
     received = np.frombuffer(np.where(person > 0, 200, 90).astype(np.uint8).tobytes(), np.uint8)
-    grey = received.reshape(240, 320)
-    for image in (grey, grey.copy(), np.dstack([grey] * 3)):
-        silhouette = extractor(image)
+    for image in (received.reshape(240, 320), received.reshape(240, 320).copy()):
+        seen = image if channels == 1 else np.repeat(image[..., None], 3, axis=2)
+        seen.setflags(write=image.flags.writeable)
+        silhouette = extractor(seen)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
         for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
-            state = tracker.track(pixels).state
+            state = tracker.track(pixels, seen).state
         assert state == TRACKING
     assert compiled() == before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,18 @@ from cardbox_tracker.estimation.config import (
 from cardbox_tracker.estimation.cost.compiled import CompiledObservation, CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame, TorsoCosts
-from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.cycles import Cycles
+from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS
+from cardbox_tracker.estimation.tracker import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    Tracker,
+)
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
@@ -64,13 +76,12 @@ def make(config: TrackerConfig | None = None, seed: int = 0, **rest: Any) -> Tra
 
 def assert_same(first: Estimate, second: Estimate) -> None:
     assert (first.state, first.cost_px, first.iou) == (second.state, second.cost_px, second.iou)
-    for name in ("posture", "posture_stddev", "keypoints_m"):
+    for name in ("posture", "posture_stddev", "keypoints_m", "offset_m", "offset_stddev_m"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-@pytest.mark.parametrize("make_config", [paper_preset, default_preset])
-def test_an_estimate_says_where_it_is_and_how_well_it_fits(make_config: Any) -> None:
-    tracker = make(make_config())
+def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
+    tracker = make(paper_preset())
     reference = ReferenceSilhouette(BODY, CAMERA)
     for silhouette in waving(20):
         estimate = tracker.track(silhouette)
@@ -85,6 +96,22 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits(make_config: Any) -> 
         assert estimate.iou > 0.7
         assert estimate.posture_stddev.shape == (12,)
         assert np.all(estimate.posture_stddev > 0)
+
+
+def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
+    tracker = make(default_preset())
+    for silhouette in waving(20):
+        estimate = tracker.track(silhouette)
+        assert estimate.state == TRACKING
+        state = np.append(estimate.posture, estimate.offset_m)
+        assert np.all((state >= STATE_LIMITS[:, 0]) & (state <= STATE_LIMITS[:, 1]))
+        # The keypoints are those of the posture.
+        cost = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+        np.testing.assert_allclose(estimate.keypoints_m, cost.keypoints(state), atol=1e-12)
+        assert estimate.iou > 0.7
+        assert estimate.posture_stddev.shape == (12,)
+        assert np.all(estimate.posture_stddev > 0)
+        assert np.all(estimate.offset_stddev_m > 0)
 
 
 @pytest.mark.parametrize("make_config", [paper_preset, default_preset])
@@ -106,7 +133,7 @@ def test_without_a_generator_runs_repeat_themselves() -> None:
 
 
 def test_the_reference_cost_gives_the_same_estimates() -> None:
-    config = default_preset().with_particles(8)
+    config = replace(paper_preset(), cycles=2, relocalize=True).with_particles(8)
     compiled = make(config, 1, silhouette=CompiledSilhouette(BODY, CAMERA))
     reference = make(config, 1, silhouette=ReferenceSilhouette(BODY, CAMERA))
     for silhouette in waving(2):
@@ -186,11 +213,44 @@ def test_whoever_comes_back_elsewhere_is_found(seed: int, torso_y_m: float) -> N
 def test_whoever_was_lost_is_found(seed: int) -> None:
     tracker = make(default_preset(), seed)
     tracker.track(seen(front()))
-    states = [tracker.track(stripes()).state for _ in range(5)]
-    assert states[-1] == LOST
+    while tracker.track(stripes()).state != LOST:
+        pass
+    estimates = [tracker.track(seen(front(0.4))) for _ in range(6)]
+    assert estimates[-1].state == TRACKING
+    assert estimates[-1].posture[0] == pytest.approx(0.4, abs=0.05)
+
+
+def test_a_paper_tracker_that_may_search_again_finds_whom_it_lost_at_once() -> None:
+    tracker = make(replace(paper_preset(), relocalize=True, cycles=2, noise_decay=0.5))
+    tracker.track(seen(front()))
+    while tracker.track(stripes()).state != LOST:
+        pass
     estimate = tracker.track(seen(front(0.4)))
     assert estimate.state == TRACKING
     assert estimate.posture[0] == pytest.approx(0.4, abs=0.05)
+
+
+def test_what_hardly_fits_is_uncertain_before_it_is_lost() -> None:
+    tracker = make(default_preset())
+    tracker.track(seen(front()))
+    states = []
+    while not states or states[-1] != LOST:
+        estimate = tracker.track(stripes())
+        states.append(estimate.state)
+        assert (estimate.posture is None) == (estimate.state == LOST)
+    assert states[-2] == UNCERTAIN
+    assert len(states) >= tracker.config.lost_frames
+
+
+def test_more_foreground_than_a_person_is_no_person_and_changes_nothing() -> None:
+    disturbed, undisturbed = make(default_preset()), make(default_preset())
+    images = waving(4)
+    for tracker in (disturbed, undisturbed):
+        for image in images[:3]:
+            tracker.track(image)
+    bright = np.full_like(NOBODY, 255)
+    assert [disturbed.track(bright).state for _ in range(7)] == [LOST] * 7
+    assert_same(disturbed.track(images[3]), undisturbed.track(images[3]))
 
 
 def test_the_papers_tracker_goes_on_from_where_the_person_was() -> None:
@@ -212,7 +272,7 @@ def test_reset_begins_from_the_front_reference() -> None:
     # Without noise the first particle is all there is.
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
     observation = CompiledSilhouette(body, CAMERA).look(seen(raised, body))
-    tracker._filter.initialize(observation, raised)
+    tracker._filter.hierarchy.initialize(observation, raised)
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, raised)
     tracker.reset()
     np.testing.assert_array_equal(tracker.track(seen(raised, body)).posture, start)
@@ -327,15 +387,19 @@ class StandingStill:
         return np.full(12, 0.5)
 
 
-def test_the_tracker_works_with_any_filter() -> None:
+def test_the_tracker_takes_another_filter() -> None:
     config = replace(paper_preset(), cycles=2, noise_decay=0.5)
-    tracker = make(config, make_filter=StandingStill)
+    tracker = make(config, make_filter=partial(Cycles, make_hierarchy=StandingStill))
     estimates = [tracker.track(seen(front())) for _ in range(2)]
     for estimate in estimates:
         assert (estimate.state, estimate.cost_px, estimate.iou) == (TRACKING, 0, 1.0)
         np.testing.assert_array_equal(estimate.posture, front())
         np.testing.assert_array_equal(estimate.posture_stddev, np.full(12, 0.5))
-    assert tracker._filter.calls == [("initialize", 1.0), ("iterate", 1.0), ("iterate", 0.5)]
+    assert tracker._filter.hierarchy.calls == [
+        ("initialize", 1.0),
+        ("iterate", 1.0),
+        ("iterate", 0.5),
+    ]
 
 
 def test_an_image_of_another_size_is_refused() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
 )

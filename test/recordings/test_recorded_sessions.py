@@ -12,10 +12,8 @@ import pytest
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.estimation.initialization.measure import (
-    InitializationResult,
-    initialize_body,
-)
+from cardbox_tracker.estimation.initialization.config import InitializationResult
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

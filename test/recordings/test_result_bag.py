@@ -12,6 +12,7 @@ import yaml
 
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.tracker import Estimate
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
@@ -23,6 +24,7 @@ TYPES = {
     "/silhouette": "sensor_msgs/msg/Image",
     "/silhouette/camera_info": "sensor_msgs/msg/CameraInfo",
     "/overlay": "sensor_msgs/msg/Image",
+    "/tracking_state": "std_msgs/msg/String",
     "/joint_states": "sensor_msgs/msg/JointState",
     "/joint_states_stddev": "sensor_msgs/msg/JointState",
     "/keypoints": "geometry_msgs/msg/PoseArray",
@@ -60,11 +62,14 @@ def test_every_topic_is_there_once_an_image(
 ) -> None:
     summary = results[1]
     assert set(decoded) == set(TYPES)
-    for topic in ("/silhouette", "/silhouette/camera_info", "/overlay"):
+    for topic in ("/silhouette", "/silhouette/camera_info", "/overlay", "/tracking_state"):
         assert len(decoded[topic]) == summary.frames
     for topic in ("/joint_states", "/joint_states_stddev", "/keypoints"):
         assert len(decoded[topic]) == summary.frames_tracked < summary.frames
     assert len(decoded["/body_model"]) == len(decoded["/robot_description"]) == 1
+    states = [message.data for message in decoded["/tracking_state"]]
+    assert states[0] == "no_person"
+    assert sum(state in ("tracking", "uncertain") for state in states) == summary.frames_tracked
 
 
 def test_markers_follow_the_person_and_go_with_them(
@@ -77,7 +82,9 @@ def test_markers_follow_the_person_and_go_with_them(
         triangles, bones = array.markers
         assert (triangles.ns, triangles.type, len(triangles.points)) == ("patches", 11, 90)
         assert (bones.ns, bones.type, len(bones.points)) == ("skeleton", 5, 16)
-        hand = camera.reference_to_optical(keypoints_m(recording.body, np.array(state.position)))[2]
+        posture, place = np.split(np.array(state.position), [12])
+        body = Estimate("tracking", posture, offset_m=place).placed(recording.body)
+        hand = camera.reference_to_optical(keypoints_m(body, posture))[2]
         last = bones.points[9]
         np.testing.assert_allclose((last.x, last.y, last.z), hand, atol=1e-9)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
 
 
 @pytest.mark.parametrize(
@@ -26,7 +29,7 @@ def test_spans_are_read(text: str, expected: tuple[float, float]) -> None:
 )
 def test_what_is_no_span_is_refused(text: str) -> None:
     with pytest.raises(
-        ValueError, match=r"expected T0:T1 in seconds, T0 before T1, such as 0:4"
+        ValueError, match=r"expected T0:T1 in seconds with T0 before T1, such as 0:4"
     ):
         TimeSpan.parse(text)
 
@@ -63,6 +66,28 @@ def test_silhouettes_are_the_person_and_the_empty_scene_has_none(
     assert np.mean(fits) > 0.95
 
 
+def test_images_come_with_the_silhouettes_when_asked_for(source: SilhouetteSource) -> None:
+    """This recording is grey, so an image is its brightness."""
+    assert next(source.frames(7.0)).image is None
+    frame = next(source.frames(7.0))
+    assert frame.image is not None
+    np.testing.assert_array_equal(frame.image, frame.brightness)
+
+
+def test_images_of_a_camera_with_colours_have_them(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (48, 64, 3), dtype=np.uint8)
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+    with BagWriter(tmp_path / "bag") as bag:
+        for number in range(4):
+            bag.write_camera_info("/camera_info", number * 10**8, "optical", camera)
+            bag.write_image("/image_raw", number * 10**8, "optical", pixels, "rgb8")
+    with BagReader(tmp_path / "bag") as reader:
+        colours = SilhouetteSource(reader, TimeSpan(0, 0.25), size=(64, 48))
+        frame = next(colours.frames(0.3))
+    assert frame.image is not None
+    np.testing.assert_array_equal(frame.image, pixels[:, :, ::-1])
+
+
 def test_images_are_brought_to_the_working_size(recording: Any) -> None:
     with BagReader(recording.folder) as bag:
         small = SilhouetteSource(bag, TimeSpan(0, 3.9), size=(160, 120))
@@ -88,4 +113,4 @@ def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> N
         CardboxError,
         match=r"no image lies in the arms span 90:91 s of a bag of 24.2 s; give",
     ):
-        source.silhouettes(TimeSpan(90, 91), "arms")
+        source.held(TimeSpan(90, 91), "arms")

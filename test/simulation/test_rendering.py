@@ -10,10 +10,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.simulation.person import SHIRT, SKIN, random_body
+from cardbox_tracker.simulation.person import (
+    SHIRT,
+    SKIN,
+    person_frames,
+    person_keypoints_m,
+    random_body,
+)
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.simulation.session import session_camera
 from cardbox_tracker.vision.camera import Camera
@@ -49,7 +55,8 @@ def test_a_person_resembles_their_cardbox_but_is_none(name: str) -> None:
     row = int(CAMERA.project(CAMERA.reference_to_optical(forward_kinematics(BODY, posture).hip))[1])
     box = cardbox_silhouette(BODY, posture) > 0
     iou = (person & box)[:row].sum() / (person | box)[:row].sum()
-    assert 0.80 < iou < 0.97
+    # Fingers and raised shoulders are not in the cardbox.
+    assert 0.75 < iou < 0.97
     assert person[row + 20].any()
 
 
@@ -61,12 +68,8 @@ def test_every_person_covers_their_skeleton(seed: int, name: str) -> None:
     posture = reference_posture(name)
     silhouette = renderer(camera=camera).silhouette(body, posture)
     assert set(np.unique(silhouette)) == {0, 255}
-    frames = forward_kinematics(body, posture)
-    # The hand keypoint is the end of the fist; half a hand towards the elbow is inside.
-    points = keypoints_m(body, posture)
-    points[2] += 0.1 * (points[1] - points[2])
-    points[5] += 0.1 * (points[4] - points[5])
-    inner = np.vstack([points, frames.hip, frames.neck, frames.head])
+    frames = person_frames(body, posture)
+    inner = np.vstack([person_keypoints_m(body, posture), frames.hip, frames.neck, frames.head])
     u, v = np.rint(camera.project(camera.reference_to_optical(inner))).astype(int).T
     seen = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     assert seen[-3:].all()

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.simulation.person import person_frames
 from cardbox_tracker.simulation.session import START_NS, TRUTH_TOPIC, synthesize_session
 
 SMALL: dict[str, Any] = {"fps": 2.0, "width": 160, "height": 120, "motion": "bow"}
@@ -51,7 +51,7 @@ def test_the_truth_beside_the_bag_is_that_of_its_messages(session: Path) -> None
         )
 
 
-def test_the_true_joints_are_those_of_the_kinematics(session: Path) -> None:
+def test_the_true_joints_are_those_of_the_person(session: Path) -> None:
     truth = json.loads((session / "ground_truth.json").read_text())
     body = BodyModel.of(hip_height_m=-0.51)
     with BagReader(session) as bag:
@@ -59,7 +59,7 @@ def test_the_true_joints_are_those_of_the_kinematics(session: Path) -> None:
     for frame in truth["frames"]:
         if "joints_m" not in frame:
             continue
-        frames = forward_kinematics(body, np.array(list(frame["posture"].values())))
+        frames = person_frames(body, np.array(list(frame["posture"].values())))
         for name, point in (("neck", frames.neck), ("left_hand", frames.left.hand)):
             optical = camera.reference_to_optical(point)
             np.testing.assert_allclose(frame["joints_m"][name], optical, atol=2e-4)

@@ -27,6 +27,7 @@ class Person:
         self.graph, self.scene = graph, scene
         self.posture: str | None = None
         self.obeys = True
+        self.mistakes: dict[str, str] = {}
         # Every line, also where this process is slow to read them.
         lines = qos.copy_of(qos.LATCHED)
         lines.depth = 1000
@@ -42,7 +43,8 @@ class Person:
     def show(self) -> None:
         line = self.statuses[-1].data if self.statuses else ""
         if self.obeys and line.split(":")[0] in ("front", "side", "arms"):
-            self.posture = line.split(":")[0]
+            asked = line.split(":")[0]
+            self.posture = self.mistakes.get(asked, asked)
         header = Header(frame_id="optical", stamp=self.graph.next_stamp())
         self.infos.publish(camera_info_message(header, self.scene.camera))
         self.images.publish(image_message(header, self.scene.silhouette(self.posture), "mono8"))
@@ -70,6 +72,19 @@ def test_guidance_gives_up_with_the_reason_when_nobody_comes(person: Person) -> 
     assert [message.data for message in person.guiding] == [False, True, False]
 
 
+def test_whoever_mixes_the_postures_up_is_told_which(person: Person) -> None:
+    person.obeys, person.mistakes = True, {"front": "side", "side": "front"}
+    before = len(person.results)
+    response = person.graph.call("initializer/initialize")
+    expected = "references 'front' and 'side' look swapped; capture both again"
+    assert not response.success and response.message == expected
+    person.graph.wait(lambda: len(person.results) > before, "the result")
+    assert person.results[-1].level == DiagnosticStatus.ERROR
+    assert person.results[-1].message == expected
+    person.graph.wait(lambda: person.statuses[-1].data == expected, "the last line")
+    person.mistakes = {}
+
+
 def test_one_call_guides_captures_and_measures(person: Person) -> None:
     person.obeys, graph = True, person.graph
     person.statuses.clear()
@@ -86,7 +101,7 @@ def test_one_call_guides_captures_and_measures(person: Person) -> None:
 
     graph.wait(first.done, "the answer")
     assert first.result().success, first.result().message
-    graph.wait(lambda: len(person.results) == 2, "the result")
+    graph.wait(lambda: person.results[-1].level == DiagnosticStatus.OK, "the result")
     fit = {entry.key: float(entry.value) for entry in person.results[-1].values}
     assert set(fit) == {"mean iou", "iou front", "iou side", "iou arms"}
     assert mean_iou_of(person.results[-1]) == fit["mean iou"] > 0.6

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, reference_posture
+from cardbox_tracker.estimation.tracker import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
@@ -32,6 +33,7 @@ from cardbox_tracker.ros.messages.conversions import camera_info_message, image_
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 
 
 class Session:
@@ -240,6 +242,9 @@ def test_body_model_message_is_the_saved_file(measured: tuple[Session, str, str]
     assert session.model_file.read_text() == text
     body = loads_body_model(text)
     assert body.placement.distance_m == pytest.approx(2.3)
+    # The images behind the silhouettes were there, and the camera is grey.
+    assert body.appearance is not None
+    assert body.appearance.is_grey
     assert body.size("upper_arm_length") == pytest.approx(
         session.scene.body.size("upper_arm_length"), abs=0.06
     )
@@ -253,7 +258,7 @@ def test_robot_description_is_latched_and_has_the_joints(
     session.graph.wait(lambda: descriptions, "robot_description")
     robot = Xml.fromstring(descriptions[-1].data)
     joints = {j.get("name") for j in robot.findall("joint") if j.get("type") != "fixed"}
-    assert joints == set(JOINT_NAMES)
+    assert joints == set(ALL_NAMES)
     assert "test_optical" in {link.get("name") for link in robot.findall("link")}
 
 
@@ -266,12 +271,12 @@ def test_each_image_gives_joint_states_of_its_stamp(measured: tuple[Session, str
     session.graph.wait(lambda: len(session.joint_states) == first + 15, "15 joint states")
     messages = session.joint_states[first:]
     assert [message.header.stamp for message in messages] == stamps
-    assert all(tuple(message.name) == JOINT_NAMES for message in messages)
-    posture = np.array(messages[-1].position)
+    assert all(tuple(message.name) == ALL_NAMES for message in messages)
+    posture, place = np.split(np.array(messages[-1].position), [len(JOINT_NAMES)])
     body, camera = session.scene.body, session.scene.camera
     truth = reference_posture("front")
     truth[0] = body.placement.lateral_m
-    found = keypoints_m(body, posture)
+    found = keypoints_m(Estimate("tracking", posture, offset_m=place).placed(body), posture)
     error_m = np.linalg.norm(found - keypoints_m(body, truth), axis=1)
     assert error_m.mean() < 0.15
     assert camera.width == 320
@@ -300,7 +305,9 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     assert keypoints[-1].header.frame_id == "test_optical"
     points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
     body, camera = session.scene.body, session.scene.camera
-    expected = camera.reference_to_optical(keypoints_m(body, np.array(state.position)))
+    posture, place = np.split(np.array(state.position), [len(JOINT_NAMES)])
+    placed = Estimate("tracking", posture, offset_m=place).placed(body)
+    expected = camera.reference_to_optical(keypoints_m(placed, posture))
     assert points.shape == (6, 3)
     np.testing.assert_allclose(points, expected, atol=0.1)
     kinds = {marker.ns: marker.type for marker in markers[-1].markers}
@@ -310,12 +317,17 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     assert np.all(np.array(deviations[-1].position) >= 0)
 
     before = len(session.joint_states)
+    states = graph.collect(String, "tracking_state")
+    graph.wait(lambda: graph.node.count_publishers("tracking_state") == 1, "tracking_state")
+    graph.spin(0.5)
     session.show(None, 2)
     graph.wait(
         lambda: any(m.action == Marker.DELETEALL for a in markers for m in a.markers),
         "markers removed when nobody is there",
     )
     assert len(session.joint_states) == before
+    graph.wait(lambda: len(states) == 2, "the state of both images")
+    assert [state.data for state in states] == ["no_person"] * 2
     graph.diagnosis("tracker", "nobody is in the image")
 
 

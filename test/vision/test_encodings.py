@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.vision.encodings import (
     SUPPORTED_ENCODINGS,
+    decode_as_sent,
     decode_bgr,
     decode_compressed,
     decode_grey,
@@ -189,6 +190,24 @@ def test_compressed_images_come_back(extension: str) -> None:
     grey = decode_compressed(array.array("B", data))
     assert grey.shape == (40, 48)
     np.testing.assert_allclose(grey, expected_grey(GREEN), atol=4)
+
+
+@pytest.mark.parametrize("extension", [".jpg", ".png"])
+def test_compressed_images_come_with_the_channels_they_have(extension: str) -> None:
+    for image in (np.full((40, 48), 90, np.uint8), np.full((40, 48, 3), GREEN, np.uint8)):
+        data = cv2.imencode(extension, image)[1].tobytes()
+        np.testing.assert_allclose(decode_compressed(data, grey=None), image, atol=4)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "shape"),
+    [("mono8", (H, W)), ("mono16", (H, W)), ("bgr8", (H, W, 3)), ("bayer_rggb8", (H, W, 3))],
+)
+def test_an_image_as_sent_has_colours_if_its_encoding_has(
+    encoding: str, shape: tuple[int, ...]
+) -> None:
+    step = W * BYTES_PER_PIXEL.get(encoding, 1)
+    assert decode_as_sent(bytes(H * step), H, W, step, encoding).shape == shape
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"no image at all" * 9])

@@ -31,13 +31,14 @@ the pitch is smaller by this factor."""
 
 
 def _units() -> tuple[FloatArray, FloatArray]:
-    """Reciprocal units (12,) for angles below and above rest."""
+    """Reciprocal units (14,) for angles below and above rest; places have none."""
     ranges = JOINT_LIMITS[:, 1] - JOINT_LIMITS[:, 0]
     is_flexion = [name.endswith("flexion") for name in JOINT_NAMES]
     units = np.where(is_flexion, ranges * _FLEXION_UNIT, ranges * _ABDUCTION_UNIT)
     units[JOINT_NAMES.index("torso_y")] = np.inf
     units[1:4] = _TORSO_UNITS_RAD
-    above = 1.0 / units
+    # The last two are torso_x and torso_z, which only some filters have.
+    above = np.append(1.0 / units, [0.0, 0.0])
     below = above.copy()
     below[JOINT_NAMES.index("torso_pitch")] *= _LEANING_BACK
     return below, above
@@ -86,7 +87,7 @@ class RestPriorObservation:
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """Rate torsos by their own angles; the arms do not matter."""
-        return lambda torsos: self._costs(torsos, TORSO)
+        return lambda torsos: self._costs(torsos[:, TORSO], TORSO)
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
         """Rate arms by their own angles; the torso does not matter."""

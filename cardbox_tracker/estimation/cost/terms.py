@@ -12,8 +12,11 @@ observation is asked in three ways:
     observation.arms_beside(torso)(side, arms)      (N, 4) -> (N,)    the torso stays
     observation.postures(postures)                  (N, 12) -> (N,)
 
-The first call of the first two prepares what all particles share. A new term is one new file with
-a settings class, see ``docs/extending.md``.
+The first call of the first two prepares what all particles share. The whole-body filter also finds
+how far the hips have moved along the line of sight and up; it asks the last two only, and appends
+``torso_x`` and ``torso_z`` to torsos, (6,), and to postures, (N, 14). So a term reads d1..d4 and
+d1..d12 by their places and uses the last two if they are there. A new term is one new file with a
+settings class, see ``docs/extending.md``.
 """
 
 from __future__ import annotations
@@ -52,12 +55,15 @@ class Frame:
         rows: rows that count, from the top: those above the hips.
         foreground_px: foreground pixels in those rows.
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
+        posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
+            metres; None where tracking starts.
     """
 
     silhouette: Silhouette
     rows: int
     foreground_px: int
     image: Image | None = None
+    posture: FloatArray | None = None
 
 
 class TermObservation(Protocol):
@@ -72,10 +78,10 @@ class TermObservation(Protocol):
         """
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Return what rates the arms of a body whose torso is at ``torso`` (4,)."""
+        """Return what rates the arms of a body whose torso is at ``torso``, (4,) or (6,)."""
 
     def postures(self, postures: FloatArray) -> FloatArray:
-        """Return the costs (N,) of whole postures (N, 12)."""
+        """Return the costs (N,) of whole postures, (N, 12) or (N, 14)."""
 
 
 class Term(Protocol):
@@ -90,6 +96,26 @@ class TermSettings(Protocol):
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
         """Return the term for a measured person before a working camera."""
+
+
+class Silence:
+    """A term, and its observation, that says nothing."""
+
+    def observe(self, frame: Frame) -> TermObservation:
+        """See :class:`Term`."""
+        return self
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`TermObservation`."""
+        return self.postures
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`TermObservation`."""
+        return lambda side, arms: self.postures(arms)
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """See :class:`TermObservation`."""
+        return np.zeros(len(postures))
 
 
 @dataclass(frozen=True)

@@ -2,33 +2,77 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
 from typing import Protocol
 
+import numpy as np
+
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import TermObservation
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import Frame, Term
+
+
+class Sight(Enum):
+    """What a silhouette can be, by its size."""
+
+    NOBODY = "too few foreground pixels"
+    PERSON = "a person"
+    TOO_MUCH = "more foreground than a person can be"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a filter has found in a frame.
+
+    Attributes:
+        posture: d1..d12, (12,), rad and metres.
+        posture_stddev: standard deviations, (12,).
+        keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
+            optical frame.
+        cost_px: pixels in which the drawn posture and the silhouette differ.
+        iou: their intersection over union.
+        is_uncertain: the posture may be wrong.
+        is_poor: it does not fit; several such frames in a row mean that the person was lost.
+        offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
+        offset_stddev_m: their standard deviations, (2,), or None.
+    """
+
+    posture: FloatArray
+    posture_stddev: FloatArray
+    keypoints_m: FloatArray
+    cost_px: int
+    iou: float
+    is_uncertain: bool
+    is_poor: bool
+    offset_m: FloatArray | None = None
+    offset_stddev_m: FloatArray | None = None
 
 
 class PoseFilter(Protocol):
-    """Follows a posture (12,), rad and metres, from observation to observation."""
+    """Follows one person from frame to frame."""
 
-    def initialize(
-        self, observation: TermObservation, posture: FloatArray, noise_scale: float = 1.0
-    ) -> None:
-        """Start around ``posture`` (12,), with ``noise_scale`` times the usual noise."""
+    def look(self, frame: Frame) -> Sight:
+        """Take the next frame; say whether it can show a person."""
 
-    def iterate(
-        self, observation: TermObservation, noise_scale: float = 1.0, explore: float = 0.0
-    ) -> None:
-        """Run one estimation cycle.
+    def follow(self, terms: Sequence[Term]) -> Fit:
+        """Find the posture in the frame looked at last, by its silhouette and further ``terms``.
 
-        Args:
-            observation: what rates postures.
-            noise_scale: factor on the noise.
-            explore: fraction of the arms' particles to draw from anywhere within the joint limits.
+        Without a person before, it starts around the front reference posture.
         """
 
-    def estimate(self) -> FloatArray:
-        """Return the posture (12,) found by the latest call of one of the above."""
+    def forget(self) -> None:
+        """Start again with the next frame that is followed: the person has left."""
 
-    def stddev(self) -> FloatArray:
-        """Return the standard deviation (12,) of each joint around the estimate."""
+    def recover(self) -> None:
+        """Search widely from the next frame on: the person is there, but nothing fits."""
+
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings, of which none restarts."""
+
+
+MakeFilter = Callable[[TrackerConfig, SilhouetteTerm, np.random.Generator], PoseFilter]
+"""Takes settings, the silhouette's term, which has body and camera, and the source of random
+numbers; returns a new filter."""

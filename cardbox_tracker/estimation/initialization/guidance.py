@@ -24,7 +24,7 @@ def instruction(name: str, side_turn: str) -> str:
     return {
         "front": "face the camera, arms hanging a little away from the body",
         "side": f"{_TURN[side_turn]}, arms hanging a little away from the body",
-        "arms": "face the camera, both arms stretched sideways, just below the shoulders",
+        "arms": "face the camera, arms stretched sideways, just below the shoulders, hands open",
     }[name]
 
 

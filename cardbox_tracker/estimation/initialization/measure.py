@@ -4,6 +4,10 @@ In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset ar
 best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy
 is reached. Beyond the paper:
 
+- References that show another posture than was asked for are refused by name.
+- Breadth of the shoulders, upper arm, forearm and the height of the shoulder joints are measured
+  before the search (:mod:`.skeleton`) and not searched: an outline does not show where they end.
+- In ``arms`` the shoulder joints are as much higher as the girdle lifts them.
 - sigma_alpha starts at the paper's 5 cm and shrinks whenever a round finds nothing better; the
   accuracy is reached when it falls below ``accuracy_m``.
 - Nobody holds a reference posture to the degree, so its angles are estimated beside the sizes, with
@@ -15,8 +19,8 @@ is reached. Beyond the paper:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,13 +28,14 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     N_JOINTS,
+    REFERENCE_NAMES,
     RIGHT_ARM,
-    SIDE_TURNS,
     reference_posture,
 )
 from cardbox_tracker.body.sizes import (
     DEFAULT_SIZES,
     N_SIZES,
+    SIZE_INDEX,
     SIZE_LIMITS,
     SIZE_NAMES,
     SUBSETS,
@@ -38,21 +43,24 @@ from cardbox_tracker.body.sizes import (
 )
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Image
+from cardbox_tracker.estimation.initialization.config import (
+    InitializationConfig,
+    InitializationResult,
+    check_fit,
+)
+from cardbox_tracker.estimation.initialization.outline import filled
+from cardbox_tracker.estimation.initialization.part_colors import can_learn, learn_appearance
+from cardbox_tracker.estimation.initialization.reference_checks import check_postures
 from cardbox_tracker.estimation.initialization.references import (
+    POSTURE_TEXT,
     Silhouette,
     check_references,
     lateral_m,
 )
-from cardbox_tracker.estimation.initialization.stature import (
-    CROWN_TO_HIP,
-    height_of_row_m,
-    stature_m,
-)
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE, measure_skeleton
+from cardbox_tracker.estimation.initialization.stature import SHOULDER_TO_HIP, stature_m
 from cardbox_tracker.vision.camera import Camera
-
-MAX_PITCH_RAD = float(np.radians(80.0))
-"""A camera that looks further up or down does not see an upright person's outline."""
 
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
 """Subset and the reference that shows it, in the order of the paper."""
@@ -64,6 +72,13 @@ _LENGTH_SCATTER, _BREADTH_SCATTER, _LEAST_SCATTER_M = 0.06, 0.20, 0.015
 _ALONG_BONES = np.array(
     [name.endswith(("length", "height", "drop", "breadth")) for name in SIZE_NAMES]
 )
+# The bones of the arms, which are measured before the search.
+_BONES = [
+    SIZE_INDEX[name]
+    for name in ("shoulder_breadth", "shoulder_drop", "upper_arm_length", "forearm_length")
+]
+_BREADTH, _DROP, _UPPER_ARM, _FOREARM = _BONES
+_TORSO_TOP = [SIZE_INDEX["waist_height"], SIZE_INDEX["torso_height"]]
 # Which angles a person misses when asked for a reference posture, and by how much.
 _LOOSE_ANGLE_RAD = np.radians(5.0)
 # How far the place of a reference posture is searched from one round to the next.
@@ -72,115 +87,44 @@ _PLACE_NOISE_M = 0.02
 _SHRINK = 0.7
 
 
-@dataclass(frozen=True)
-class InitializationConfig:
-    """Settings of the initialization."""
-
-    distance_m: float = setting(
-        2.0,
-        "level distance from the camera to the person; a silhouette gives sizes only up to scale",
-        unit="m",
-        limits=(0.3, 20.0),
-    )
-    camera_pitch_rad: float = setting(
-        0.0,
-        "how far the camera looks down; travels to the tracker in the body model",
-        unit="rad",
-        limits=(-MAX_PITCH_RAD, MAX_PITCH_RAD),
-    )
-    side_turn: str = setting(
-        "left",
-        "which way the person turns for the side reference, as they see it",
-        choices=SIDE_TURNS,
-    )
-    hypotheses: int = setting(500, "hypotheses M of the estimation", limits=(10, 100000))
-    max_rounds: int = setting(100, "rounds of a step of the estimation at most", limits=(1, 10000))
-    sigma_alpha_m: float = setting(
-        0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
-    )
-    accuracy_m: float = setting(
-        0.002, "a step ends when its noise has shrunk below this", unit="m", limits=(0.0, 1.0)
-    )
-    prior: float = setting(
-        0.003,
-        "cost of a size one standard deviation off, as a fraction of the silhouette's pixels",
-        limits=(0.0, 1.0),
-    )
-    min_iou: float = setting(
-        0.6,
-        "a measurement is refused if the mean fit (IoU) of the references is below this",
-        limits=(0.0, 1.0),
-    )
-    seed: int = setting(0, "seed of the random draws", limits=(0, 2**31 - 1))
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
-
-
-@dataclass(frozen=True)
-class InitializationResult:
-    """What the initialization found.
-
-    Attributes:
-        body: the measured person.
-        iou: fit of each reference, by name.
-        rounds: rounds that were needed, by subset, both passes together.
-        costs_px: cost and prior of the best hypothesis before the first and after each round, one
-            tuple a pass, by subset.
-    """
-
-    body: BodyModel
-    iou: dict[str, float]
-    rounds: dict[str, int]
-    costs_px: dict[str, list[tuple[float, ...]]]
-
-    @property
-    def mean_iou(self) -> float:
-        """Mean fit of the three references."""
-        return float(np.mean(list(self.iou.values())))
-
-
 def initialize_body(
     references: Mapping[str, Silhouette],
     camera: Camera,
     config: InitializationConfig | None = None,
     progress: Callable[[float], None] | None = None,
+    images: Mapping[str, Sequence[Image]] | None = None,
 ) -> InitializationResult:
-    """Measure a person.
+    """Measure a person, and learn what they look like.
 
     Args:
         references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
         camera: working camera, of the silhouettes' size.
         config: settings.
         progress: called with the finished fraction.
+        images: some of each of the references ``front`` and ``arms``, (H, W, 3) bgr or (H, W), of
+            the camera's size; without them the body has no appearance.
 
     Raises:
-        InitializationError: the references are unusable, or the model does not fit them.
+        InitializationError: the references are unusable, show other postures than they should, or
+            the model does not fit them; the text names which and what to do.
     """
     config = config or InitializationConfig()
     check_references(references)
     camera = camera.with_pitch(config.camera_pitch_rad)
+    references = {name: filled(references[name]) for name in REFERENCE_NAMES}
+    if config.check_postures:
+        check_postures(references, camera, config.distance_m)
     search = _Search(references, camera, config)
     for number in range(2 * len(STEPS)):
         search.step(*STEPS[number % len(STEPS)])
         if progress is not None:
             progress((number + 1) / (2 * len(STEPS)))
     result = search.result()
-    if result.mean_iou < config.min_iou:
-        fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
-        raise InitializationError(
-            f"the model fits the references poorly (IoU {fits}; mean {result.mean_iou:.2f}, "
-            f"expected {config.min_iou:.2f} or more); check person_distance_m "
-            f"({config.distance_m:g} m), the camera's pitch "
-            f"({np.degrees(config.camera_pitch_rad):g} degrees), the side the person turned to "
-            f"({config.side_turn}), and look at the silhouettes"
-        )
-    return result
+    check_fit(result, config)
+    if images is None or not can_learn(images, references):
+        return result
+    appearance = learn_appearance(images, references, result.body, camera, config.seed)
+    return replace(result, body=result.body.with_values(appearance=appearance))
 
 
 class _Search:
@@ -192,12 +136,19 @@ class _Search:
         self._config = config
         self._references = references
         self._rng = np.random.default_rng(config.seed)
-        stature = stature_m(references, camera, config.distance_m)
-        crown_row = np.nonzero(np.any(references["front"], axis=1))[0][0] - 0.5
-        crown_m = height_of_row_m(camera, crown_row, config.distance_m)
-        self._initial = np.clip(
-            DEFAULT_SIZES * stature / _DEFAULT_STATURE_M, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]
-        )
+        skeleton = measure_skeleton(references, camera, config.distance_m)
+        if skeleton is None:
+            raise InitializationError(
+                f"reference 'arms': no arms are seen; capture it again: {POSTURE_TEXT['arms']}"
+            )
+        stature = stature_m(references["front"], skeleton, camera, config.distance_m)
+        self._shoulder_height_m = skeleton.shoulder_height_m
+        self._hip_height_m = skeleton.shoulder_height_m - SHOULDER_TO_HIP * stature
+        sizes = DEFAULT_SIZES * stature / _DEFAULT_STATURE_M
+        sizes[_BREADTH] = skeleton.shoulder_breadth_m
+        sizes[_UPPER_ARM], sizes[_FOREARM] = skeleton.upper_arm_m, skeleton.forearm_m
+        sizes = np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1])
+        self._initial = self._with_shoulders_in_place(sizes[None])[0]
         self._sizes = self._initial.copy()
         self._scatter = np.maximum(
             np.where(_ALONG_BONES, _LENGTH_SCATTER, _BREADTH_SCATTER) * self._initial,
@@ -206,7 +157,7 @@ class _Search:
         self._start = BodyModel.of(
             self._sizes,
             distance_m=config.distance_m,
-            hip_height_m=crown_m - CROWN_TO_HIP * stature,
+            hip_height_m=self._hip_height_m,
             lateral_m=lateral_m(references["front"], camera, config.distance_m),
             camera_pitch_rad=config.camera_pitch_rad,
             side_turn=config.side_turn,
@@ -228,6 +179,7 @@ class _Search:
         config = self._config
         size_mask = np.zeros(N_SIZES)
         size_mask[SUBSETS[subset]] = 1.0
+        size_mask[_BONES] = 0.0
         loose = _loose_joints(name)
         posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
         posture_noise[0] = _PLACE_NOISE_M
@@ -243,6 +195,7 @@ class _Search:
                 SIZE_LIMITS[:, 0],
                 SIZE_LIMITS[:, 1],
             )
+            hypotheses = self._with_shoulders_in_place(hypotheses)
             postures = posture + noise[:, N_SIZES:] * posture_noise
             # No joint limits here: whoever turns for the side reference moves the feet, too.
             costs = self._rate(name, hypotheses, postures)
@@ -257,13 +210,20 @@ class _Search:
         self._history[subset].append(tuple(history))
         self._sizes, self._postures[name] = sizes, posture
 
+    def _with_shoulders_in_place(self, sizes: FloatArray) -> FloatArray:
+        """Sizes (N, 18) whose shoulder joints are as high as measured, whatever the torso's top."""
+        placed = sizes.copy()
+        drop_m = self._hip_height_m + sizes[:, _TORSO_TOP].sum(axis=1) - self._shoulder_height_m
+        placed[:, _DROP] = np.clip(drop_m, *SIZE_LIMITS[_DROP])
+        return placed
+
     def _rate(self, name: str, sizes: FloatArray, postures: FloatArray) -> FloatArray:
         seen = self._seen[name]
         weight_px = self._config.prior * seen.frame.foreground_px
         size_steps = (sizes - self._initial) / self._scatter
         angle_steps = ((postures - self._asked[name]) / _LOOSE_ANGLE_RAD)[:, 1:]
         prior = np.sum(size_steps**2, axis=1) + np.sum(angle_steps**2, axis=1)
-        rated: FloatArray = seen.bodies(sizes, postures) + weight_px * prior
+        rated: FloatArray = seen.bodies(_sizes_in(name, sizes), postures) + weight_px * prior
         return rated
 
     def result(self) -> InitializationResult:
@@ -274,12 +234,22 @@ class _Search:
             hip_height_m=round(float(start.placement.hip_height_m), 4),
             lateral_m=round(float(self._postures["front"][0]), 4),
         )
-        fitted = CompiledSilhouette(body, self._camera)
-        iou = {
-            name: fitted.look(silhouette).overlap(self._postures[name])[1]
-            for name, silhouette in self._references.items()
-        }
+        iou = {}
+        for name, silhouette in self._references.items():
+            shown = body.with_values(sizes=_sizes_in(name, body.sizes[None])[0])
+            fitted = CompiledSilhouette(shown, self._camera).look(silhouette)
+            iou[name] = fitted.overlap(self._postures[name])[1]
         return InitializationResult(body, iou, self._rounds, self._history)
+
+
+def _sizes_in(name: str, sizes: FloatArray) -> FloatArray:
+    """Sizes (N, 18) as a reference shows them: in ``arms`` the girdle lifts the shoulder joints."""
+    if name != "arms":
+        return sizes
+    lifted = sizes.copy()
+    drop_m = sizes[:, _DROP] - GIRDLE_RISE * sizes[:, _BREADTH]
+    lifted[:, _DROP] = np.maximum(drop_m, SIZE_LIMITS[_DROP, 0])
+    return lifted
 
 
 def _loose_joints(name: str) -> FloatArray:

@@ -25,11 +25,12 @@ MAX_PERSON_FRACTION = 0.6
 MAX_LIKENESS = 0.80
 """Two different reference postures overlap less than this, as IoU when laid over each other."""
 
-_POSTURE_TEXT = {
+POSTURE_TEXT = {
     "front": "face the camera, arms 20 degrees away from the body",
     "side": "turn by 90 degrees, arms as before",
-    "arms": "face the camera, both arms stretched sideways",
+    "arms": "face the camera, both arms stretched sideways, hands open",
 }
+"""What a person has to do for each reference."""
 
 
 def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
@@ -59,7 +60,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         raise InitializationError(
             f"reference '{name}': nobody is in the image ({100 * share:.1f} % foreground, "
             f"expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of the camera "
-            f"and {_POSTURE_TEXT[name]}"
+            f"and {POSTURE_TEXT[name]}"
         )
     if share > MAX_PERSON_FRACTION:
         raise InitializationError(
@@ -75,7 +76,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         if np.any(pixels):
             raise InitializationError(
                 f"reference '{name}': the person is cut off at the {border} border of the "
-                f"image; step back or to the middle, and {_POSTURE_TEXT[name]}"
+                f"image; step back or to the middle, and {POSTURE_TEXT[name]}"
             )
 
 
@@ -102,7 +103,7 @@ def check_references(references: Mapping[str, Silhouette]) -> None:
             raise InitializationError(
                 f"references 'front' and '{name}' are too alike (IoU {likeness:.2f}, expected "
                 f"below {MAX_LIKENESS:.2f}): {action}; capture '{name}' again: "
-                f"{_POSTURE_TEXT[name]}"
+                f"{POSTURE_TEXT[name]}"
             )
 
 

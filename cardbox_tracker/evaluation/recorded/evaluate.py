@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from cardbox_tracker.evaluation.paper.results import provenance, write_json
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
-from cardbox_tracker.evaluation.recorded.tracking import track_session
+from cardbox_tracker.evaluation.recorded.tracking import recovery_of, track_session
 from cardbox_tracker.files import atomic_path
 
 
@@ -25,6 +26,7 @@ def evaluate_sessions(
     preset: str,
     seeds: tuple[int, ...],
     jobs: int,
+    recovery: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Evaluate recorded sessions; write ``sessions.json`` and ``sessions.md`` into ``output``.
@@ -35,6 +37,7 @@ def evaluate_sessions(
         preset: a name of ``PRESETS``.
         seeds: of initialization and filters; each is a run of its own.
         jobs: processes.
+        recovery: also measure how soon it is right again after disturbances.
         progress: told the finished fraction.
 
     Returns:
@@ -52,7 +55,9 @@ def evaluate_sessions(
     compile_all()
     sessions = []
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        work = [pool.submit(evaluate_session, folder, preset, seeds) for folder in folders]
+        work = [
+            pool.submit(evaluate_session, folder, preset, seeds, recovery) for folder in folders
+        ]
         for done, future in enumerate(work, 1):
             sessions.append(future.result())
             if progress is not None:
@@ -71,13 +76,28 @@ def evaluate_sessions(
     return results
 
 
-def evaluate_session(folder: Path, preset: str, seeds: tuple[int, ...]) -> dict[str, Any]:
-    """Return the figures of one session: of each run, and MediaPipe's beside them."""
+def evaluate_session(
+    folder: Path, preset: str, seeds: tuple[int, ...], recovery: bool = False
+) -> dict[str, Any]:
+    """Return the figures of one session: of each run, and MediaPipe's beside them.
+
+    With ``recovery`` the first seed's run also has how often it recovered from disturbances.
+    """
     session = load_session(folder)
-    runs = track_session(session, PRESETS[preset](), seeds)
+    config = PRESETS[preset]()
+    try:
+        runs = track_session(session, config, seeds)
+        found = [figures(session, run) for run in runs]
+        if runs[0].body is not None and recovery:
+            found[0]["recovery"] = {
+                kind: asdict(one)
+                for kind, one in recovery_of(session, runs[0].body, config, seeds[0]).items()
+            }
+    except CardboxError as error:
+        found = [{"frames": len(session.stamps_ns), "failure": str(error)}]
     return {
         "name": session.name,
         "mediapipe": session.mediapipe,
         "mediapipe_ms": session.mediapipe_ms,
-        "runs": [figures(session, run) for run in runs],
+        "runs": found,
     }

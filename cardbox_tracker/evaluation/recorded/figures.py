@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.estimation.tracker import TRACKING
 from cardbox_tracker.evaluation.metrics import align, angle_errors_deg
@@ -122,7 +124,13 @@ def coverage(session: RecordedSession, run: SessionRun) -> dict[str, float]:
 
 
 def lengths(session: RecordedSession, run: SessionRun) -> dict[str, float]:
-    """Ratio of each measured length to the true one, of the truth's own joints."""
+    """Return the measured lengths beside those of the truth's own joints.
+
+    Returns:
+        ``upper_arm``, ``forearm`` and ``shoulders`` as ratios to the true ones, and
+        ``joint_height``: how much higher the shoulder joints are than the true ones while the arms
+        hang in the reference ``front``, cm; nan where the truth has no such image.
+    """
     assert run.body is not None
     truth = session.keypoints_m
 
@@ -135,4 +143,24 @@ def lengths(session: RecordedSession, run: SessionRun) -> dict[str, float]:
         "upper_arm": run.body.size("upper_arm_length") / upper_arm,
         "forearm": run.body.size("forearm_length") / forearm,
         "shoulders": run.body.size("shoulder_breadth") / true_m(0, 3),
+        "joint_height": 100 * (_joint_height_m(run.body) - _true_joint_height_m(session)),
     }
+
+
+def _joint_height_m(body: BodyModel) -> float:
+    """Height of an upright person's shoulder joints above the camera's centre."""
+    return body.placement.hip_height_m + body_parts(body.sizes).shoulder_height_m
+
+
+def _true_joint_height_m(session: RecordedSession) -> float:
+    shoulders = [
+        frame.keypoints_m[list(SHOULDERS)].mean(axis=0)
+        for frame in session.truth.frames.values()
+        if frame.segment == "front"
+    ]
+    if not shoulders:
+        return float("nan")
+    pitch_rad = np.radians(session.truth.pitch_deg)
+    # Upwards in the optical frame of a camera that looks down by the pitch.
+    up = np.array([0.0, -np.cos(pitch_rad), -np.sin(pitch_rad)])
+    return float(np.median(np.array(shoulders) @ up))

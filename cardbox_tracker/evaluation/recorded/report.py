@@ -30,6 +30,7 @@ def sessions_report(results: Results) -> str:
         *_versus(results),
         *_signed(results),
         *_steadiness(results),
+        *_recovery(results),
         *_lengths(results),
         *_motions(results),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']} on "
@@ -140,13 +141,62 @@ def _lengths(results: Results) -> list[str]:
             ("upper arm", "upper_arm"),
             ("forearm to hand", "forearm"),
             ("shoulder breadth", "shoulders"),
+            ("shoulder joints too high, cm", "joint_height"),
         )
     }
     return [
         "## Measured lengths, as a ratio to the true ones",
         "",
-        *_table(results, columns, "{:.3f}"),
+        "The height of the shoulder joints is compared while the arms hang.",
+        "",
+        *_table(results, columns, ("{:.3f}", "{:.3f}", "{:.3f}", "{:+.1f}")),
+        *_deviations(results, columns),
     ]
+
+
+def _deviations(results: Results, columns: Mapping[str, Callable[[Results], float]]) -> list[str]:
+    """A sentence with the mean and the largest deviation of each length; none without lengths."""
+    table = np.array([[column(s) for column in columns.values()] for s in results["sessions"]])
+    measured = table[np.isfinite(table).all(axis=1)]
+    if not measured.size:
+        return []
+    *ratios, height = np.abs(measured - (1.0, 1.0, 1.0, 0.0)).T
+    texts = [
+        f"{name} {100 * off.mean():.1f} % ({100 * off.max():.1f} %)"
+        for name, off in zip(columns, ratios, strict=False)
+    ]
+    joints = f"shoulder joints {height.mean():.1f} cm ({height.max():.1f} cm)"
+    return [f"Mean (largest) deviation: {', '.join(texts)}, {joints}.", ""]
+
+
+def _recovery(results: Results) -> list[str]:
+    """How often each kind of disturbance was recovered from; empty where it was not measured."""
+    kinds = dict.fromkeys(
+        kind for s in results["sessions"] for run in s["runs"] for kind in run.get("recovery", {})
+    )
+    if not kinds:
+        return []
+    lines = [
+        "## Recovery after disturbances",
+        "",
+        "In brackets the trials, with the first seed. Recovered: half a second to one second after "
+        "the disturbance the mean error is at most 4 cm above that of the undisturbed run, or "
+        "below 10 cm.",
+        "",
+        f"| session | {' | '.join(kinds)} |",
+        "|---" * (len(kinds) + 1) + "|",
+    ]
+    totals = {kind: np.zeros(2, int) for kind in kinds}
+    for session in results["sessions"]:
+        cells = []
+        for kind in kinds:
+            trials = [r["recovery"][kind] for r in session["runs"] if "recovery" in r]
+            counts = np.array([(t["recovered"], t["trials"]) for t in trials]).reshape(-1, 2)
+            totals[kind] += counts.sum(axis=0)
+            cells.append("{} ({})".format(*counts.sum(axis=0)))
+        lines.append(f"| {session['name']} | {' | '.join(cells)} |")
+    cells = ["{} ({})".format(*total) for total in totals.values()]
+    return [*lines, f"| **all** | {' | '.join(cells)} |", ""]
 
 
 def _motions(results: Results) -> list[str]:
@@ -177,13 +227,19 @@ def _coverage(session: Results, summary: Callable[[list[float]], Any]) -> float:
 
 
 def _table(
-    results: Results, columns: Mapping[str, Callable[[Results], float]], form: str
+    results: Results,
+    columns: Mapping[str, Callable[[Results], float]],
+    form: str | tuple[str, ...],
 ) -> list[str]:
-    """Rows are sessions; then the means over all, and over those with motion capture."""
+    """Rows are sessions; then the means over all, and over those with motion capture.
+
+    ``form`` is that of all columns, or one of each.
+    """
+    forms = (form,) * len(columns) if isinstance(form, str) else form
     sessions = results["sessions"]
     values = {s["name"]: [column(s) for column in columns.values()] for s in sessions}
     lines = [f"| session | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
-    lines += [_row(name, row, form) for name, row in values.items()]
+    lines += [_row(name, row, forms) for name, row in values.items()]
     groups = {f"mean of {len(sessions)}": list(values)}
     captured = [name for name in values if MOTION_CAPTURE in name]
     if 0 < len(captured) < len(values):
@@ -191,10 +247,13 @@ def _table(
     for label, names in groups.items():
         rows = np.array([values[name] for name in names])
         means = [float(np.nanmean(c)) if np.isfinite(c).any() else float("nan") for c in rows.T]
-        lines.append(_row(f"**{label}**", means, form))
+        lines.append(_row(f"**{label}**", means, forms))
     return [*lines, ""]
 
 
-def _row(name: str, values: Iterable[float], form: str) -> str:
-    cells = [form.format(value) if np.isfinite(value) else "" for value in values]
+def _row(name: str, values: Iterable[float], forms: Iterable[str]) -> str:
+    cells = [
+        form.format(value) if np.isfinite(value) else ""
+        for value, form in zip(values, forms, strict=True)
+    ]
     return f"| {name} | {' | '.join(cells)} |"

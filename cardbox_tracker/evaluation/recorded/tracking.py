@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
@@ -67,12 +68,28 @@ def track_session(
                 if tracker is None:
                     continue
                 start = time.perf_counter()
-                estimates[frame.stamp_ns] = tracker.track(frame.silhouette)
+                estimates[frame.stamp_ns] = tracker.track(frame.silhouette, frame.image)
                 spent.append(1e3 * (time.perf_counter() - start))
     return [
         _run(session, body, failure, estimates, spent)
         for (body, failure), estimates, spent in zip(bodies, found, times, strict=True)
     ]
+
+
+def recovery_of(
+    session: RecordedSession, body: BodyModel, config: TrackerConfig, seed: int
+) -> dict[str, Recovery]:
+    """Return how often the tracker recovers from disturbances on one session, by their kind.
+
+    Raises:
+        CardboxError: the recording cannot be read.
+    """
+    with BagReader(session.bag) as bag:
+        source = SilhouetteSource(bag, session.spans["empty"])
+        frames = list(
+            source.frames(session.start_s + (session.truth.start_ns - bag.start_ns) / 1e9)
+        )
+        return measure_recovery(session, frames, body, source.camera, config, seed)
 
 
 def _measure(

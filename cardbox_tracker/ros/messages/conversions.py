@@ -28,7 +28,7 @@ def stamp_ns(stamp: Time) -> int:
 
 
 def image_of(message: Image | CompressedImage) -> ImageArray:
-    """Return an image message as bgr (H, W, 3), or as brightness (H, W) if it has no colours.
+    """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
 
     Raises:
         EncodingError: the encoding is not supported or the bytes do not match it.
@@ -43,6 +43,26 @@ def image_of(message: Image | CompressedImage) -> ImageArray:
         message.encoding,
         bool(message.is_bigendian),
     )
+
+
+def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:
+    """Return the image (H, W, 3) or (H, W) that a silhouette (H, W) was cut out of; None for None.
+
+    Raises:
+        CameraError: it has another size.
+        EncodingError: the encoding is not supported or the bytes do not match it.
+    """
+    if message is None:
+        return None
+    image = image_of(message)
+    if image.shape[:2] != silhouette.shape:
+        (height, width), (rows, columns) = image.shape[:2], silhouette.shape
+        raise CameraError(
+            f"the image of the silhouette is {width}x{height} but the silhouette is "
+            f"{columns}x{rows}; take both from one background node, or start the tracker with "
+            "use_image:=false"
+        )
+    return image
 
 
 def silhouette_of(message: Image) -> ImageArray:
@@ -66,14 +86,20 @@ def silhouette_of(message: Image) -> ImageArray:
     return data[: step * height].reshape(height, step)[:, :width]
 
 
-def image_message(header: Header, image: NDArray[Any], encoding: str) -> Image:
-    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32, as ``encoding``."""
+def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:
+    """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
+
+    Args:
+        header: of the message.
+        image: its pixels.
+        encoding: their meaning; mono8 or bgr8 by default.
+    """
     contiguous = np.ascontiguousarray(image)
     message = Image(
         header=header,
         height=contiguous.shape[0],
         width=contiguous.shape[1],
-        encoding=encoding,
+        encoding=encoding or ("mono8" if image.ndim == 2 else "bgr8"),
         is_bigendian=0,
         step=contiguous.strides[0],
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from cardbox_tracker.estimation.initialization.measure import InitializationResult
+from cardbox_tracker.estimation.initialization.config import InitializationResult
 
 _NAME = "initialization"
 _HARDWARE_ID = "cardbox_tracker"

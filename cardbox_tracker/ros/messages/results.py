@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3
 from sensor_msgs.msg import JointState
-from std_msgs.msg import ColorRGBA, Header
+from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
-from cardbox_tracker.outputs import JointValues, Markers, Points, Value
+from cardbox_tracker.outputs import JointValues, Markers, Points, Text, Value
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
@@ -57,6 +57,7 @@ _ENCODERS: dict[type[Value], tuple[Any, Callable[[Header, Any], Any]]] = {
     JointValues: (JointState, joint_state_message),
     Points: (PoseArray, points_message),
     Markers: (MarkerArray, markers_message),
+    Text: (String, lambda _, text: String(data=text.text)),
 }
 
 

@@ -44,6 +44,7 @@ class BackgroundNode(CardboxNode):
         self._covered = 0.0
 
         self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
         self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
@@ -140,8 +141,12 @@ class BackgroundNode(CardboxNode):
     def _publish(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
+        if self._images.get_subscription_count():
+            # Before the silhouette, so that nobody who needs both has to wait.
+            self._images.publish(conversions.image_message(header, image))
         silhouette = pipeline.silhouette(image)
-        # The image first, so that the tracker does not wait for a CameraInfo that rarely changes.
+        # The silhouette first, so that the tracker does not wait for a CameraInfo that rarely
+        # changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
         self._covered = np.count_nonzero(silhouette) / silhouette.size

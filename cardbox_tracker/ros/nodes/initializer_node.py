@@ -22,8 +22,9 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
+from cardbox_tracker.estimation.initialization.config import InitializationResult
 from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
-from cardbox_tracker.estimation.initialization.measure import InitializationResult, initialize_body
+from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
@@ -57,6 +58,8 @@ class InitializerNode(CardboxNode):
         self._topic = self.resolve("silhouette")
         self._references = ReferenceCapture(self._topic)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
+        add_image = self._references.add_image
+        self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
@@ -118,24 +121,24 @@ class InitializerNode(CardboxNode):
     def _measure(self) -> str:
         settings, references = self.parameters.value, self._references
         references.check_running()
-        before = dict(references.captured)
+        before = dict(references.captured), dict(references.images)
         try:
             Guidance(self._guide.show, self._capture, self._wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
             )
-            if self._camera is None:
+            if (camera := self._camera) is None:
                 raise InitializationError(
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
                     "silhouettes from the background node, which publishes it"
                 )
             result = initialize_body(
-                references.captured, self._camera, settings.config(), self._progress
+                references.captured, camera, settings.config(), self._progress, references.images
             )
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
-            references.captured = before
+            references.captured, references.images = before
             raise
-        references.captured = {}
+        references.captured, references.images = {}, {}
         answer = _answer(result)
         self._result.publish(measured_message(result, answer))
         self._publish(result.body)
@@ -158,8 +161,10 @@ class InitializerNode(CardboxNode):
         self._describe(body)
 
     def _describe(self, body: BodyModel) -> None:
-        frame_id = self._frame_id if self.parameters.value.optical_frame_in_urdf else None
-        self._description.publish(String(data=urdf_from_body(body, frame_id or None)))
+        settings = self.parameters.value
+        frame_id = self._frame_id if settings.optical_frame_in_urdf else None
+        urdf = urdf_from_body(body, frame_id or None, torso_place=settings.torso_place_in_urdf)
+        self._description.publish(String(data=urdf))
 
     def _values(self) -> dict[str, str]:
         return {

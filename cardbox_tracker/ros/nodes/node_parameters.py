@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     MAX_PITCH_RAD,
     InitializationConfig,
 )
@@ -81,6 +81,8 @@ class InitializerParameters(NodeParameters):
     hypotheses: int = shared(InitializationConfig, "hypotheses", effect=_NEXT_MEASUREMENT)
     max_rounds: int = shared(InitializationConfig, "max_rounds", effect=_NEXT_MEASUREMENT)
     seed: int = shared(InitializationConfig, "seed", effect=_NEXT_MEASUREMENT)
+    check_postures: bool = shared(InitializationConfig, "check_postures", effect=_NEXT_MEASUREMENT)
+    least_iou: float = shared(InitializationConfig, "least_iou", effect=_NEXT_MEASUREMENT)
     capture_frames: int = parameter(
         5,
         "silhouettes a capture combines, each pixel by majority; more of them remove more noise, "
@@ -112,6 +114,12 @@ class InitializerParameters(NodeParameters):
         "already publishes where it is",
         effect=_NEXT_MEASUREMENT,
     )
+    torso_place_in_urdf: bool = parameter(
+        True,
+        "robot_description has the joints torso_x and torso_z; must be the same as the tracker's "
+        "torso_place",
+        effect=_NEXT_MEASUREMENT,
+    )
 
     def config(self) -> InitializationConfig:
         """Return the settings of the core."""
@@ -122,6 +130,8 @@ class InitializerParameters(NodeParameters):
             hypotheses=self.hypotheses,
             max_rounds=self.max_rounds,
             seed=self.seed,
+            check_postures=self.check_postures,
+            least_iou=self.least_iou,
         )
 
 

@@ -1,4 +1,4 @@
-"""Keep the latest silhouettes, and make reference silhouettes of them on request."""
+"""Keep the latest silhouettes and images, and make reference silhouettes of them on request."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ from cardbox_tracker.estimation.initialization.references import (
     average_silhouette,
     check_reference,
 )
-from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
+from cardbox_tracker.ros.messages.conversions import (
+    ImageArray,
+    image_of,
+    silhouette_of,
+    stamp_ns,
+)
 
 # As many as the parameter capture_frames allows.
 _KEPT = 30
@@ -28,19 +33,26 @@ class ReferenceCapture:
 
     Attributes:
         captured: reference silhouettes (H, W), 0 or 255.
+        images: the images behind those silhouettes that came in time, (H, W, 3) bgr or (H, W).
     """
 
     def __init__(self, topic: str) -> None:
         """``topic`` is where silhouettes come from, for the texts."""
         self.captured: dict[str, Silhouette] = {}
+        self.images: dict[str, list[ImageArray]] = {}
         self._topic = topic
         self._recent: deque[Image] = deque(maxlen=_KEPT)
+        self._recent_images: deque[Image] = deque(maxlen=_KEPT)
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
         """Keep a silhouette as the latest one."""
         self._recent.append(message)
         self._received_s = time.monotonic()
+
+    def add_image(self, message: Image, _: int) -> None:
+        """Keep the image that a silhouette with the same stamp is cut out of."""
+        self._recent_images.append(message)
 
     @property
     def missing(self) -> list[str]:
@@ -68,15 +80,19 @@ class ReferenceCapture:
         messages = list(self._recent)[-frames:]
         latest = messages[-1]
         now_ns = stamp_ns(latest.header.stamp)
-        silhouettes = [
-            silhouette_of(message)
+        alike = [
+            message
             for message in messages
             if (message.width, message.height) == (latest.width, latest.height)
             and 0 <= now_ns - stamp_ns(message.header.stamp) <= _ONE_POSTURE_NS
         ]
+        silhouettes = [silhouette_of(message) for message in alike]
         silhouette = average_silhouette(silhouettes)
         check_reference(name, silhouette)
+        stamps = {stamp_ns(message.header.stamp) for message in alike}
+        images = [m for m in self._recent_images if stamp_ns(m.header.stamp) in stamps]
         self.captured[name] = silhouette
+        self.images[name] = [image_of(message) for message in images]
         text = f"captured '{name}' from {len(silhouettes)} silhouettes"
         age_s = time.monotonic() - self._received_s
         if age_s > _OLD_S:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from typing import Any
 
@@ -14,24 +13,17 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.precompile import compile_all
-from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, Estimate, Tracker
-from cardbox_tracker.outputs import FIGURES
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
-
-_REASONS = {
-    NO_PERSON: "nobody is in the image",
-    LOST: (
-        "the person was lost (the model does not fit the silhouette); call tracker/reset when they "
-        "stand in the front reference posture, or initialize again if it is another person"
-    ),
-}
 
 
 class TrackerNode(CardboxNode):
@@ -47,19 +39,21 @@ class TrackerNode(CardboxNode):
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._tracker: Tracker | None = None
-        self._state = ""
-        self._counts: dict[str, int] = {}
-        self._estimate: Estimate | None = None
 
-        self._outputs = TrackerOutputs(self, self.parameters.value.rep155_id)
+        self._outputs = TrackerOutputs(self, self.parameters.value)
         self._model_topic = self.resolve("body_model")
         self._silhouette_topic = self.resolve("silhouette")
         self._info_topic = self.resolve("silhouette/camera_info")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
-        self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
+        self._pairing = ImagePairing(self._on_silhouette)
+        if self.parameters.value.use_image:
+            add_image = self._pairing.add_image
+            self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
+        add_silhouette = self._pairing.add_silhouette
+        self.subscribe(Image, "silhouette", add_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
-        self.diagnostics.extra = self._values
+        self._report = TrackerReport(self)
         if self.parameters.value.model_file:
             self._use(load_body_model(self.parameters.value.model_file))
         self._wait()
@@ -92,6 +86,7 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
+        self._pairing.waits = body.appearance is not None
         self._build("new body model")
         self._wait()
 
@@ -111,7 +106,7 @@ class TrackerNode(CardboxNode):
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
         self._tracker = Tracker(self._body, self._camera, settings.config(), rng)
-        self._state = ""
+        self._report.start()
         self.get_logger().info(f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
@@ -123,7 +118,7 @@ class TrackerNode(CardboxNode):
         self._build("reset")
         return "tracking starts again from the front reference posture"
 
-    def _on_silhouette(self, message: Image, sent_ns: int) -> None:
+    def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
         header = message.header
         if not self.diagnostics.input.add(conversions.stamp_ns(header.stamp)) and self._tracker:
             self._build("an image is older than the one before (a bag that loops?)")
@@ -138,35 +133,11 @@ class TrackerNode(CardboxNode):
                 f"the silhouette is {width}x{height} but {self._info_topic} describes "
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
-        estimate = self._tracker.track(silhouette)
+        image = conversions.image_behind(silhouette, seen)
+        estimate = self._tracker.track(silhouette, image)
         self._outputs.publish(header, estimate, silhouette, self._tracker)
-        self._note(estimate)
+        self._report.add(estimate)
         self.diagnostics.working(sent_ns)
-
-    def _note(self, estimate: Estimate) -> None:
-        self._estimate = estimate
-        self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
-        if estimate.state != self._state:
-            self._state = estimate.state
-            reason = _REASONS.get(estimate.state)
-            text = f"not tracking: {reason}" if reason else "tracking"
-            self.get_logger().info(text)
-        self.diagnostics.advice = self._advice
-
-    def _advice(self) -> list[str]:
-        reason = _REASONS.get(self._state)
-        return [f"no joint states: {reason}"] if reason else []
-
-    def _values(self) -> dict[str, str]:
-        values = {"state": self._state or "not started"}
-        values |= {f"images {state}": str(count) for state, count in self._counts.items()}
-        estimate = self._estimate
-        if estimate is not None and estimate.posture is not None:
-            values |= {figure.label: figure.text(estimate) for figure in FIGURES}
-            if estimate.posture_stddev is not None:
-                angles = estimate.posture_stddev[1:]
-                values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"
-        return values
 
 
 def main(args: list[str] | None = None) -> int:

@@ -67,6 +67,18 @@ class TrackerParameters(NodeParameters):
         "body model to start with; one that arrives on body_model replaces it; empty: none",
         read_only=True,
     )
+    torso_place: bool = parameter(
+        True,
+        "joint_states also has torso_x and torso_z, where the person stands; must be the same as "
+        "the initializer's torso_place_in_urdf",
+        read_only=True,
+    )
+    use_image: bool = parameter(
+        True,
+        "also take silhouette/image, to see hands and forearms before the torso by the colours "
+        "that the body model has of them",
+        read_only=True,
+    )
     rep155_id: str = parameter(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "

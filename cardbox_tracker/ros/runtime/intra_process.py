@@ -45,6 +45,10 @@ class IntraProcessPublisher:
         self._publisher = publisher
         self._takers = takers
 
+    def get_subscription_count(self) -> int:
+        """Return how many take the messages, in this process and in others."""
+        return len(self._takers) + int(self._publisher.get_subscription_count())
+
     def publish(self, message: Any) -> None:
         """Return when the takers are done; they share ``message`` and leave it as it is."""
         for taker in self._takers:

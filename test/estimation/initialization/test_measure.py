@@ -13,12 +13,13 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.body.sizes import SIZE_INDEX, SIZE_LIMITS, SUBSETS
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
-from cardbox_tracker.estimation.initialization.measure import (
+from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
-    initialize_body,
 )
-from cardbox_tracker.simulation.person import random_body
+from cardbox_tracker.estimation.initialization.measure import initialize_body
+from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE
+from cardbox_tracker.simulation.person import FINGER_REACH, random_body
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.simulation.session import session_camera
 from cardbox_tracker.vision.rasterisation import render
@@ -48,13 +49,22 @@ SHOWN_M = 0.03
 SHARED_M = 0.06
 
 
+def as_people_are(body: BodyModel, name: str) -> BodyModel:
+    """The body as it shows in a reference: open hands, and shoulders that rise with the arms."""
+    sizes = body.sizes.copy()
+    sizes[SIZE_INDEX["forearm_length"]] *= 1.0 + FINGER_REACH
+    if name == "arms":
+        sizes[SIZE_INDEX["shoulder_drop"]] -= GIRDLE_RISE * body.size("shoulder_breadth")
+    return body.with_values(sizes=np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]))
+
+
 def references_of(body: BodyModel) -> dict[str, np.ndarray]:
     camera = CAMERA.with_pitch(body.camera_pose.pitch_rad)
     silhouettes = {}
     for name in REFERENCE_NAMES:
         posture = reference_posture(name, body.side_turn)
         posture[0] = body.placement.lateral_m
-        silhouette = render(cardbox_patches(body, posture), camera)
+        silhouette = render(cardbox_patches(as_people_are(body, name), posture), camera)
         # The model ends at the hips; a person goes on, down to the image's lower border.
         middle = round(camera.cx + camera.fx * body.placement.lateral_m / body.placement.distance_m)
         silhouette[rows_above_hips(body, camera) :, middle - 20 : middle + 20] = 255
@@ -241,12 +251,74 @@ def test_a_poor_fit_is_refused_with_its_numbers() -> None:
         references[name] = silhouette
     references["side"][40:70, 40:280] = 255
     with pytest.raises(InitializationError) as caught:
-        initialize_body(references, CAMERA, InitializationConfig())
+        initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
     text = str(caught.value)
     assert text.startswith("the model fits the references poorly (IoU front 0.")
     for part in ("mean 0.", "expected 0.60 or more", "person_distance_m (2 m)", "pitch (0 degrees"):
         assert part in text
     assert "the side the person turned to (left)" in text
+
+
+def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
+    body = BodyModel.of(hip_height_m=-0.51)
+    reached = measure(body).iou
+    least = max(reached.values())
+    poor = sorted(name for name in reached if reached[name] < least)
+    with pytest.raises(InitializationError) as caught:
+        measure(body, least_iou=least)
+    text = str(caught.value)
+    assert text.startswith("the model fits '")
+    for name in poor:
+        assert f"'{name}'" in text.split("poorly")[0]
+    assert f"expected {least:.2f} or more of each" in text
+
+
+@pytest.mark.parametrize(
+    ("swapped", "text"),
+    [
+        (("front", "side"), "'front' and 'side' look swapped"),
+        (("front", "arms"), "'front' and 'arms' look swapped"),
+        (("side", "arms"), "'side' and 'arms' look swapped"),
+    ],
+)
+def test_swapped_references_are_refused_before_any_work(
+    swapped: tuple[str, str], text: str
+) -> None:
+    references = references_of(BodyModel.of(hip_height_m=-0.51))
+    first, second = swapped
+    references[first], references[second] = references[second], references[first]
+    told: list[float] = []
+    with pytest.raises(InitializationError, match=text):
+        initialize_body(references, CAMERA, InitializationConfig(), told.append)
+    assert told == []
+
+
+def test_the_bones_of_the_arms_do_not_depend_on_the_seed() -> None:
+    body = BodyModel.of(hip_height_m=-0.51)
+    first, second = measure(body, seed=7).body, measure(body, seed=8).body
+    for name in ("shoulder_breadth", "upper_arm_length", "forearm_length"):
+        assert first.size(name) == second.size(name)
+    # Rounding to a tenth of a millimetre leaves no more than that.
+    assert heights_m(first)["shoulder"] == pytest.approx(heights_m(second)["shoulder"], abs=3e-4)
+
+
+def test_without_arms_nothing_is_measured() -> None:
+    references = references_of(BodyModel.of(hip_height_m=-0.51))
+    arms = references["arms"]
+    arms[:] = 0
+    arms[20:, 150:169] = 255
+    with pytest.raises(InitializationError, match="reference 'arms': no arms are seen; capture"):
+        initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
+
+
+def test_arms_of_another_posture_are_measured_where_the_check_is_off() -> None:
+    references = references_of(BodyModel.of(hip_height_m=-0.51))
+    columns = np.flatnonzero(references["arms"].any(axis=0))
+    references["arms"][:, columns[-1] - 45 :] = 0
+    with pytest.raises(InitializationError, match="the left arm is bent"):
+        initialize_body(references, CAMERA, InitializationConfig())
+    config = InitializationConfig(check_postures=False, least_iou=0.3)
+    assert initialize_body(references, CAMERA, config).mean_iou > 0.6
 
 
 def test_the_required_fit_is_a_setting() -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.evaluation.paper.sessions import (
@@ -20,6 +19,7 @@ from cardbox_tracker.evaluation.paper.sessions import (
     recorded_session,
     synthetic_session,
 )
+from cardbox_tracker.simulation.person import person_keypoints_m
 
 
 def test_it_starts_before_the_motion_in_the_front_posture(session: Session) -> None:
@@ -41,7 +41,7 @@ def test_silhouettes_and_truth_belong_together(session: Session) -> None:
 
 def test_the_truth_is_that_of_the_kinematics(session: Session) -> None:
     person = BodyModel.of(hip_height_m=-0.51)
-    expected = session.camera.reference_to_optical(keypoints_m(person, session.postures))
+    expected = session.camera.reference_to_optical(person_keypoints_m(person, session.postures))
     np.testing.assert_allclose(session.keypoints_m, expected, atol=1e-4)
     np.testing.assert_allclose(session.torso_rad, session.postures[:, 1:4], atol=1e-3)
 

@@ -16,7 +16,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.errors import CameraError, EncodingError
-from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points
+from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points, Text
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.camera_info import calibration_from_info
@@ -156,8 +156,12 @@ def test_no_markers_remove_those_before() -> None:
     assert marker.action == Marker.DELETEALL
 
 
+def test_a_state_is_a_word() -> None:
+    assert results.message_of(HEADER, Text("uncertain")).data == "uncertain"
+
+
 def test_every_output_has_its_message() -> None:
-    values = (JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()))
+    values = (JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()), Text("a"))
     for value in values:
         message = results.message_of(HEADER, value)
         assert isinstance(message, results.message_type(type(value)))

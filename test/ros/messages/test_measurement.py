@@ -6,7 +6,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.estimation.initialization.measure import InitializationResult
+from cardbox_tracker.estimation.initialization.config import InitializationResult
 from cardbox_tracker.ros.messages.measurement import (
     mean_iou_of,
     measured_message,

@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
-from cardbox_tracker.estimation.initialization.measure import InitializationConfig
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
 from cardbox_tracker.ros.nodes.node_parameters import (
     NODES,

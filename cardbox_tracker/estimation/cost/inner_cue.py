@@ -1,0 +1,256 @@
+"""The cue inside the outline: hands and forearms by their colours.
+
+An outline says nothing of an arm before the torso. This term knows from the initialization what the
+person's parts look like (``BodyModel.appearance``):
+
+1. The brightness of the torso is followed slowly, so that the colours stay comparable.
+2. Within the silhouette's bounding box every pixel gets two log-likelihood ratios, of the hand and
+   of the forearm, against what else would be there: torso, head, or what is below the hips, by
+   where the last posture has them.
+3. An arm gains the mean ratio over its hand and over its forearm, each times the area, as at the
+   place where the person is expected: a sum over pixels, so that a limb is not rewarded for being
+   short, and not for coming nearer.
+4. A hand gains less where the other forearm is, and nothing behind the torso.
+
+The gain is subtracted from the cost. Without an image, without a posture before, or for a person
+whose colours are not known, the term says nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.appearance import (
+    COLOR_STEPS,
+    FOREARM,
+    GREY_STEPS,
+    HAND,
+    HEAD,
+    LEGS,
+    TORSO,
+    steps_of_levels,
+)
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
+from cardbox_tracker.estimation.cost.inner_cue_kernels import ratio_maps
+from cardbox_tracker.estimation.cost.terms import (
+    ARMS,
+    ArmCosts,
+    Frame,
+    Image,
+    Silence,
+    Silhouette,
+    Term,
+    TermObservation,
+    TorsoCosts,
+)
+from cardbox_tracker.settings import check, setting
+from cardbox_tracker.vision.camera import Camera
+
+# One pixel says no more than this: histograms of a few hundred pixels are not that certain.
+_LIMIT_NATS = 2.5
+# Parts whose Bhattacharyya distance is below this look alike and say nothing.
+_ALIKE = 0.05
+# The light is not believed to change beyond this.
+_DARKEST, _BRIGHTEST = 0.6, 1.6
+# Every so many pixels of the torso, at least so many rows and columns, and pixels in the outline.
+_STRIDE, _LEAST_SIDE_PX, _LEAST_PX = 3, 6, 20
+
+_OTHER = {"left": "right", "right": "left"}
+
+
+@dataclass(frozen=True)
+class InnerCue:
+    """Settings of the cue inside the outline."""
+
+    hand: float = setting(
+        0.7,
+        "pixels of the outline that a pixel of a hand is worth for each nat by which it looks like "
+        "one",
+        limits=(0.0, 10.0),
+    )
+    forearm: float = setting(0.7, "the same of a forearm", limits=(0.0, 10.0))
+    light: float = setting(
+        0.25,
+        "share of an image in the brightness to which its colours are compared; 0: the light does "
+        "not change",
+        limits=(0.0, 1.0),
+    )
+    lifts_shoulders: bool = setting(
+        True,
+        "shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as in "
+        "the filter hierarchical",
+    )
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of range; the text names it.
+        """
+        check(self)
+
+    def build(self, body: BodyModel, camera: Camera) -> Term:
+        """Return the term, which says nothing of a body without an appearance."""
+        return Silence() if body.appearance is None else InnerCueTerm(self, body, camera)
+
+
+_SILENCE = Silence()
+
+
+class InnerCueTerm:
+    """The cue for one person whose colours are known."""
+
+    def __init__(self, config: InnerCue, body: BodyModel, camera: Camera) -> None:
+        """Prepare for one body before one camera, and compile the kernels if they are not yet.
+
+        Raises:
+            ValueError: ``body`` has no appearance.
+        """
+        if body.appearance is None:
+            raise ValueError("the body has no appearance; learn it, or track without this term")
+        self.config = config
+        self._appearance = body.appearance
+        self._ratios = ratios_of(body.appearance.histograms)
+        self._brightness = body.appearance.brightness.copy()
+        self._arms = ArmView.of(
+            body, camera, np.array([config.hand, config.forearm]), config.lifts_shoulders
+        )
+        self._warm_up(camera)
+
+    def _warm_up(self, camera: Camera) -> None:
+        """Run every kernel once, so that no live image waits for the compiler."""
+        shape = (camera.height, camera.width)
+        image = np.zeros(shape if self._appearance.is_grey else (*shape, 3), np.uint8)
+        observation = self.observe(Frame(np.full(shape, 255, np.uint8), 1, 1, image, np.zeros(14)))
+        observation.arms_beside(np.zeros(4))("left", np.zeros((1, 4)))
+        self._brightness = self._appearance.brightness.copy()
+
+    def observe(self, frame: Frame) -> TermObservation:
+        """Return what the image says, or that it says nothing."""
+        if frame.posture is None:
+            # Tracking starts anew, maybe after a while and in another light.
+            self._brightness = self._appearance.brightness.copy()
+            return _SILENCE
+        image = None if frame.image is None else self._comparable(frame.image)
+        if image is None:
+            return _SILENCE
+        zones = self._arms.zones(frame.posture)
+        self._follow_light(image, frame.silhouette, zones)
+        u0, v0, width, height = cv2.boundingRect(frame.silhouette)
+        maps = self._maps(image, frame.silhouette, zones, (u0, v0, width, height))
+        before = frame.posture[None]
+        others = {
+            side: self._arms.project(torsos_of(before), before[:, joints], side)[0]
+            for side, joints in ARMS.items()
+        }
+        return InnerCueObservation(self._arms, maps, (u0, v0), others)
+
+    def _comparable(self, image: Image) -> Image | None:
+        """Return the image (H, W, channels) as the colours were learned; None if it lacks them."""
+        if image.ndim == 2:
+            return image[..., None] if self._appearance.is_grey else None
+        if self._appearance.is_grey:
+            return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)[..., None]
+        return image
+
+    def _follow_light(self, image: Image, silhouette: Silhouette, zones: FloatArray) -> None:
+        """Let the torso's brightness follow that of the chest, below the head."""
+        u, v, half_width, half_height, hips, _ = zones.tolist()
+        top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
+        left, right = max(int(u - 1.2 * half_width), 0), int(u + 1.2 * half_width)
+        if min(bottom - top, right - left) < _LEAST_SIDE_PX or self.config.light <= 0:
+            return
+        some = (slice(top, bottom, _STRIDE), slice(left, right, _STRIDE))
+        chest = image[some][silhouette[some] > 0]
+        if len(chest) < _LEAST_PX:
+            return
+        learned = self._appearance.brightness
+        now = np.clip(np.median(chest, axis=0), _DARKEST * learned, _BRIGHTEST * learned)
+        self._brightness += self.config.light * (now - self._brightness)
+
+    def _maps(
+        self,
+        image: Image,
+        silhouette: Silhouette,
+        zones: FloatArray,
+        box: tuple[int, int, int, int],
+    ) -> NDArray[np.float32]:
+        """Ratios of hand and forearm within ``box`` (u, v, width, height), (2, h, w), nats."""
+        u0, v0, width, height = box
+        maps = np.empty((2, max(height, 1), max(width, 1)), np.float32)
+        part = (slice(v0, v0 + maps.shape[1]), slice(u0, u0 + maps.shape[2]))
+        # Copies, which are small: the kernel is compiled for one type of array, whatever the
+        # image's is (out of a message, for one, it is read-only).
+        ratio_maps(
+            np.array(image[part], order="C"),
+            np.array(silhouette[part], order="C"),
+            steps_of_levels(self._brightness, self._appearance.brightness),
+            GREY_STEPS if self._appearance.is_grey else COLOR_STEPS,
+            self._ratios,
+            zones - (u0, v0, 0, 0, v0, v0),
+            maps,
+        )
+        for one in maps:
+            cv2.blur(one, (3, 3), one)
+        return maps
+
+
+def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:
+    """Return log-likelihood ratios by zone (torso, head, below), hand or forearm, and bin, nats."""
+    # Around the hips shirt and trousers meet, so both are expected there.
+    below = 0.5 * histograms[TORSO] + 0.5 * histograms[LEGS]
+    ratios = np.zeros((3, 2, histograms.shape[1]), np.float32)
+    for zone, other in enumerate((histograms[TORSO], histograms[HEAD], below)):
+        for part, own in enumerate((histograms[HAND], histograms[FOREARM])):
+            if -np.log(np.sum(np.sqrt(own * other))) >= _ALIKE:
+                ratios[zone, part] = np.clip(np.log(own / other), -_LIMIT_NATS, _LIMIT_NATS)
+    return ratios
+
+
+@dataclass(frozen=True, eq=False)
+class InnerCueObservation:
+    """The cue of one frame; see :class:`~cardbox_tracker.estimation.cost.terms.TermObservation`.
+
+    Attributes:
+        view: the person who is looked for.
+        maps: ratios of hand and forearm, (2, h, w), nats.
+        corner: column and row of the image where the maps begin.
+        others: elbow and hand of each arm in the frame before, (1, 2, 3).
+    """
+
+    view: ArmView
+    maps: NDArray[np.float32]
+    corner: tuple[int, int]
+    others: dict[str, FloatArray]
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """Nothing: the outline says where the torso is."""
+        return _SILENCE.postures
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """Rate arms by what is seen at their place; the other arm is where it was last."""
+        torsos = np.zeros((1, 6))
+        torsos[0, : len(torso)] = torso
+
+        def costs(side: str, arms: FloatArray) -> FloatArray:
+            points, hidden = self.view.project(torsos, arms, side)
+            other = self.others[_OTHER[side]]
+            return -self.view.gains(points, hidden, other, self.maps, self.corner)
+
+        return costs
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """Rate both arms."""
+        torsos = torsos_of(postures)
+        seen = {s: self.view.project(torsos, postures[:, joints], s) for s, joints in ARMS.items()}
+        left, right = (
+            self.view.gains(*seen[side], seen[_OTHER[side]][0], self.maps, self.corner)
+            for side in ARMS
+        )
+        return -(left + right)

@@ -1,0 +1,308 @@
+"""The cue inside the outline, compiled: maps of a frame, arms in the image, and their gains.
+
+All in one file, since the cache of compiled code asks only the file of the function that is called
+whether it has changed (``cost/kernels.py``). A torso is (6,): d1..d4, and how far the hips are
+nearer to the camera and higher than their place, metres. Rotations are as in ``body/kinematics.py``
+and the optical frame as in ``cost/kernels.py``.
+"""
+
+from __future__ import annotations
+
+from math import acos, cos, sin, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+
+# The forearm's patch: where it begins and ends, as fractions of elbow to fist (then comes the
+# hand), and its width as a fraction of the forearm's, for a wider one samples what lies beside.
+_BEGIN, _END, _WIDTH = 0.04, 0.76, 0.7
+_POINTS = (6, 3)
+# The hand's patch: a fist is nearly as long as wide, and its middle lies before the forearm's end.
+_HAND_LENGTH_M, _HAND_WIDTH_M, _HAND_BEFORE_END_M = 0.09, 0.075, 0.02
+_HAND_POINTS = (4, 3)
+# Half of a hand's gain goes where the other forearm covers it: the pixels are one hand's only.
+_CLAIM = 0.5
+# How far from the axis of the other forearm it, or its hand, still covers anything.
+_CLAIM_REACH_M = 0.09
+# A hand further behind the torso's middle than this, and within its width, is covered by it.
+_BEHIND_M = 0.03
+_NEAREST_M = 0.1
+
+_TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+
+class Lengths(NamedTuple):
+    """Lengths of a body, metres, and how its shoulders rise; a plain tuple to the kernels.
+
+    ``clavicle`` is the radius of the circle on which the girdle lifts a shoulder joint, by
+    ``lift_gain`` times the elevation of the upper arm beyond ``lift_from``, rad.
+    """
+
+    shoulder_aside: float
+    shoulder_height: float
+    upper_arm: float
+    forearm: float
+    forearm_width: float
+    torso_top: float
+    torso_width: float
+    head_middle: float
+    head_forward: float
+    head_width: float
+    head_height: float
+    waist_height: float
+    clavicle: float
+    lift_gain: float
+    lift_from: float
+
+
+LengthsTuple = tuple[float, ...]
+Pair = tuple[float, float]
+
+
+@_inline
+def _torso_pose(torso: Any, place: PlaceTuple, view: ViewTuple, rotation: Any, hip: Any) -> None:
+    """Write rotation (3, 3) and mid-hip (3,) of a torso (6,) in the optical frame."""
+    cr, sr = cos(torso[1]), sin(torso[1])
+    cp, sp = cos(torso[2]), sin(torso[2])
+    cw, sw = cos(torso[3]), sin(torso[3])
+    cv, sv = view[4], view[5]
+    for j in range(3):
+        if j == 0:
+            x, y, z = cw * cp, sw * cp, -sp
+        elif j == 1:
+            x, y, z = cw * sp * sr - sw * cr, sw * sp * sr + cw * cr, cp * sr
+        else:
+            x, y, z = cw * sp * cr + sw * sr, sw * sp * cr - cw * sr, cp * cr
+        rotation[0, j] = y
+        rotation[1, j] = -cv * z + sv * x
+        rotation[2, j] = -sv * z - cv * x
+    distance, height = place[0] - torso[4], place[1] + torso[5]
+    hip[0] = torso[0]
+    hip[1] = -cv * height - sv * distance
+    hip[2] = -sv * height + cv * distance
+
+
+@_inline
+def _turn_limb(parent: Any, abduction: float, flexion: float, rotation: Any) -> None:
+    """Write parent Rx(abduction) Ry(-flexion), each (3, 3)."""
+    ca, sa = cos(abduction), sin(abduction)
+    cf, sf = cos(flexion), sin(flexion)
+    for j in range(3):
+        px, py, pz = parent[j, 0], parent[j, 1], parent[j, 2]
+        y = ca * py + sa * pz
+        z = ca * pz - sa * py
+        rotation[j, 0] = cf * px + sf * z
+        rotation[j, 1] = y
+        rotation[j, 2] = cf * z - sf * px
+
+
+@_compile
+def torso_zones(
+    torso: Any, lengths: LengthsTuple, place: PlaceTuple, view: ViewTuple, zones: Any
+) -> None:
+    """Write where the head and the torso of a torso (6,) are in the image: ``zones`` (6,), px.
+
+    Centre of the head (u, v), half axes of an ellipse around it, the row of the hips, and the row
+    of the torso's top.
+    """
+    body = Lengths(*lengths)
+    rotation, hip = np.empty((3, 3)), np.empty(3)
+    _torso_pose(torso, place, view, rotation, hip)
+    heights = (body.head_middle, 0.6 * body.waist_height, body.torso_top)
+    for i in range(3):
+        forward = body.head_forward if i == 0 else 0.0
+        x = hip[0] + forward * rotation[0, 0] + heights[i] * rotation[0, 2]
+        y = hip[1] + forward * rotation[1, 0] + heights[i] * rotation[1, 2]
+        z = max(hip[2] + forward * rotation[2, 0] + heights[i] * rotation[2, 2], _NEAREST_M)
+        row = view[1] * y / z + view[3]
+        if i == 0:
+            per_m = view[0] / z
+            zones[0], zones[1] = view[0] * x / z + view[2], row
+            zones[2], zones[3] = 0.6 * body.head_width * per_m, 0.6 * body.head_height * per_m
+        elif i == 1:
+            zones[4] = row
+        else:
+            zones[5] = row + 0.02 * per_m
+
+
+@_compile
+def ratio_maps(
+    pixels: Any, inside: Any, steps_of_levels: Any, steps: int, ratios: Any, zones: Any, maps: Any
+) -> None:
+    """Write the ratios (2, h, w), nats, of hand and forearm against what else would be there.
+
+    Args:
+        pixels: (h, w, channels).
+        inside: silhouette (h, w), 0 outside.
+        steps_of_levels: step of each level of each channel, (channels, 256).
+        steps: how many there are.
+        ratios: by zone, hand or forearm, and bin, (3, 2, bins).
+        zones: (6,), in pixels of these arrays, see :func:`torso_zones`.
+        maps: written.
+    """
+    for v in range(maps.shape[1]):
+        for u in range(maps.shape[2]):
+            maps[0, v, u] = maps[1, v, u] = 0.0
+            if inside[v, u] == 0:
+                continue
+            color = 0
+            for c in range(pixels.shape[2]):
+                color = color * steps + steps_of_levels[c, pixels[v, u, c]]
+            zone = _LOWER_ZONE if v > zones[4] else _TORSO_ZONE
+            a, b = (u - zones[0]) / zones[2], (v - zones[1]) / zones[3]
+            # The neck is skin, too: what lies under the head and above the torso's top.
+            if a * a + b * b < 1.0 or (abs(a) < 0.8 and b > 0.0 and v < zones[5]):
+                zone = _HEAD_ZONE
+            maps[0, v, u] = ratios[zone, 0, color]
+            maps[1, v, u] = ratios[zone, 1, color]
+
+
+@_compile
+def project_arms(
+    torsos: Any,
+    arms: Any,
+    side: float,
+    lengths: LengthsTuple,
+    place: PlaceTuple,
+    view: ViewTuple,
+    points: Any,
+    hidden: Any,
+) -> None:
+    """Write where arms are in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
+
+    Points are u, v, px a metre of elbow and hand (the forearm's end) of ``arms`` (N, 4), rad, at
+    ``torsos`` (N, 6), or (1, 6) for all of them; hidden is a hand behind the torso. ``side`` is 1
+    for left arms, -1 for right ones.
+    """
+    body = Lengths(*lengths)
+    torso, upper, fore = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    hip, joint = np.empty(3), np.empty(3)
+    for i in range(arms.shape[0]):
+        if i == 0 or torsos.shape[0] > 1:
+            _torso_pose(torsos[i], place, view, torso, hip)
+        _turn_limb(torso, side * arms[i, 0], arms[i, 1], upper)
+        aside, height = body.shoulder_aside, body.shoulder_height
+        if body.lift_gain > 0.0:
+            upright = 0.0
+            for c in range(3):
+                upright += upper[c, 2] * torso[c, 2]
+            elevation = acos(min(max(upright, -1.0), 1.0))
+            lift = body.lift_gain * max(elevation - body.lift_from, 0.0)
+            aside -= body.clavicle * (1.0 - cos(lift))
+            height += body.clavicle * sin(lift)
+        for c in range(3):
+            joint[c] = hip[c] + side * aside * torso[c, 1] + height * torso[c, 2]
+            joint[c] -= body.upper_arm * upper[c, 2]
+        _turn_limb(upper, side * arms[i, 2], arms[i, 3], fore)
+        for j in range(2):
+            z = max(joint[2], _NEAREST_M)
+            points[i, j, 0] = view[0] * joint[0] / z + view[2]
+            points[i, j, 1] = view[1] * joint[1] / z + view[3]
+            points[i, j, 2] = view[0] / z
+            if j == 0:
+                for c in range(3):
+                    joint[c] -= body.forearm * fore[c, 2]
+        x = y = h = 0.0
+        for c in range(3):
+            x += (joint[c] - hip[c]) * torso[c, 0]
+            y += (joint[c] - hip[c]) * torso[c, 1]
+            h += (joint[c] - hip[c]) * torso[c, 2]
+        width = body.torso_width if h < body.torso_top else body.head_width
+        hidden[i] = x < -_BEHIND_M and abs(y) < width / 2
+
+
+@_compile
+def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
+    """Mean of ``ratios`` (h, w) over a grid of so many points, along and across, of a patch.
+
+    ``half`` is half the patch along the limb, ``aside`` half of it across, px; outside is 0.
+    """
+    h, w = ratios.shape
+    along, across = points
+    total = 0.0
+    for i in range(along):
+        s = (2.0 * i + 1.0) / along - 1.0
+        for j in range(across):
+            t = (2.0 * j + 1.0) / across - 1.0
+            x = int(centre[0] + s * half[0] + t * aside[0] + 0.5)
+            y = int(centre[1] + s * half[1] + t * aside[1] + 0.5)
+            if 0 <= x < w and 0 <= y < h:
+                total += ratios[y, x]
+    return total / (along * across)
+
+
+@_inline
+def _claimed(u: float, v: float, other: Any, u0: int, v0: int) -> float:
+    """How much of a hand at (u, v) the other forearm, or its hand, covers: 1 all, 0 nothing."""
+    eu, ev = other[0, 0] - u0, other[0, 1] - v0
+    du, dv = other[1, 0] - u0 - eu, other[1, 1] - v0 - ev
+    along = ((u - eu) * du + (v - ev) * dv) / max(du * du + dv * dv, 1e-6)
+    along = min(max(along, 0.0), 1.05)
+    away = sqrt((u - eu - along * du) ** 2 + (v - ev - along * dv) ** 2)
+    covered: float = max(1.0 - away / (_CLAIM_REACH_M * other[1, 2]), 0.0)
+    return covered
+
+
+@_compile
+def arm_gains(
+    points: Any,
+    hidden: Any,
+    others: Any,
+    maps: Any,
+    u0: int,
+    v0: int,
+    forearm_m: float,
+    width_m: float,
+    px_per_m: float,
+    weights: Any,
+    gains: Any,
+) -> None:
+    """Write the gains (N,), px, of arms.
+
+    Args:
+        points: (N, 2, 3), see :func:`project_arms`.
+        hidden: (N,), the hand shows nothing.
+        others: (N, 2, 3), or (1, 2, 3) for all: points of the other arm.
+        maps: ratios of hand and forearm, (2, h, w), nats.
+        u0: first column of the maps in the image.
+        v0: first row of the maps.
+        forearm_m: length of the forearm with fist.
+        width_m: of the forearm.
+        px_per_m: where the person is expected; areas count as there, or whatever comes nearer to
+            the camera, and so covers more, would gain.
+        weights: px of the outline that one of hand and forearm is worth for each nat, (2,).
+        gains: written.
+    """
+    for i in range(points.shape[0]):
+        gains[i] = 0.0
+        if hidden[i]:
+            continue
+        eu, ev = points[i, 0, 0] - u0, points[i, 0, 1] - v0
+        hu, hv = points[i, 1, 0] - u0, points[i, 1, 1] - v0
+        per_m = points[i, 1, 2]
+        du, dv = hu - eu, hv - ev
+        length = sqrt(du * du + dv * dv)
+        au, av = (du / length, dv / length) if length > 1e-6 else (0.0, 1.0)
+        along, across = 0.5 * _HAND_LENGTH_M * per_m, 0.5 * _HAND_WIDTH_M * per_m
+        before = _HAND_BEFORE_END_M / forearm_m
+        centre = (hu - before * du, hv - before * dv)
+        half, aside = (au * along, av * along), (-av * across, au * across)
+        hand = _mean(maps[0], centre, half, aside, _HAND_POINTS)
+        if hand > 0.0:
+            other = others[i if others.shape[0] > 1 else 0]
+            hand *= 1.0 - _CLAIM * _claimed(hu, hv, other, u0, v0)
+        gains[i] += weights[0] * hand * _HAND_LENGTH_M * _HAND_WIDTH_M * px_per_m**2
+        middle, reach = 0.5 * (_BEGIN + _END), 0.5 * (_END - _BEGIN)
+        across = 0.5 * _WIDTH * width_m * per_m
+        centre = (eu + middle * du, ev + middle * dv)
+        half, aside = (reach * du, reach * dv), (-av * across, au * across)
+        forearm = _mean(maps[1], centre, half, aside, _POINTS)
+        # A forearm that points to the camera shows less: its length in the image counts.
+        area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
+        gains[i] += weights[1] * forearm * area_m2 * px_per_m**2

@@ -1,0 +1,131 @@
+"""A learned prior of one arm's posture: what people do with their arms.
+
+An outline is alike for an arm that points to the camera and one that points away. The prior is a
+mixture of Gaussians over six numbers, the unit vectors of upper arm and forearm in the torso's
+frame: x forwards, y outwards (to the left for the left arm, to the right for the right one), z up.
+``tools/make_pose_prior.py`` learns it from motion capture; the data file names the source. Its unit
+is the nat: -log p, about 0 at the likeliest posture, never above ``FLOOR_NATS``.
+
+Both arms share it: a positive abduction raises either outwards, so d5..d8 and d9..d12 mean alike.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from math import cos, exp, log, sin
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from cardbox_tracker.body.sizes import FloatArray
+
+FLOOR_NATS = 8.0
+"""About what a posture costs that was nowhere in the motion capture; none is impossible, so an arm
+that the image shows clearly is found there, too."""
+
+_DATA = "pose_prior.json"
+_D = 6
+
+
+@cache
+def _data() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath(_DATA).read_text(encoding="utf-8")
+    data: dict[str, Any] = json.loads(text)
+    return data
+
+
+@cache
+def load_gmm() -> FloatArray:
+    """Return the mixture, (K, 28), read-only; a row is a Gaussian with mean m and covariance C.
+
+    Its numbers are log(share / density's normalization) less the offset that makes the likeliest
+    posture cost about nothing (1), m (6), and the lower triangle of L^-1, C = L L^T, row by row
+    (21); so that log p = log(sum of exp(row[0] - |L^-1 (x - m)|^2 / 2)).
+    """
+    data = _data()
+    shares, means = np.array(data["shares"]), np.array(data["means"])
+    whitening = np.linalg.inv(np.linalg.cholesky(np.array(data["covariances"])))
+    logs = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1)
+    constants = np.log(shares) + logs - 0.5 * _D * np.log(2 * np.pi) - data["offset"]
+    rows, columns = np.tril_indices(_D)
+    gmm: FloatArray = np.hstack([constants[:, None], means, whitening[:, rows, columns]])
+    gmm.setflags(write=False)
+    return gmm
+
+
+def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
+    """Draw arms from the mixture: unit vectors of upper arm and forearm, (count, 6)."""
+    data = _data()
+    rng = np.random.default_rng(seed)
+    shares = np.array(data["shares"])
+    chosen = rng.choice(len(shares), count, p=shares / shares.sum())
+    means, covariances = data["means"], data["covariances"]
+    drawn = np.array([rng.multivariate_normal(means[k], covariances[k]) for k in chosen])
+    limbs = drawn.reshape(count, 2, 3)
+    limbs /= np.linalg.norm(limbs, axis=2, keepdims=True)
+    return drawn
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
+    """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm; ``away`` is scratch."""
+    density = rest
+    for k in range(gmm.shape[0]):
+        for row in range(_D):
+            away[row] = directions[row] - gmm[k, 1 + row]
+        squares = 0.0
+        place = 1 + _D
+        for row in range(_D):
+            y = 0.0
+            for column in range(row + 1):
+                y += gmm[k, place] * away[column]
+                place += 1
+            squares += y * y
+        log_density = gmm[k, 0] - 0.5 * squares
+        # Less would not change a sum that is exp(-FLOOR_NATS) at least.
+        if log_density > -20.0:
+            density += exp(log_density)
+    return -log(density)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add_arm_prior(arms: Any, gmm: Any, floor_nats: float, weight: float, costs: Any) -> None:
+    """Add ``weight`` times -log p, nats, of arms (N, 4), rad, to ``costs`` (N,), in place."""
+    x, away = np.empty(_D), np.empty(_D)
+    rest = exp(-floor_nats)
+    for i in range(arms.shape[0]):
+        ca, sa = cos(arms[i, 0]), sin(arms[i, 0])
+        cf, sf = cos(arms[i, 1]), sin(arms[i, 1])
+        x[0], x[1], x[2] = sf, sa * cf, -ca * cf
+        # The forearm's direction in the frame of the upper arm, turned by Rx(a) Ry(-f).
+        ce, se = cos(arms[i, 3]), sin(arms[i, 3])
+        u, v, w = se, sin(arms[i, 2]) * ce, -cos(arms[i, 2]) * ce
+        x[3] = cf * u - sf * w
+        z = sf * u + cf * w
+        x[4] = ca * v - sa * z
+        x[5] = sa * v + ca * z
+        costs[i] += weight * nats_of(x, gmm, rest, away)
+
+
+class ArmPrior:
+    """-log p of arms in nats, see the module."""
+
+    def __init__(self, floor_nats: float = FLOOR_NATS) -> None:
+        """Read the mixture, and compile the kernel if it is not yet."""
+        self._gmm = np.array(load_gmm())
+        self._floor_nats = floor_nats
+        self(np.zeros((1, 4)))
+
+    def __call__(self, arms: FloatArray) -> FloatArray:
+        """Return -log p (N,), nats, of arms (N, 4): shoulder and elbow as in d5..d8, rad."""
+        costs = np.zeros(len(arms))
+        self.add(costs, arms, 1.0)
+        return costs
+
+    def add(self, costs: FloatArray, arms: FloatArray, weight: float) -> None:
+        """Add ``weight`` times -log p of arms (N, 4) to ``costs`` (N,), float64, in place."""
+        contiguous = np.ascontiguousarray(arms, np.float64)
+        add_arm_prior(contiguous, self._gmm, self._floor_nats, weight, costs)

@@ -1,0 +1,107 @@
+"""The hierarchical filter as a tracker uses it: cycles a frame, new searches, how well it fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.posture import clip_to_limits, reference_posture
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, SumOfTerms, Term
+from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+from cardbox_tracker.vision.rasterisation import render
+
+# Somebody sideways shows about half the area of the front view, at the image's border less.
+_PERSON_FRACTION = 0.25
+_RECOVERY_CYCLES = 4
+_RECOVERY_NOISE = 2.0
+
+MakeHierarchy = Callable[[TrackerConfig, int, np.random.Generator], HierarchicalFilter]
+
+
+class Cycles:
+    """A :class:`~cardbox_tracker.estimation.filtering.pose_filter.PoseFilter` after the paper.
+
+    That is its algorithm "Online Motion Tracking".
+    """
+
+    def __init__(
+        self,
+        config: TrackerConfig,
+        silhouette: SilhouetteTerm,
+        rng: np.random.Generator,
+        make_hierarchy: MakeHierarchy = HierarchicalFilter,
+    ) -> None:
+        """Prepare; ``make_hierarchy`` takes settings, pixels of an image and random numbers."""
+        self._config, self._term = config, silhouette
+        body, camera = silhouette.body, silhouette.camera
+        self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
+        self._keypoints = CompiledKeypoints(body, camera)
+        self._reference = reference_posture("front")
+        self._reference[0] = body.placement.lateral_m
+        model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
+        self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
+        self._started = False
+
+    def look(self, frame: Frame) -> Sight:
+        """See :class:`PoseFilter`."""
+        self._frame = frame
+        return Sight.NOBODY if frame.foreground_px < self._min_person_px else Sight.PERSON
+
+    def forget(self) -> None:
+        """See :class:`PoseFilter`."""
+        self._started = False
+
+    def recover(self) -> None:
+        """See :class:`PoseFilter`."""
+        self._started = False
+
+    def configure(self, config: TrackerConfig) -> None:
+        """See :class:`PoseFilter`."""
+        self._config = config
+
+    def follow(self, terms: Sequence[Term]) -> Fit:
+        """See :class:`PoseFilter`."""
+        seen = self._term.observe(self._frame)
+        observation = SumOfTerms((seen, *(term.observe(self._frame) for term in terms)))
+        if self._started:
+            self._iterate(observation)
+        else:
+            self._start(observation)
+        posture = self.hierarchy.estimate()
+        cost_px, iou = seen.overlap(posture)
+        is_poor = iou < self._config.lost_iou
+        keypoints_m = self._keypoints(posture)
+        stddev = self.hierarchy.stddev()
+        return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor)
+
+    def _iterate(self, observation: SumOfTerms) -> None:
+        """Run the cycles of one frame, with falling noise; the first one explores."""
+        for cycle in range(self._config.cycles):
+            explore = self._config.explore if cycle == 0 else 0.0
+            self.hierarchy.iterate(observation, self._config.noise_decay**cycle, explore)
+
+    def _start(self, observation: SumOfTerms) -> None:
+        """Start around the front reference where the person stands, then settle."""
+        self._started = True
+        reference = self._reference.copy()
+        if self._config.relocalize:
+            reference[0] = self._lateral_m(self._frame.silhouette)
+        self.hierarchy.initialize(observation, clip_to_limits(reference))
+        if self._config.relocalize:
+            for cycle in range(_RECOVERY_CYCLES):
+                noise_scale = _RECOVERY_NOISE * self._config.noise_decay**cycle
+                self.hierarchy.iterate(observation, noise_scale)
+
+    def _lateral_m(self, silhouette: Silhouette) -> float:
+        """``torso_y`` under which the silhouette's median column lies."""
+        camera = self._term.camera
+        columns = np.count_nonzero(silhouette[: self._term.rows], axis=0).cumsum()
+        middle = int(np.searchsorted(columns, columns[-1] / 2))
+        offset_m = (middle - camera.cx) / camera.fx * self._term.body.placement.distance_m
+        return float(offset_m)

@@ -1,0 +1,309 @@
+"""The whole-body filter: a few dozen whole postures survive from frame to frame.
+
+A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
+the best torso, then all joints together. ``docs/architecture.md`` has the steps with their numbers
+and what was tried. What proposes is in
+:mod:`cardbox_tracker.estimation.filtering.whole_body_moves`, what rates in
+:mod:`cardbox_tracker.estimation.cost.whole_body`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, PLACE_LIMITS, reference_posture
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.pose_prior import sample_bank
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import Frame, Term
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_kernels import (
+    ARM_ANGLES,
+    N_STATE,
+    TORSO,
+    TORSO_X,
+    TORSO_Z,
+    angles_of_arms,
+)
+from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering.draws import Draws
+from cardbox_tracker.estimation.filtering.loss import (
+    Evidence,
+    chance_of_loss,
+    remembered,
+    state_stddev,
+)
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+
+STATE_LIMITS: FloatArray = np.vstack([JOINT_LIMITS, PLACE_LIMITS])
+"""Shape (14, 2)."""
+_ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
+_HOME_LIMIT_M = 0.7
+# Deviation of x of torsos that stand upright: larger while the search is young.
+_SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
+# Arms that are passed on, and how many of them are combined with the other side's.
+_BEST_ARMS, _PAIRED_ARMS = 20, 12
+_AGAIN_NOISE = 0.45
+# Uniform numbers of a torso, an arm, a state of the last rounds.
+_TORSO_UNIFORMS, _ARM_UNIFORMS, _TOGETHER_UNIFORMS = 2, 3, 2
+
+
+@cache
+def _bank() -> FloatArray:
+    """Return arms (3000, 4) of the learned prior; outward angles are alike on both sides."""
+    arms: FloatArray = angles_of_arms(sample_bank(), 1.0, _ARM_LIMITS)
+    return arms
+
+
+class WholeBodyFilter:
+    """Follows states (14,); a :class:`~.pose_filter.PoseFilter`.
+
+    A state is d1..d12, ``torso_x`` and ``torso_z``.
+    """
+
+    def __init__(
+        self, config: TrackerConfig, silhouette: SilhouetteTerm, rng: np.random.Generator
+    ) -> None:
+        """Prepare, and compile what is not yet; see ``MakeFilter``."""
+        self._config = c = config.whole_body
+        self._body, self._rng = silhouette.body, rng
+        self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
+        self._bank = _bank()
+        self._torso_sigma = np.zeros(N_STATE)
+        angles_rad = (c.roll_noise_rad, c.pitch_noise_rad, c.yaw_noise_rad)
+        self._torso_sigma[:4] = c.y_noise_m, *angles_rad
+        self._torso_sigma[12:] = c.x_noise_m, c.z_noise_m
+        self._sigma = self._torso_sigma.copy()
+        self._sigma[4:12] = c.arm_noise_rad
+        # From the hips to the torso's top: about where the shoulders are.
+        self._lever_m = float(self._cost.parts[TORSO, 0] + self._cost.parts[TORSO, 1])
+        self._reference = np.zeros(N_STATE)
+        self._reference[:N_JOINTS] = reference_posture("front")
+        self._reference[0] = self._body.placement.lateral_m
+        self._normals = c.torsos * N_STATE + 2 * (c.arms + c.arms_again) * ARM_ANGLES
+        self._normals += c.rounds * c.together * N_STATE
+        self._uniforms = c.torsos * _TORSO_UNIFORMS + 2 * c.arms * _ARM_UNIFORMS
+        self._uniforms += c.rounds * c.together * _TOGETHER_UNIFORMS
+        self.forget()
+
+    def forget(self) -> None:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        self._survivors = self._reference[None].copy()
+        self._is_new, self._is_lost = True, False
+        self._age = 0
+        self._home_m = 0.0
+        self._output: FloatArray | None = None
+        # Of left elbow and hand, right elbow and hand, m.
+        self._arm_spread = [0.0, 0.0, 0.0, 0.0]
+        self._chance: float | None = None
+
+    def recover(self) -> None:
+        """See :class:`~.pose_filter.PoseFilter`: the search goes on, and somebody upright joins it.
+
+        To forget would cost more than it brings where silhouettes stay poor.
+        """
+        self._is_lost = True
+        # What was wrong is not shown, nor is the next result mixed with it.
+        self._output = None
+
+    def configure(self, config: TrackerConfig) -> None:
+        """See :class:`~.pose_filter.PoseFilter`: every setting of this filter restarts."""
+
+    def look(self, frame: Frame) -> Sight:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        self._frame = frame
+        self._cost.see(frame.silhouette, self._survivors[0])
+        share = self._cost.silhouette_px / self._cost.frontal_px
+        if share < self._config.smallest_person:
+            return Sight.NOBODY
+        return Sight.TOO_MUCH if share > self._config.largest_person else Sight.PERSON
+
+    def follow(self, terms: Sequence[Term]) -> Fit:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        self._cost.terms = tuple(term.observe(self._frame) for term in terms)
+        self._sight = self._cost.sight()
+        passes = self._config.start_passes if self._is_new else 1
+        if self._is_new or self._is_lost:
+            self._home_m = 0.0
+            self._survivors[-1] = self._reference
+            place_m = self._sight * self._body.placement.distance_m
+            self._survivors[-1, 0] = np.clip(place_m, *STATE_LIMITS[0])
+        if self._is_new:
+            # Now it is known where the legs are.
+            self._cost.see(self._frame.silhouette, self._survivors[0])
+        else:
+            self._age += 1
+        for _ in range(passes):
+            self._search()
+        self._is_new = self._is_lost = False
+        return self._fit()
+
+    def _search(self) -> None:
+        """Run all stages once."""
+        config, cost = self._config, self._cost
+        normals = Draws(self._rng.standard_normal(self._normals))
+        uniforms = Draws(self._rng.random(self._uniforms))
+        before = self._survivors[0].copy()
+        self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
+        self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
+        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m
+
+        pool = self._torsos(before, normals, uniforms)
+        ratings = cost.bodies(pool)[0]
+        best = pool[np.argmin(ratings)]
+        by_rating = moves.best_states(pool, ratings, min(len(pool), config.survivors))
+        cost.fix_torso(best)
+        (left, left_ratings), (right, right_ratings) = (
+            self._arm(by_rating, arm, normals, uniforms) for arm in (0, 1)
+        )
+        pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
+        states = np.concatenate([pool, pairs])
+        ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
+        self._together(states, ratings, normals, uniforms)
+
+    def _torsos(self, before: FloatArray, normals: Draws, uniforms: Draws) -> FloatArray:
+        """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
+        config, cost = self._config, self._cost
+        fresh = self._reference.copy()
+        fresh[TORSO_X] = before[TORSO_X]
+        is_settled = not self._is_new and self._age > _SETTLED_FRAMES
+        torsos = moves.propose_torsos(
+            self._survivors,
+            self._torso_sigma,
+            self._lever_m,
+            config.torso_explorers,
+            config.fresh_torsos,
+            fresh,
+            _SETTLED_X_M if is_settled else _YOUNG_X_M,
+            self._sight,
+            self._body.placement.distance_m,
+            STATE_LIMITS,
+            normals.take(config.torsos, N_STATE),
+            uniforms.take(config.torsos, _TORSO_UNIFORMS),
+        )
+        ratings = cost.torsos(torsos, before)
+        pool: FloatArray = moves.pool_of(
+            self._survivors,
+            torsos,
+            ratings,
+            config.best_torsos,
+            before,
+            cost.place,
+            cost.view,
+            _ARM_LIMITS,
+        )
+        return pool
+
+    def _arm(
+        self, pool: FloatArray, arm: int, normals: Draws, uniforms: Draws
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
+        config, cost = self._config, self._cost
+        arms = moves.propose_arms(
+            pool,
+            arm,
+            config.survivors,
+            config.arm_noise_rad,
+            config.arm_mirrors,
+            config.arm_tips,
+            self._bank,
+            config.banked_arms,
+            cost.uncovered(arm),
+            cost.parts,
+            cost.girdle,
+            cost.place,
+            cost.view,
+            _ARM_LIMITS,
+            normals.take(config.arms, ARM_ANGLES),
+            uniforms.take(config.arms, _ARM_UNIFORMS),
+        )
+        ratings = cost.arms(arms, arm)
+        self._arm_spread[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
+            arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
+        )
+        again = moves.around_best(
+            arms,
+            ratings,
+            _BEST_ARMS,
+            _AGAIN_NOISE * config.arm_noise_rad,
+            _ARM_LIMITS,
+            normals.take(config.arms_again, ARM_ANGLES),
+        )
+        both = np.concatenate([ratings, cost.arms(again, arm)])
+        return np.concatenate([arms, again]), both
+
+    def _together(
+        self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
+    ) -> None:
+        """Move all joints of the best together; then choose who survives."""
+        config, cost = self._config, self._cost
+        sigma = config.together_noise * self._sigma
+        for number in range(config.rounds):
+            if number == 0:
+                sources = self._apart(states, ratings)
+            else:
+                count = min(config.survivors, len(states))
+                sources = moves.best_states(states, ratings, count)
+            moved = moves.move_all(
+                sources,
+                sigma,
+                self._lever_m,
+                int(config.differing * config.together),
+                config.difference_scale,
+                STATE_LIMITS,
+                normals.take(config.together, N_STATE),
+                uniforms.take(config.together, _TOGETHER_UNIFORMS),
+            )
+            states = np.concatenate([states, moved])
+            ratings = np.concatenate([ratings, cost.bodies(moved)[0]])
+            sigma = config.round_decay * sigma
+        self.states, self.ratings = states, ratings
+        self._survivors = self._apart(states, ratings)
+
+    def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
+        c, cost = self._config, self._cost
+        kept = (c.survivors, c.alike, c.apart_m)
+        chosen = moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)
+        return states[chosen]
+
+    def _fit(self) -> Fit:
+        """Return the smoothed mean of the best states, and how far to believe it."""
+        config, cost = self._config, self._cost
+        mean, stddev = moves.mean_and_spread(
+            self.states, self.ratings, config.average, config.spread
+        )
+        if self._output is None:
+            self._output = mean
+        else:
+            self._output = config.smoothing * self._output + (1.0 - config.smoothing) * mean
+        _, costs_px, areas_px = cost.bodies(np.array([mean, self._output]))
+        total = cost.silhouette_px
+        common = 0.5 * (total + areas_px - costs_px)
+        evidence = Evidence(
+            residual=costs_px[0] / total,
+            left_over=(total - common[0]) / total,
+            outside=(areas_px[0] - common[0]) / total,
+            area=total / cost.frontal_px,
+            prior=float(self.ratings.min()) - costs_px[0] / total,
+            arm_m=sum(self._arm_spread) / 4,
+            stddev=stddev,
+            mean=mean,
+            age=self._age,
+        )
+        self._chance = remembered(chance_of_loss(evidence), self._chance)
+        deviations = state_stddev(stddev)
+        return Fit(
+            posture=self._output[:N_JOINTS].copy(),
+            posture_stddev=deviations[:N_JOINTS],
+            keypoints_m=cost.keypoints(self._output),
+            cost_px=int(costs_px[1]),
+            iou=float(common[1] / (total + areas_px[1] - common[1])),
+            is_uncertain=self._chance > config.uncertain_from,
+            is_poor=self._chance > config.lost_from,
+            offset_m=self._output[N_JOINTS:].copy(),
+            offset_stddev_m=deviations[N_JOINTS:],
+        )

@@ -1,0 +1,176 @@
+"""Settings of the whole-body filter: how it searches, and when it doubts what it found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.settings import check, setting
+
+
+@dataclass(frozen=True)
+class WholeBodyConfig:
+    """Numbers of particles, noise, and thresholds; see ``docs/architecture.md`` for the steps.
+
+    Attributes:
+        cost: what is drawn and which postures are usual.
+    """
+
+    cost: WholeBodyCostConfig = WholeBodyCostConfig()
+    survivors: int = setting(16, "states kept from frame to frame", limits=(4, 1000), restarts=True)
+    alike: int = setting(
+        8,
+        "survivors that may be alike; the others differ from all better ones",
+        limits=(1, 1000),
+        restarts=True,
+    )
+    apart_m: float = setting(
+        0.12, "how far apart survivors are to differ", unit="m", limits=(0.0, 10.0), restarts=True
+    )
+    torsos: int = setting(70, "torsos tried", limits=(2, 100_000), restarts=True)
+    torso_explorers: int = setting(
+        16, "of these, those that bow or turn anywhere", limits=(0, 100_000), restarts=True
+    )
+    fresh_torsos: int = setting(
+        8,
+        "of these, those that stand upright where the silhouette is",
+        limits=(0, 100_000),
+        restarts=True,
+    )
+    best_torsos: int = setting(
+        12,
+        "best torsos that are rated with arms: carried along, and fixed in space",
+        limits=(1, 1000),
+        restarts=True,
+    )
+    arms: int = setting(90, "arms tried on either side", limits=(44, 100_000), restarts=True)
+    arm_mirrors: int = setting(
+        8, "of these, survivors mirrored in depth", limits=(0, 100_000), restarts=True
+    )
+    arm_tips: int = setting(
+        10,
+        "of these, those that reach for foreground that the model leaves uncovered",
+        limits=(0, 100_000),
+        restarts=True,
+    )
+    banked_arms: int = setting(
+        20, "of these, those drawn from the learned prior", limits=(0, 100_000), restarts=True
+    )
+    arms_again: int = setting(
+        50, "arms tried around the best 20", limits=(1, 100_000), restarts=True
+    )
+    rounds: int = setting(
+        2, "rounds in which all joints move together", limits=(0, 100), restarts=True
+    )
+    together: int = setting(36, "states of such a round", limits=(2, 100_000), restarts=True)
+    # Differences of survivors follow the directions in which the fit is flat (Storn & Price,
+    # "Differential Evolution", 1997).
+    differing: float = setting(
+        0.4,
+        "of these, the fraction that moves by the difference of two others",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
+    difference_scale: float = setting(
+        0.6, "factor on such a difference", limits=(0.0, 2.0), restarts=True
+    )
+    y_noise_m: float = setting(
+        0.02, "noise of the torso's y", unit="m", limits=(0.0, 1.0), restarts=True
+    )
+    roll_noise_rad: float = setting(
+        0.08, "noise of the torso's roll", unit="rad", limits=(0.0, 3.2), restarts=True
+    )
+    pitch_noise_rad: float = setting(
+        0.08, "noise of the torso's pitch", unit="rad", limits=(0.0, 3.2), restarts=True
+    )
+    yaw_noise_rad: float = setting(
+        0.10, "noise of the torso's yaw", unit="rad", limits=(0.0, 3.2), restarts=True
+    )
+    x_noise_m: float = setting(
+        0.02, "noise of the torso's x", unit="m", limits=(0.0, 1.0), restarts=True
+    )
+    z_noise_m: float = setting(
+        0.01, "noise of the torso's z", unit="m", limits=(0.0, 1.0), restarts=True
+    )
+    arm_noise_rad: float = setting(
+        0.22, "noise of an arm's angles", unit="rad", limits=(0.0, 3.2), restarts=True
+    )
+    together_noise: float = setting(
+        0.3,
+        "factor on the noise of the first round of all joints",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
+    round_decay: float = setting(
+        0.6, "factor on the noise from one round to the next", limits=(0.0, 1.0), restarts=True
+    )
+    home_rate: float = setting(
+        0.02,
+        "how fast the home of the torso's x follows it, a frame",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
+    average: int = setting(
+        150, "best states whose weighted mean is the result", limits=(1, 1_000_000), restarts=True
+    )
+    spread: float = setting(
+        0.02,
+        "states this much worse than the best, as a share of the silhouette's pixels, weigh 1/e "
+        "in mean and deviation",
+        limits=(1e-6, 10.0),
+        restarts=True,
+    )
+    # With 0.6 hands that move fast lagged behind.
+    smoothing: float = setting(
+        0.3,
+        "share of the last result in the next one",
+        limits=(0.0, 0.99),
+        restarts=True,
+    )
+    start_passes: int = setting(
+        3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
+    )
+    # Somebody sideways shows about half the area of the front view, at the image's border less.
+    smallest_person: float = setting(
+        0.25,
+        "less foreground is nobody, as a fraction of the model's in the front posture",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
+    # Beyond it the light has changed, or several people are there.
+    largest_person: float = setting(
+        2.5,
+        "more foreground is not one person, as a fraction of the same",
+        limits=(1.0, 1000.0),
+        restarts=True,
+    )
+    uncertain_from: float = setting(
+        0.5, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
+    )
+    lost_from: float = setting(
+        0.9,
+        "chance of loss above which a frame counts for lost_frames; 1: never",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of range, or values do not go together; the text says which.
+        """
+        check(self)
+        special = self.arm_mirrors + self.arm_tips + self.banked_arms
+        if special >= self.arms:
+            raise ValueError(f"arms is {self.arms}; expected more than the {special} special ones")
+        if not self.fresh_torsos <= self.torso_explorers <= self.torsos:
+            raise ValueError(
+                "fresh_torsos, torso_explorers and torsos are "
+                f"{self.fresh_torsos}, {self.torso_explorers}, {self.torsos}; expected each to be "
+                "among the next ones"
+            )
+        if self.alike > self.survivors:
+            raise ValueError(f"alike is {self.alike}; expected 1 to {self.survivors}")
+        if self.best_torsos > self.torsos:
+            raise ValueError(f"best_torsos is {self.best_torsos}; expected 1 to {self.torsos}")

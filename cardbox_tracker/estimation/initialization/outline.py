@@ -1,0 +1,281 @@
+"""Lengths and directions in the outlines of a person: arms, span, widths.
+
+All lengths are metres in Y and Z of the upright plane through the person, of the reference frame.
+Silhouettes are (H, W), 0 or 255, of one person as :func:`filled` returns them; cameras are working
+cameras, pitched as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.vision.camera import Camera
+
+FloatArray = NDArray[np.float64]
+Silhouette = NDArray[np.uint8]
+
+_HEAD_ABOVE = 0.07
+"""Rows higher than this above the arms' axis show the head, of the span."""
+_EVEN = 0.015
+"""Arms are as long as each other if the middle of the span is no further from the head's, of the
+span."""
+_GAP = 20
+"""Parts of a person join over gaps of one in so many of the image's height: about an arm."""
+_FEWEST_COLUMNS = 20
+"""Silhouettes narrower than this, px, have no arms."""
+_TRUNK = 2.2
+"""Beyond so many times the thickness of the arm there is the trunk."""
+_HAND, _ARMPIT = 0.30, 0.97
+"""Between these fractions of the way from fingertips to armpit, the outline is that of the arm."""
+_HANGING = (0.02, 0.27)
+"""Between these distances below the axis of the level arms, of the span, a hanging arm is a run of
+its own: between armpit and wrist."""
+
+
+@dataclass(frozen=True)
+class LevelArm:
+    """One arm of ``arms``, in the upright plane.
+
+    Attributes:
+        tip_m: Y of the fingertips.
+        armpit_m: Y where the trunk begins.
+        slope, height_m: of the axis, Z = slope Y + height.
+        thickness_m: median height of the arm's outline between elbow and wrist.
+    """
+
+    tip_m: float
+    armpit_m: float
+    slope: float
+    height_m: float
+    thickness_m: float
+
+    @property
+    def reach_m(self) -> float:
+        """Armpit to fingertips."""
+        return abs(self.tip_m - self.armpit_m)
+
+    def axis_m(self, y_m: float) -> float:
+        """Height of the axis at ``y_m``."""
+        return self.slope * y_m + self.height_m
+
+
+def plane_points_m(
+    camera: Camera, columns: NDArray[Any], rows: NDArray[Any], distance_m: float
+) -> FloatArray:
+    """Return the points (n, 2), Y and Z, of the upright plane that show in pixels.
+
+    Args:
+        camera: working camera.
+        columns: shape (n,), px.
+        rows: shape (n,), px.
+        distance_m: level distance to the plane.
+    """
+    rays = np.stack(
+        [
+            (np.asarray(columns, dtype=np.float64) - camera.cx) / camera.fx,
+            (np.asarray(rows, dtype=np.float64) - camera.cy) / camera.fy,
+            np.ones(len(columns)),
+        ],
+        axis=-1,
+    )
+    points = camera.optical_to_reference(rays)
+    scaled: FloatArray = points[:, 1:] * (-distance_m / points[:, :1])
+    return scaled
+
+
+def filled(silhouette: Silhouette) -> Silhouette:
+    """Return the person of a silhouette (H, W): the largest region, and what is torn off it.
+
+    Regions count as one where the gaps between them are narrower than about an arm. Holes smaller
+    than the square of that gap are filled.
+    """
+    seen = (silhouette > 0).astype(np.uint8)
+    gap = max(3, silhouette.shape[0] // _GAP | 1)  # odd, so that closing takes nothing away
+    joined = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
+    if len(statistics) < 2:
+        return np.zeros_like(silhouette)
+    person = seen * (labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
+    # A hole counts as one even where its rim is broken by a pixel or two. What is larger is the
+    # gap between trunk and arm, where a hand touches the hips.
+    rim = cv2.morphologyEx(person, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - rim, connectivity=4)
+    small = np.nonzero(statistics[:, cv2.CC_STAT_AREA] < gap * gap)[0]
+    holes = np.isin(labels, small[small > 0]).astype(np.uint8)
+    whole = person | cv2.dilate(holes, np.ones((3, 3), np.uint8))
+    return np.asarray(whole * np.uint8(255), dtype=np.uint8)
+
+
+def level_arm(
+    silhouette: Silhouette, camera: Camera, distance_m: float, side: int
+) -> LevelArm | None:
+    """Follow one arm of ``arms`` from the fingertips to the trunk.
+
+    Args:
+        silhouette: (H, W) of ``arms``.
+        camera: working camera.
+        distance_m: level distance to the person.
+        side: 1 for the arm at the image's right, -1 for the other.
+
+    Returns:
+        None if nothing like an arm is there.
+    """
+    used = np.nonzero(silhouette.any(axis=0))[0]
+    if len(used) < _FEWEST_COLUMNS:
+        return None
+    order = used[::-1] if side > 0 else used
+    order = order[: (used[-1] - used[0] + 1) // 2]
+    n = len(order)
+    top = np.argmax(silhouette[:, order] > 0, axis=0)
+    below = np.arange(silhouette.shape[0])[:, None] >= top
+    # The uppermost run of each column; whatever is under the arm, such as a skirt, is not the arm.
+    gap = below & (silhouette[:, order] == 0)
+    end = np.where(gap.any(axis=0), np.argmax(gap, axis=0), silhouette.shape[0])
+    thickness = (end - top).astype(np.float64)
+    typical = float(np.median(thickness[n // 5 : 3 * n // 5]))
+    trunk = np.nonzero(thickness[n // 3 :] > _TRUNK * typical)[0]
+    armpit = n // 3 + int(trunk[0]) if len(trunk) else int(0.75 * n)
+    middle = (top + end - 1) / 2.0
+    points = plane_points_m(camera, order[:armpit], middle[:armpit], distance_m)
+    hand = int(_HAND * armpit)
+    arm = points[hand : max(int(_ARMPIT * armpit), hand + 5)]
+    if len(arm) < 5:
+        return None
+    slope, height = _line(arm[:, 0], arm[:, 1])
+    tip = plane_points_m(
+        camera, np.array([order[0] + 0.5 * side]), np.array([np.median(middle[:4])]), distance_m
+    )
+    per_px = distance_m / camera.fx
+    return LevelArm(float(tip[0, 0]), float(points[-1, 0]), slope, height, typical * per_px)
+
+
+def span_m(
+    arms: Silhouette, camera: Camera, distance_m: float, left: LevelArm, right: LevelArm
+) -> float:
+    """Return the way from fingertip to fingertip.
+
+    Where the span's middle is not below the head, part of one arm was not cut out; the longer one
+    then tells the span.
+
+    Args:
+        arms: silhouette (H, W).
+        camera: working camera.
+        distance_m: level distance to the person.
+        left: the left arm in it.
+        right: the right arm in it.
+    """
+    span = left.tip_m - right.tip_m
+    centre = (left.tip_m + right.tip_m) / 2.0
+    axis = (left.axis_m(centre) + right.axis_m(centre)) / 2.0
+    head = arms[row_heights_m(arms, camera, distance_m) > axis + _HEAD_ABOVE * span] > 0
+    if not head.any():
+        return span
+    counts = head.sum(axis=0).cumsum()
+    column = np.searchsorted(counts, counts[-1] / 2.0)
+    middle = plane_points_m(camera, np.array([column]), np.array([camera.cy]), distance_m)[0, 0]
+    uneven = abs(centre - middle) / span
+    trust = float(np.clip(uneven / _EVEN - 1.0, 0.0, 1.0))
+    return float(span * (1.0 + 2.0 * trust * uneven))
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Slope and offset of a line; points that are far off count little (Cauchy weights)."""
+    weights = np.ones(len(x))
+    slope = offset = 0.0
+    for _ in range(8):
+        slope, offset = (float(c) for c in np.polyfit(x, y, 1, w=np.sqrt(weights)))
+        off = np.abs(y - slope * x - offset)
+        weights = 1.0 / (1.0 + (off / max(2.0 * float(np.median(off)), 1e-4)) ** 2)
+    return slope, offset
+
+
+def _runs(row: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First columns, and columns after the last, of the runs of foreground of a row."""
+    steps = np.diff(np.concatenate([[0], (row > 0).astype(np.int8), [0]]))
+    return np.nonzero(steps == 1)[0], np.nonzero(steps == -1)[0]
+
+
+def row_heights_m(silhouette: Silhouette, camera: Camera, distance_m: float) -> FloatArray:
+    """Return the height (H,) of every row, in the column of the principal point."""
+    rows = np.arange(silhouette.shape[0], dtype=np.float64)
+    return plane_points_m(camera, np.full(len(rows), camera.cx), rows, distance_m)[:, 1]
+
+
+def width_m(front: Silhouette, camera: Camera, distance_m: float, height_m: float) -> float:
+    """Return the width from edge to edge at a height; NaN if nothing is there."""
+    row = int(np.argmin(np.abs(row_heights_m(front, camera, distance_m) - height_m)))
+    columns = np.nonzero(front[row])[0]
+    if len(columns) < 2:
+        return float("nan")
+    ends = np.array([columns[0] - 0.5, columns[-1] + 0.5])
+    points = plane_points_m(camera, ends, np.full(2, float(row)), distance_m)
+    return float(points[1, 0] - points[0, 0])
+
+
+def trunk_width_m(
+    silhouette: Silhouette, camera: Camera, distance_m: float, height_m: float, centre_m: float
+) -> float:
+    """Return the width of the run at a height that has ``centre_m`` in it; NaN if there is none."""
+    row = int(np.argmin(np.abs(row_heights_m(silhouette, camera, distance_m) - height_m)))
+    starts, stops = _runs(silhouette[row])
+    rows = np.full(len(starts), float(row))
+    left = plane_points_m(camera, starts - 0.5, rows, distance_m)[:, 0]
+    right = plane_points_m(camera, stops - 0.5, rows, distance_m)[:, 0]
+    middle = (left <= centre_m) & (centre_m <= right)
+    return float((right - left)[middle][0]) if middle.any() else float("nan")
+
+
+def axes_distance_m(
+    front: Silhouette,
+    camera: Camera,
+    distance_m: float,
+    axis_m: float,
+    joint_m: float,
+    span_m: float,
+    arm: LevelArm,
+) -> float:
+    """Return how far apart the axes of hanging arms are at the height of the shoulder joints.
+
+    Args:
+        front: silhouette (H, W).
+        camera: working camera.
+        distance_m: level distance to the person.
+        axis_m: height of the axes of the level arms of ``arms``.
+        joint_m: height of the joints.
+        span_m: fingertip to fingertip.
+        arm: one of the level arms, for its thickness.
+
+    Returns:
+        NaN if the arms are no runs of their own in enough rows.
+    """
+    heights = row_heights_m(front, camera, distance_m)
+    thickness_px = arm.thickness_m * camera.fx / distance_m
+    below = (axis_m - heights) / span_m
+    rows = np.nonzero((below > _HANGING[0]) & (below < _HANGING[1]))[0]
+    ends = []
+    for side in (-1, 0):
+        middle, kept, last = [], [], None
+        for row in rows:
+            starts, stops = _runs(front[row])
+            # Between armpit and wrist a hanging arm is a run of its own.
+            if len(starts) < 2:
+                continue
+            width = stops[side] - starts[side]
+            column = (starts[side] + stops[side] - 1) / 2.0
+            if not 0.4 * thickness_px < width < 1.8 * thickness_px:
+                continue
+            if last is None or abs(column - last) <= 4:
+                middle.append(column)
+                kept.append(float(row))
+                last = column
+        if len(kept) < 6:
+            return float("nan")
+        points = plane_points_m(camera, np.array(middle), np.array(kept), distance_m)
+        slope, offset = _line(points[:, 1], points[:, 0])
+        ends.append(slope * joint_m + offset)
+    return ends[0] - ends[1]

@@ -1,0 +1,226 @@
+"""Learn the colours of a person's parts from the images of the references ``front`` and ``arms``.
+
+1. The posture really held is searched near the reference by the outline alone.
+2. The parts it places are drawn well inside of themselves and of the outline; what lies there is
+   that part beyond doubt. The forearm and the hand are found from the outline's tip inwards, since
+   a measured length that is off by some centimetres would put the wrist into the hand. Both are
+   taken from ``arms`` only: in ``front`` hands hang before the trousers, or beside them.
+3. Colours are counted, smoothed over neighbouring ones, and mixed with a little of every colour.
+4. Half of the hand's histogram is that of the face: outlines often lose hands, faces never, and
+   both are skin.
+5. A part with too few pixels looks like the one most like it: legs like the torso, a hand like the
+   face, a forearm like the torso (sleeves).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.appearance import (
+    COLOR_STEPS,
+    FOREARM,
+    GREY_STEPS,
+    HAND,
+    HEAD,
+    LEGS,
+    PARTS,
+    TORSO,
+    UNSEEN,
+    Appearance,
+    bins_of,
+    steps_of_levels,
+)
+from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Image, Silhouette
+from cardbox_tracker.vision.camera import Camera
+
+LEARNED_FROM = ("front", "arms")
+"""References whose images are needed."""
+
+# A label beside those of the parts: the skin of the face, which tells much of the hands'.
+_FACE = len(PARTS)
+_FACE_SHARE = 0.5
+# Fewer pixels than this teach nothing of a part.
+_MIN_PX = 40
+# Search of the posture: rounds, postures a round, what the noise shrinks by, and its start.
+_ROUNDS, _POSTURES, _SHRINK = 8, 300, 0.7
+_PLACE_M, _ROLL_RAD, _ABDUCTION_RAD = 0.03, np.radians(4.0), np.radians(10.0)
+
+
+def can_learn(images: Mapping[str, Sequence[Image]], references: Mapping[str, Silhouette]) -> bool:
+    """Return whether there are images of what is learned from, all of one kind and size."""
+    needed = [image for name in LEARNED_FROM for image in images.get(name, ())]
+    size = references[LEARNED_FROM[0]].shape
+    one_kind = len({image.shape for image in needed}) == 1 and needed[0].shape[:2] == size
+    return one_kind and all(images.get(name) for name in LEARNED_FROM)
+
+
+def learn_appearance(
+    images: Mapping[str, Sequence[Image]],
+    references: Mapping[str, Silhouette],
+    body: BodyModel,
+    camera: Camera,
+    seed: int = 0,
+) -> Appearance:
+    """Learn what the parts look like.
+
+    Args:
+        images: some of each of ``LEARNED_FROM``, (H, W, 3) bgr or (H, W), all of one kind.
+        references: the reference silhouettes (H, W) of both.
+        body: the measured person.
+        camera: working camera, pitched as the body model says.
+        seed: of the search for the posture that was really held.
+    """
+    return Appearance.of(*learn_histograms(images, references, body, camera, seed))
+
+
+def learn_histograms(
+    images: Mapping[str, Sequence[Image]],
+    references: Mapping[str, Silhouette],
+    body: BodyModel,
+    camera: Camera,
+    seed: int = 0,
+) -> tuple[FloatArray, FloatArray]:
+    """Return histograms (5, bins) and brightness (channels,) as :func:`learn_appearance` has them.
+
+    Without the rounding of an :class:`~cardbox_tracker.body.appearance.Appearance`.
+    """
+    labels = {}
+    for name in LEARNED_FROM:
+        posture = fit_posture(body, camera, references[name], name, seed)
+        labels[name] = part_labels(body, camera, posture, references[name])
+    channels = 1 if images[LEARNED_FROM[0]][0].ndim == 2 else 3
+    torso = [
+        image.reshape(-1, channels)[labels[name].ravel() == TORSO]
+        for name in LEARNED_FROM
+        for image in images[name]
+    ]
+    brightness = np.median(np.concatenate(torso), axis=0)
+    counts = np.zeros((len(PARTS) + 1, bins_of(channels)))
+    for name in LEARNED_FROM:
+        for image in images[name]:
+            bins = _bins(image, steps_of_levels(brightness, brightness))
+            for part in range(len(counts)):
+                if name == "arms" or part not in (HAND, FOREARM):
+                    counts[part] += np.bincount(bins[labels[name] == part], minlength=len(counts.T))
+    counts[HEAD] += counts[_FACE]
+    for part, instead in ((LEGS, TORSO), (_FACE, HEAD), (HAND, _FACE), (FOREARM, TORSO)):
+        if counts[part].sum() < _MIN_PX:
+            counts[part] = counts[instead]
+    histograms = _smoothed(counts, channels)
+    histograms[HAND] = (1 - _FACE_SHARE) * histograms[HAND] + _FACE_SHARE * histograms[_FACE]
+    return histograms[: len(PARTS)], brightness
+
+
+def _bins(image: Image, steps: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Bin of every pixel (H, W), with the steps (channels, 256) of each channel's levels."""
+    channels = image.reshape(*image.shape[:2], -1)
+    bins = np.zeros(image.shape[:2], np.int32)
+    for c, of_level in enumerate(steps):
+        bins = bins * (COLOR_STEPS if len(steps) == 3 else GREY_STEPS) + of_level[channels[..., c]]
+    return bins
+
+
+def _smoothed(counts: FloatArray, channels: int) -> FloatArray:
+    """Smooth counts (parts, bins) over neighbouring colours, and make each sum to one."""
+    steps = GREY_STEPS if channels == 1 else COLOR_STEPS
+    cube = counts.reshape(len(counts), *(steps,) * channels)
+    for axis in range(1, channels + 1):
+        borders = [(1, 1) if a == axis else (0, 0) for a in range(channels + 1)]
+        padded = np.pad(cube, borders, "edge")
+        before, same, after = (np.take(padded, range(o, o + steps), axis) for o in range(3))
+        cube = (before + 2.0 * same + after) / 4.0
+    flat = cube.reshape(len(counts), -1)
+    flat = flat / np.maximum(flat.sum(axis=1, keepdims=True), 1e-9)
+    result: FloatArray = (1 - UNSEEN) * flat + UNSEEN / flat.shape[1]
+    return result
+
+
+def fit_posture(
+    body: BodyModel, camera: Camera, silhouette: Silhouette, name: str, seed: int = 0
+) -> FloatArray:
+    """Return the posture (12,) near the reference ``name`` whose outline fits best."""
+    rng = np.random.default_rng(seed)
+    seen = CompiledSilhouette(body, camera).look(silhouette)
+    best = reference_posture(name)
+    best[0] = body.placement.lateral_m
+    sigma = np.zeros(N_JOINTS)
+    sigma[0], sigma[1] = _PLACE_M, _ROLL_RAD
+    sigma[[4, 6, 8, 10]] = _ABDUCTION_RAD
+    for _ in range(_ROUNDS):
+        postures = best + sigma * rng.standard_normal((_POSTURES, N_JOINTS))
+        postures[0] = best
+        best = postures[np.argmin(seen.postures(postures))]
+        sigma = _SHRINK * sigma
+    return best
+
+
+def part_labels(
+    body: BodyModel, camera: Camera, posture: FloatArray, silhouette: Silhouette
+) -> NDArray[np.int8]:
+    """Return the part of each pixel (H, W) where it is beyond doubt, else -1."""
+    frames = forward_kinematics(body, posture)
+    labels = np.full(silhouette.shape, -1, np.int8)
+    size = body.size
+
+    def pixels(points_m: FloatArray) -> FloatArray:
+        optical = camera.reference_to_optical(np.asarray(points_m, dtype=np.float64))
+        return np.asarray(camera.project(optical))
+
+    def upright(
+        part: int, low: float, high: float, half_low: float, half_high: float, x: float = 0.0
+    ) -> None:
+        """Label a trapezoid of the torso's frame, from height ``low`` to ``high``, metres."""
+        corners = np.array(
+            [(x, -half_low, low), (x, half_low, low), (x, half_high, high), (x, -half_high, high)]
+        )
+        area = np.zeros(silhouette.shape, np.uint8)
+        placed = pixels(frames.hip + corners @ frames.torso_rotation.T)
+        cv2.fillConvexPoly(area, np.round(placed).astype(np.int32), 1)
+        labels[area > 0] = part
+
+    waist, top = size("waist_height"), size("waist_height") + size("torso_height")
+    chin, head = top + size("neck_length"), size("head_height")
+    half, forward = 0.4 * size("head_width"), size("head_offset")
+    upright(TORSO, 0.5 * waist, top, 0.4 * size("waist_width"), 0.36 * size("torso_top_width"))
+    upright(HEAD, chin + 0.02, chin + head, half, 0.8 * half, forward)
+    # The neck is skin, too, and counts as the head, or it would look like a hand before the torso.
+    upright(HEAD, top + 0.01, chin + 0.02, 0.75 * half, 0.75 * half)
+    upright(_FACE, chin + 0.2 * head, chin + 0.6 * head, 0.6 * half, 0.6 * half, forward)
+    upright(LEGS, -0.3, -0.08, 0.42 * size("waist_width"), 0.42 * size("waist_width"))
+    for arm in (frames.left, frames.right):
+        elbow, hand = pixels(arm.elbow), pixels(arm.hand)
+        length = size("forearm_length")
+        per_m = (hand - elbow) / length
+        tip_m = _tip_m(silhouette, elbow, per_m, length)
+        thick = max(1, round(0.5 * size("forearm_width") * float(np.hypot(*per_m))))
+        for part, begin_m, end_m in (
+            (FOREARM, 0.15 * length, tip_m - 0.20),
+            (HAND, tip_m - 0.13, tip_m - 0.05),
+        ):
+            if end_m > begin_m:
+                a, b = (np.round(elbow + m * per_m).astype(int).tolist() for m in (begin_m, end_m))
+                area = np.zeros(silhouette.shape, np.uint8)
+                cv2.line(area, a, b, 1, thick)
+                labels[area > 0] = part
+    # Pixels at the outline are mixed with the background.
+    labels[cv2.erode(silhouette, np.ones((3, 3), np.uint8)) == 0] = -1
+    return labels
+
+
+def _tip_m(silhouette: Silhouette, elbow: FloatArray, per_m: FloatArray, length_m: float) -> float:
+    """How far from the elbow a stretched arm's outline ends; ``length_m`` if none ends near it."""
+    height, width = silhouette.shape
+    for metres in np.arange(length_m + 0.12, length_m - 0.12, -0.005):
+        u, v = np.round(elbow + metres * per_m).astype(int)
+        if 0 <= v < height and 0 <= u < width and silhouette[v, u]:
+            return float(metres)
+    return length_m

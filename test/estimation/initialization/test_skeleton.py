@@ -1,0 +1,120 @@
+"""The bones of the arms, out of outlines drawn by hand and of model bodies."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
+from cardbox_tracker.estimation.initialization.skeleton import (
+    GIRDLE_RISE,
+    KNUCKLES_SHARE,
+    UPPER_ARM_SHARE,
+    combined,
+    effect_of_hips,
+    measure_skeleton,
+)
+from cardbox_tracker.simulation.person import FINGER_REACH
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
+
+# At 2 m a pixel is 1 cm.
+CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)
+DISTANCE_M = 2.0
+
+
+def block(top: int, bottom: int, left: int, right: int) -> np.ndarray:
+    silhouette = np.zeros((240, 320), np.uint8)
+    silhouette[top:bottom, left:right] = 255
+    return silhouette
+
+
+def outstretched(drop: float = 0.0, left_px: int = 80, right_px: int = 80) -> np.ndarray:
+    """Trunk 40 px wide, head 16 px, arms 8 px thick at row 100 that fall by ``drop`` a pixel."""
+    image: np.ndarray = block(95, 220, 140, 180) | block(60, 95, 152, 168)
+    for side, reach in ((1, right_px), (-1, left_px)):
+        for i in range(reach):
+            column = 160 + i if side > 0 else 159 - i
+            row = round(100 + drop * i)
+            image[row - 4 : row + 4, column] = 255
+    return image
+
+
+def seen(body: BodyModel, name: str) -> np.ndarray:
+    """A model body with open hands, and with shoulders that rise with the arms."""
+    sizes: np.ndarray = body.sizes.copy()
+    sizes[SIZE_INDEX["forearm_length"]] *= 1.0 + FINGER_REACH
+    if name == "arms":
+        sizes[SIZE_INDEX["shoulder_drop"]] -= GIRDLE_RISE * body.size("shoulder_breadth")
+    camera = Camera(320, 240, 330.0, 330.0, 159.5, 119.5, body.camera_pose.pitch_rad)
+    patches = cardbox_patches(body.with_values(sizes=sizes), reference_posture(name))
+    image: np.ndarray = render(patches, camera)
+    return image
+
+
+def test_readings_are_averaged_by_their_precision() -> None:
+    # Weights 4 and 1 of logarithms.
+    found = combined(np.array([1.0, 1.05]), np.array([0.05, 0.10]))
+    assert found == pytest.approx(1.05**0.2, abs=1e-3)
+    assert combined(np.array([0.4, np.nan]), np.array([0.05, 0.01])) == pytest.approx(0.4)
+    # One that is far off hardly counts.
+    found = combined(np.array([1.0, 1.01, 2.0]), np.array([0.03, 0.03, 0.03]))
+    assert found == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_effect_of_the_hips_by_hand() -> None:
+    assert effect_of_hips(1.042) == pytest.approx(1.0)
+    assert effect_of_hips(1.042 * 1.1) == pytest.approx(1.1**0.15)
+    assert effect_of_hips(2.0) == pytest.approx(np.exp(0.03))
+    assert effect_of_hips(0.5) == pytest.approx(np.exp(-0.03))
+    assert effect_of_hips(float("nan")) == 1.0
+
+
+def test_a_stick_figure_by_hand() -> None:
+    """Arms at row 100, hanging arms whose axes meet the joints' height 16 px from the middle."""
+    arms = outstretched()
+    front = block(95, 220, 146, 174) | block(60, 95, 152, 168)
+    for side in (1, -1):
+        outline = [(16, 100), (20, 98), (50, 180), (42, 182)]
+        points = [[159.5 + side * x, y] for x, y in outline]
+        cv2.fillPoly(front, [np.round(points).astype(np.int32)], 255)
+    found = measure_skeleton({"front": front, "arms": arms}, CAMERA, DISTANCE_M)
+    assert found is not None
+    assert found.span_m == pytest.approx(1.60)
+    breadth = found.shoulder_breadth_m
+    assert 0.28 < breadth < 0.40
+    # The axis is 20 cm above the camera's centre; the joint is 0.34 % of the span higher there,
+    # and lower by the girdle's rise when the arms hang.
+    expected = 0.20 + 0.0034 * 1.60 - GIRDLE_RISE * breadth
+    assert found.shoulder_height_m == pytest.approx(expected, abs=0.003)
+    reach = KNUCKLES_SHARE * (0.98 * 1.60 - breadth) / 2
+    assert found.upper_arm_m + found.forearm_m == pytest.approx(reach, abs=1e-6)
+    share = found.upper_arm_m / reach
+    assert UPPER_ARM_SHARE * np.exp(-0.03) - 1e-9 <= share <= UPPER_ARM_SHARE * np.exp(0.03) + 1e-9
+
+
+def test_no_arms_no_skeleton() -> None:
+    narrow = block(60, 220, 155, 165)
+    assert measure_skeleton({"front": narrow, "arms": narrow}, CAMERA, DISTANCE_M) is None
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 8.0])
+@pytest.mark.parametrize("factor", [0.85, 1.0, 1.1])
+def test_a_model_body_is_measured(factor: float, pitch_deg: float) -> None:
+    body = BodyModel.of(
+        DEFAULT_SIZES * factor, hip_height_m=-0.55, camera_pitch_rad=np.radians(pitch_deg)
+    )
+    camera = Camera(320, 240, 330.0, 330.0, 159.5, 119.5, body.camera_pose.pitch_rad)
+    references = {name: seen(body, name) for name in ("front", "arms")}
+    found = measure_skeleton(references, camera, body.placement.distance_m)
+    assert found is not None
+    top = body.placement.hip_height_m + body.size("waist_height") + body.size("torso_height")
+    expected = top - body.size("shoulder_drop")
+    assert found.shoulder_height_m == pytest.approx(expected, abs=0.015)
+    arm = body.size("upper_arm_length") + body.size("forearm_length")
+    assert found.upper_arm_m + found.forearm_m == pytest.approx(arm, rel=0.05)
+    assert found.shoulder_breadth_m == pytest.approx(body.size("shoulder_breadth"), rel=0.08)
