@@ -185,7 +185,7 @@ def test_the_torsos_prior_by_hand() -> None:
     home = capped(0.25, 4.0)
     assert prior(rest) == pytest.approx(home)
     bowed, back = rest.copy(), rest.copy()
-    bowed[2], back[2] = np.radians(16.0), np.radians(-5.0)
+    bowed[2], back[2] = np.radians(13.0), np.radians(-8.0)
     assert prior(bowed) == pytest.approx(home + capped(1.0, 9.0))
     assert prior(back) == pytest.approx(home + capped(1.0, 9.0))
     turned = rest.copy()
