@@ -10,7 +10,17 @@ import pytest
 
 from cardbox_tracker.evaluation.paper.report import recorded_results
 from cardbox_tracker.evaluation.paper.results import motions_in, read_json
-from tools.readme_figures import BEGIN, END, current, main, readme_section, replaced
+from tools.readme_figures import (
+    BEGIN,
+    END,
+    SESSIONS_BEGIN,
+    SESSIONS_END,
+    current,
+    main,
+    readme_section,
+    replaced,
+    sessions_section,
+)
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "evaluation"
@@ -54,6 +64,7 @@ def test_each_number_of_the_table_is_in_the_results() -> None:
 
 def test_no_error_or_cost_stands_outside_the_marks() -> None:
     outside = readme().split(BEGIN)[0] + readme().split(END)[1]
+    outside = outside.split(SESSIONS_BEGIN)[0] + outside.split(SESSIONS_END)[1]
     assert re.findall(r"\d[\d.]*\s*(?:cm|px)\b", outside) == []
 
 
@@ -63,12 +74,11 @@ def hand_made() -> dict[str, Any]:
         "error_m": {"left_hand": 0.2, "right_hand": 0.3},
         "mean_cost_px": 987.6,
     }
-    mean = {"mean": {"mpjpe_m": 0.05}}
     return {
         "runs": 7,
         "quick": True,
         "wave": {"drs": strategy, "srs": strategy},
-        "experiments": {"variants": {"paper": mean, "default": mean}},
+        "commit": "0123456789abcdef",
     }
 
 
@@ -80,9 +90,7 @@ def test_section_by_hand() -> None:
     assert f"| reach (person) | {row}" in text
     assert "7 runs (a quick run)" in text
     words = " ".join(text.split())
-    assert (
-        "synthetic motions is 5.0 cm; with the preset `paper`, run equally often, 5.0 cm" in words
-    )
+    assert words.endswith("Measured at commit 01234567.")
     assert "`person` are images of rendered, realistically shaped bodies, not films" in words
     assert "(3 runs)" in words
     assert max(len(line) for line in text.splitlines()) <= 100
@@ -93,3 +101,18 @@ def test_marks_are_needed_once() -> None:
     for text in ("", BEGIN, f"{BEGIN}{END}{BEGIN}{END}"):
         with pytest.raises(ValueError, match="needs the marks"):
             replaced(text, "new")
+
+
+def test_sessions_by_hand() -> None:
+    def session(name: str, aligned: float, peer: float) -> dict[str, Any]:
+        run = {"absolute": 9.0, "aligned": aligned, "without_estimate": 5, "frames": 50, "ms": 2.5}
+        return {"name": name, "mediapipe": {"aligned": peer}, "runs": [run, run]}
+
+    results = {"seeds": [0, 1], "sessions": [session("a", 4.0, 8.0), session("b", 9.0, 6.0)]}
+    text = sessions_section(results)
+    assert "| a | 4.0 cm | 8.0 cm | 9.0 cm | 10 % |" in text
+    assert "| **mean** | 6.5 cm | 7.0 cm | 9.0 cm | |" in text
+    words = " ".join(text.split())
+    assert "Better than MediaPipe on 1 of 2, at worst 1.5 times its error." in words
+    assert "An image takes 2.5 ms" in words
+    assert "on 2 recordings, 2 seeds" in words
