@@ -70,6 +70,7 @@ class WholeBodyFilter:
     ) -> None:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
         self._config = c = config.whole_body
+        self._lost_iou = config.lost_iou
         self._body, self._rng = silhouette.body, rng
         self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
         self._bank = _bank()
@@ -111,7 +112,8 @@ class WholeBodyFilter:
         self._output = None
 
     def configure(self, config: TrackerConfig) -> None:
-        """See :class:`~.pose_filter.PoseFilter`: every setting of this filter restarts."""
+        """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
+        self._lost_iou = config.lost_iou
 
     def look(self, frame: Frame) -> Sight:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -296,14 +298,15 @@ class WholeBodyFilter:
         )
         self._chance = remembered(chance_of_loss(evidence), self._chance)
         deviations = state_stddev(stddev)
+        iou = float(common[1] / (total + areas_px[1] - common[1]))
         return Fit(
             posture=self._output[:N_JOINTS].copy(),
             posture_stddev=deviations[:N_JOINTS],
             keypoints_m=cost.keypoints(self._output),
             cost_px=int(costs_px[1]),
-            iou=float(common[1] / (total + areas_px[1] - common[1])),
+            iou=iou,
             is_uncertain=self._chance > config.uncertain_from,
-            is_poor=self._chance > config.lost_from,
+            is_poor=self._chance > config.lost_from or iou < self._lost_iou,
             offset_m=self._output[N_JOINTS:].copy(),
             offset_stddev_m=deviations[N_JOINTS:],
         )

@@ -191,7 +191,8 @@ def _recovery(results: Results) -> list[str]:
         cells = []
         for kind in kinds:
             trials = [r["recovery"][kind] for r in session["runs"] if "recovery" in r]
-            counts = np.array([(t["recovered"], t["trials"]) for t in trials]).reshape(-1, 2)
+            pairs = [(t["recovered"], t["trials"]) for t in trials]
+            counts = np.array(pairs, int).reshape(-1, 2)
             totals[kind] += counts.sum(axis=0)
             cells.append("{} ({})".format(*counts.sum(axis=0)))
         lines.append(f"| {session['name']} | {' | '.join(cells)} |")

@@ -58,9 +58,10 @@ class Nodes:
 
     def start(self, name: str, *arguments: str) -> None:
         """Start the executable ``name`` of this package, see ``EXECUTABLES``."""
+        # -P: in a checkout, too, the installed package is run, whose kernels are compiled already.
         with (self._logs / f"{name}.log").open("wb") as log:
             self._processes[name] = subprocess.Popen(
-                [sys.executable, "-m", EXECUTABLES[name], *arguments],
+                [sys.executable, "-P", "-m", EXECUTABLES[name], *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )

@@ -88,16 +88,18 @@ def test_recovery_counts_its_trials(session: Path) -> None:
     for kind in recovery.values():
         assert 0 <= kind["recovered"] <= kind["trials"]
         assert kind["trials"] >= 1
+    lost = {key: value for key, value in found["runs"][0].items() if key != "recovery"}
     report = sessions_report(
         {
             "seeds": [0],
             "preset": "paper",
-            "sessions": [found],
+            "sessions": [found, {**found, "name": "never followed", "runs": [lost]}],
             "command": "",
             "provenance": {"commit": "", "cpu": ""},
         }
     )
     assert "## Recovery after disturbances" in report
+    assert "| never followed | 0 (0) | 0 (0) | 0 (0) |" in report
 
 
 def test_a_session_that_cannot_be_read_is_told_in_its_row(session: Path, tmp_path: Path) -> None:
