@@ -70,13 +70,12 @@ class WholeBodyFilter:
     ) -> None:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
         self._config = c = config.whole_body
-        self._lost_iou = config.lost_iou
-        self._body, self._rng = silhouette.body, rng
+        self._body, self._rng, self._lost_iou = silhouette.body, rng, config.lost_iou
         self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
         self._bank = _bank()
         self._torso_sigma = np.zeros(N_STATE)
-        angles_rad = (c.roll_noise_rad, c.pitch_noise_rad, c.yaw_noise_rad)
-        self._torso_sigma[:4] = c.y_noise_m, *angles_rad
+        self._torso_sigma[0] = c.y_noise_m
+        self._torso_sigma[1:4] = c.roll_noise_rad, c.pitch_noise_rad, c.yaw_noise_rad
         self._torso_sigma[12:] = c.x_noise_m, c.z_noise_m
         self._sigma = self._torso_sigma.copy()
         self._sigma[4:12] = c.arm_noise_rad
@@ -95,8 +94,7 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._survivors = self._reference[None].copy()
         self._is_new, self._is_lost = True, False
-        self._age = 0
-        self._home_m = 0.0
+        self._age, self._home_m = 0, 0.0
         self._output: FloatArray | None = None
         # Of left elbow and hand, right elbow and hand, m.
         self._arm_spread = [0.0, 0.0, 0.0, 0.0]
