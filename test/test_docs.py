@@ -237,17 +237,17 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
     from cardbox_tracker.body.posture import (
-        JOINT_LIMITS,
         JOINT_NAMES,
         PLACE_LIMITS,
         PLACE_NAMES,
+        TURNING_LIMITS,
     )
 
     rows = re.findall(
         r"(?m)^\| `(\w+)`.*\| (-?[\d.]+) to ([\d.]+) \|$", text_of(Path("docs/conventions.md"))
     )
-    limits = dict(zip(JOINT_NAMES, np.degrees(JOINT_LIMITS), strict=True))
-    limits["torso_y"] = JOINT_LIMITS[0]
+    limits = dict(zip(JOINT_NAMES, np.degrees(TURNING_LIMITS), strict=True))
+    limits["torso_y"] = TURNING_LIMITS[0]
     limits |= dict(zip(PLACE_NAMES, PLACE_LIMITS, strict=True))
     assert len(rows) == 10
     for name, lowest, highest in rows:

@@ -60,6 +60,12 @@ JOINT_LIMITS: FloatArray = np.vstack(
 """Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``)."""
 JOINT_LIMITS.setflags(write=False)
 
+_TURN_DEG = 100.0
+TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
+"""Shape (12, 2): the limits of somebody who also turns with the feet, to walk or to look aside."""
+TURNING_LIMITS[3] = np.radians([-_TURN_DEG, _TURN_DEG])
+TURNING_LIMITS.setflags(write=False)
+
 PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
 """How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
 

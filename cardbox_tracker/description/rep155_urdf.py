@@ -20,7 +20,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_LIMITS, PLACE_LIMITS
+from cardbox_tracker.body.posture import PLACE_LIMITS, TURNING_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
@@ -57,10 +57,10 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
         ("z_body", "prismatic", (0, 0, 1), PLACE_LIMITS[1]),
     )
     trunk: tuple[_Movable, ...] = (
-        ("body", "prismatic", (0, 1, 0), JOINT_LIMITS[0]),
-        ("y_waist", "revolute", (0, 0, 1), JOINT_LIMITS[3]),
-        ("waist", "revolute", (0, 1, 0), JOINT_LIMITS[2]),
-        ("r_waist", "revolute", (1, 0, 0), JOINT_LIMITS[1]),
+        ("body", "prismatic", (0, 1, 0), TURNING_LIMITS[0]),
+        ("y_waist", "revolute", (0, 0, 1), TURNING_LIMITS[3]),
+        ("waist", "revolute", (0, 1, 0), TURNING_LIMITS[2]),
+        ("r_waist", "revolute", (1, 0, 0), TURNING_LIMITS[1]),
     )
     for name, kind, axis, limits in (*(place if torso_place else ()), *trunk):
         link = add_link(robot, name + end)

@@ -20,7 +20,7 @@ from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
 from cardbox_tracker.description.urdf_elements import (
     PATCH_THICKNESS_M,
     add_box,
@@ -34,7 +34,11 @@ from cardbox_tracker.description.urdf_elements import (
 ROOT_LINK = "camera_level"
 
 _LIMITS = dict(
-    zip((*JOINT_NAMES, *PLACE_NAMES), [*JOINT_LIMITS.tolist(), *PLACE_LIMITS.tolist()], strict=True)
+    zip(
+        (*JOINT_NAMES, *PLACE_NAMES),
+        [*TURNING_LIMITS.tolist(), *PLACE_LIMITS.tolist()],
+        strict=True,
+    )
 )
 
 

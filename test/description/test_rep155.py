@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
-    JOINT_LIMITS,
     LEFT_ARM,
     PLACE_LIMITS,
     RIGHT_ARM,
+    TURNING_LIMITS,
     reference_posture,
 )
 from cardbox_tracker.description.rep155 import REP155_JOINTS, Rep155Joints, joint_names
@@ -63,7 +63,7 @@ def assert_agrees(
 
 
 def within_limits() -> st.SearchStrategy[np.ndarray]:
-    values = [st.floats(low, high) for low, high in JOINT_LIMITS.tolist()]
+    values = [st.floats(low, high) for low, high in TURNING_LIMITS.tolist()]
     return st.tuples(*values).map(np.array)
 
 

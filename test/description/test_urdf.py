@@ -15,7 +15,7 @@ import pytest
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
-from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
@@ -33,7 +33,7 @@ KEYPOINT_LINKS = (
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
 ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
-ALL_LIMITS = np.vstack([JOINT_LIMITS, PLACE_LIMITS])
+ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
 
 
 def child(element: Xml.Element, tag: str) -> dict[str, str]:
@@ -84,7 +84,7 @@ def link_poses(xml: str, positions: Mapping[str, float]) -> dict[str, np.ndarray
 
 def random_postures(count: int) -> np.ndarray:
     rng = np.random.default_rng(5)
-    return rng.uniform(JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1], (count, 12))
+    return rng.uniform(TURNING_LIMITS[:, 0], TURNING_LIMITS[:, 1], (count, 12))
 
 
 def random_places(count: int) -> np.ndarray:

@@ -45,7 +45,8 @@ class WholeBodyCost:
         view: the camera.
         frontal_px: pixels of the model in the front reference posture.
         silhouette_px: foreground pixels that count in the present silhouette.
-        anchor: x and z of the last frame, and the home of x, (3,), metres.
+        anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
+            (4,).
         terms: what further terms say of the present frame.
     """
 
@@ -70,7 +71,7 @@ class WholeBodyCost:
         shape = (camera.height, camera.width + 1)
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
         self.terms: tuple[TermObservation, ...] = ()
-        self.anchor = np.zeros(3)
+        self.anchor = np.zeros(4)
         front = np.zeros((1, kernels.N_STATE))
         front[0, :12] = reference_posture("front")
         front[0, 0] = body.placement.lateral_m

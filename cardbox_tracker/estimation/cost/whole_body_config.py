@@ -115,7 +115,7 @@ class WholeBodyCostConfig:
     )
     step_cap: float = setting(2.0, "most that a motion costs", limits=(0.1, 1000.0), restarts=True)
     x_home_m: float = setting(
-        0.2,
+        0.08,
         "unit of the torso's distance from where it mostly was along the line of sight",
         unit="m",
         limits=(0.001, 10.0),

@@ -380,13 +380,16 @@ def _saturating(square: float, cap: float) -> float:
 
 @_inline
 def _torso_prior(state: Floats, anchor: Floats, rules: Floats) -> float:
-    """Prior of a torso; ``anchor`` (3,) is x and z of the last frame and the home of x, metres."""
+    """Prior of a torso.
+
+    ``anchor`` (4,) is x and z of the last frame and the home of x, metres, and the expected yaw.
+    """
     cap = rules[ANGLE_CAP]
     pitch = state[PITCH] - rules[PITCH_REST]
     pitch /= rules[BACK_UNIT] if pitch < 0.0 else rules[FORWARD_UNIT]
     rated = _saturating((state[ROLL] / rules[ROLL_UNIT]) ** 2, cap)
     rated += _saturating(pitch**2, cap)
-    rated += _saturating((state[YAW] / rules[YAW_UNIT]) ** 2, cap)
+    rated += _saturating(((state[YAW] - anchor[3]) / rules[YAW_UNIT]) ** 2, cap)
     rated += _saturating(((state[TORSO_X] - anchor[0]) / rules[X_STEP]) ** 2, rules[STEP_CAP])
     rated += _saturating(((state[TORSO_Z] - anchor[1]) / rules[Z_STEP]) ** 2, rules[STEP_CAP])
     rated += _saturating(((state[TORSO_X] - anchor[2]) / rules[X_HOME]) ** 2, rules[HOME_CAP])

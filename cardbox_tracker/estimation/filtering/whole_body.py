@@ -10,14 +10,12 @@ and what was tried. What proposes is in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, PLACE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import N_JOINTS, PLACE_LIMITS, TURNING_LIMITS, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.pose_prior import sample_bank
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -27,9 +25,9 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     TORSO,
     TORSO_X,
     TORSO_Z,
-    angles_of_arms,
 )
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering.arm_bank import bank_of_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.loss import (
     Evidence,
@@ -38,8 +36,9 @@ from cardbox_tracker.estimation.filtering.loss import (
     state_stddev,
 )
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+from cardbox_tracker.estimation.filtering.walking import Walk
 
-STATE_LIMITS: FloatArray = np.vstack([JOINT_LIMITS, PLACE_LIMITS])
+STATE_LIMITS: FloatArray = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
 """Shape (14, 2)."""
 _ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 _HOME_LIMIT_M = 0.7
@@ -48,15 +47,10 @@ _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Arms that are passed on, and how many of them are combined with the other side's.
 _BEST_ARMS, _PAIRED_ARMS = 20, 12
 _AGAIN_NOISE = 0.45
+# A step across the image that takes the legs out of the columns where they were.
+_STEP_M = 0.05
 # Uniform numbers of a torso, an arm, a state of the last rounds.
 _TORSO_UNIFORMS, _ARM_UNIFORMS, _TOGETHER_UNIFORMS = 2, 3, 2
-
-
-@cache
-def _bank() -> FloatArray:
-    """Return arms (3000, 4) of the learned prior; outward angles are alike on both sides."""
-    arms: FloatArray = angles_of_arms(sample_bank(), 1.0, _ARM_LIMITS)
-    return arms
 
 
 class WholeBodyFilter:
@@ -72,13 +66,10 @@ class WholeBodyFilter:
         self._config = c = config.whole_body
         self._body, self._rng, self._lost_iou = silhouette.body, rng, config.lost_iou
         self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
-        self._bank = _bank()
-        self._torso_sigma = np.zeros(N_STATE)
-        self._torso_sigma[0] = c.y_noise_m
-        self._torso_sigma[1:4] = c.roll_noise_rad, c.pitch_noise_rad, c.yaw_noise_rad
-        self._torso_sigma[12:] = c.x_noise_m, c.z_noise_m
-        self._sigma = self._torso_sigma.copy()
-        self._sigma[4:12] = c.arm_noise_rad
+        self._bank = bank_of_arms()
+        self._sigma = c.noise()
+        self._torso_sigma = self._sigma.copy()
+        self._torso_sigma[4:12] = 0.0
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(self._cost.parts[TORSO, 0] + self._cost.parts[TORSO, 1])
         self._reference = np.zeros(N_STATE)
@@ -95,6 +86,7 @@ class WholeBodyFilter:
         self._survivors = self._reference[None].copy()
         self._is_new, self._is_lost = True, False
         self._age, self._home_m = 0, 0.0
+        self._walk = Walk()
         self._output: FloatArray | None = None
         # Of left elbow and hand, right elbow and hand, m.
         self._arm_spread = [0.0, 0.0, 0.0, 0.0]
@@ -126,17 +118,20 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._cost.terms = tuple(term.observe(self._frame) for term in terms)
         self._sight = self._cost.sight()
+        ahead_m = self._body.placement.distance_m - float(self._survivors[0, TORSO_X])
+        self._step_m = self._walk.see(self._frame.silhouette, self._sight, ahead_m)
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             self._home_m = 0.0
             self._survivors[-1] = self._reference
             place_m = self._sight * self._body.placement.distance_m
             self._survivors[-1, 0] = np.clip(place_m, *STATE_LIMITS[0])
-        if self._is_new:
+        moved = self._survivors[0].copy()
+        moved[0] += self._step_m
+        if self._is_new or abs(self._step_m) > _STEP_M:
             # Now it is known where the legs are.
-            self._cost.see(self._frame.silhouette, self._survivors[0])
-        else:
-            self._age += 1
+            self._cost.see(self._frame.silhouette, moved)
+        self._age += not self._is_new
         for _ in range(passes):
             self._search()
         self._is_new = self._is_lost = False
@@ -150,7 +145,7 @@ class WholeBodyFilter:
         before = self._survivors[0].copy()
         self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
         self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
-        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m
+        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m, self._walk.yaw_rad
 
         pool = self._torsos(before, normals, uniforms)
         ratings = cost.bodies(pool)[0]
@@ -171,22 +166,24 @@ class WholeBodyFilter:
         fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X]
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
+        upright = config.fresh_torsos if is_settled else config.torso_explorers
         torsos = moves.propose_torsos(
             self._survivors,
             self._torso_sigma,
             self._lever_m,
             config.torso_explorers,
-            config.fresh_torsos,
+            upright,
             fresh,
             _SETTLED_X_M if is_settled else _YOUNG_X_M,
             self._sight,
+            self._step_m,
             self._body.placement.distance_m,
             STATE_LIMITS,
             normals.take(config.torsos, N_STATE),
             uniforms.take(config.torsos, _TORSO_UNIFORMS),
         )
         ratings = cost.torsos(torsos, before)
-        pool: FloatArray = moves.pool_of(
+        pool = moves.pool_of(
             self._survivors,
             torsos,
             ratings,
@@ -196,7 +193,8 @@ class WholeBodyFilter:
             cost.view,
             _ARM_LIMITS,
         )
-        return pool
+        # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
+        return np.concatenate([pool, torsos[len(torsos) - upright :]])
 
     def _arm(
         self, pool: FloatArray, arm: int, normals: Draws, uniforms: Draws

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import check, setting
 
@@ -17,9 +20,9 @@ class WholeBodyConfig:
     """
 
     cost: WholeBodyCostConfig = WholeBodyCostConfig()
-    survivors: int = setting(16, "states kept from frame to frame", limits=(4, 1000), restarts=True)
+    survivors: int = setting(32, "states kept from frame to frame", limits=(4, 1000), restarts=True)
     alike: int = setting(
-        8,
+        12,
         "survivors that may be alike; the others differ from all better ones",
         limits=(1, 1000),
         restarts=True,
@@ -33,7 +36,7 @@ class WholeBodyConfig:
     )
     fresh_torsos: int = setting(
         8,
-        "of these, those that stand upright where the silhouette is",
+        "of these, those that stand upright where the silhouette is; all of them at first",
         limits=(0, 100_000),
         restarts=True,
     )
@@ -130,9 +133,9 @@ class WholeBodyConfig:
     start_passes: int = setting(
         3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
     )
-    # Somebody sideways shows about half the area of the front view, at the image's border less.
+    # Somebody sideways shows about half the area of the front view, a step away less.
     smallest_person: float = setting(
-        0.25,
+        0.12,
         "less foreground is nobody, as a fraction of the model's in the front posture",
         limits=(0.0, 1.0),
         restarts=True,
@@ -153,6 +156,11 @@ class WholeBodyConfig:
         limits=(0.0, 1.0),
         restarts=True,
     )
+
+    def noise(self) -> FloatArray:
+        """Return the deviations of a state's noise, (14,), metres and rad."""
+        torso = [self.y_noise_m, self.roll_noise_rad, self.pitch_noise_rad, self.yaw_noise_rad]
+        return np.array([*torso, *[self.arm_noise_rad] * 8, self.x_noise_m, self.z_noise_m])
 
     def __post_init__(self) -> None:
         """Check the ranges.

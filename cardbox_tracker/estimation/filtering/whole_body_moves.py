@@ -43,8 +43,9 @@ _inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 _BOW_FROM_RAD, _BOW_RANGE_RAD = -5.0 * pi / 180.0, 60.0 * pi / 180.0
 _BOWING, _BOWING_OR_TURNING = 0.5, 0.9
 _EXPLORERS_X_M = 0.06
-# Deviation of the yaw of torsos that stand upright where the silhouette is, rad.
-_FRESH_YAW_RAD = 0.3
+# Of the torsos that stand upright where the silhouette is, this part is turned anywhere, as people
+# are who walk in; the others face the camera with this deviation, rad.
+_FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
 # An arm that reaches for a pixel is bent so far at most that shoulder and hand are this far apart
 # beyond the difference of its bones, and never quite straight; m.
 _FOLDED_M, _STRETCHED_M = 0.05, 0.001
@@ -84,6 +85,7 @@ def propose_torsos(
     fresh_state: Floats,
     fresh_x_m: float,
     sight: float,
+    step_m: float,
     distance_m: float,
     limits: Floats,
     normals: Floats,
@@ -91,9 +93,11 @@ def propose_torsos(
 ) -> Floats:
     """Return states (N, 14) with new torsos around ``survivors`` (M, 14), whose arms they keep.
 
-    Every second one turns about the shoulders. The last ``explorers`` bow, turn or turn over; the
-    last ``fresh`` of them are ``fresh_state`` (14,) with other x, where the direction of ``sight``,
-    aside over ahead, is. ``normals`` are (N, 14), ``uniforms`` (N, 2).
+    Every second one turns about the shoulders; half of either kind moves by ``step_m``, as far as
+    the silhouette did: somebody walking makes more way than the noise does. The last ``explorers``
+    bow, turn or turn over; the last ``fresh`` of them are ``fresh_state`` (14,) with other x and
+    yaw, where the direction of ``sight``, aside over ahead, is. ``normals`` are (N, 14),
+    ``uniforms`` (N, 2).
     """
     n = normals.shape[0]
     states = np.empty((n, N_STATE))
@@ -101,6 +105,8 @@ def propose_torsos(
         source, state = survivors[i % survivors.shape[0]], states[i]
         for d in range(N_STATE):
             state[d] = source[d] + sigma[d] * normals[i, d]
+        if (i // 2) % 2 == 1:
+            state[TORSO_Y] += step_m
         _clip(state, limits)
         if i < n - explorers:
             if i % 2 == 1:
@@ -120,7 +126,10 @@ def propose_torsos(
                 state[d] = fresh_state[d]
             state[TORSO_X] += fresh_x_m * normals[i, TORSO_X]
             _clip(state, limits)
-            state[YAW] = _FRESH_YAW_RAD * normals[i, YAW]
+            if uniforms[i, 0] < _FRESH_TURNED:
+                state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * uniforms[i, 1]
+            else:
+                state[YAW] = _FRESH_YAW_RAD * normals[i, YAW]
             state[TORSO_Y] = sight * (distance_m - state[TORSO_X])
         _clip(state, limits)
     return states

@@ -171,7 +171,7 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
 def test_the_torsos_prior_by_hand() -> None:
     of = cost()
     of.see(np.full((120, 160), 255, np.uint8), state())
-    anchor = np.array([0.1, 0.0, 0.2])
+    anchor = np.array([0.1, 0.0, 0.14, np.radians(7.0)])
 
     def prior(one: np.ndarray) -> float:
         found: float = kernels.priors(one, anchor, of.parts, of.girdle, of._rules, of._gmm)[0]
@@ -181,7 +181,8 @@ def test_the_torsos_prior_by_hand() -> None:
         return cap * (1.0 - np.exp(-square / cap))
 
     rest = state(x=0.1)
-    # Half a unit of 0.2 m from home.
+    rest[3] = anchor[3]
+    # Half a unit of 0.08 m from home.
     home = capped(0.25, 4.0)
     assert prior(rest) == pytest.approx(home)
     bowed, back = rest.copy(), rest.copy()
@@ -189,14 +190,14 @@ def test_the_torsos_prior_by_hand() -> None:
     assert prior(bowed) == pytest.approx(home + capped(1.0, 9.0))
     assert prior(back) == pytest.approx(home + capped(1.0, 9.0))
     turned = rest.copy()
-    turned[3] = -np.radians(28.0)
+    turned[3] = -np.radians(21.0)
     assert prior(turned) == pytest.approx(home + capped(4.0, 9.0))
     raised = rest.copy()
     raised[13] = 0.03
     assert prior(raised) == pytest.approx(home + capped(4.0, 2.0) + capped(0.25, 4.0))
     stepped = rest.copy()
     stepped[12] = 0.22
-    assert prior(stepped) == pytest.approx(capped(4.0, 2.0) + capped(0.01, 4.0))
+    assert prior(stepped) == pytest.approx(capped(4.0, 2.0) + capped(1.0, 4.0))
 
 
 def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:

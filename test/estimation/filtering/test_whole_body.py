@@ -188,7 +188,7 @@ def test_torsos_that_turn_about_the_shoulders_leave_them_where_they_are() -> Non
     sigma[1:3] = 0.2
     lever_m = float(BODY.size("waist_height") + BODY.size("torso_height"))
     torsos = moves.propose_torsos(
-        *(upright()[None], sigma, lever_m, 0, 0, upright(), 0.0, 0.0, 2.0, STATE_LIMITS),
+        *(upright()[None], sigma, lever_m, 0, 0, upright(), 0.0, 0.0, 0.0, 2.0, STATE_LIMITS),
         rng.standard_normal((20, 14)),
         rng.random((20, 2)),
     )
