@@ -21,7 +21,7 @@ from cardbox_tracker.ros.messages.conversions import camera_info_message, image_
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 12
-RESTARTS = 3
+RESTARTS = 2
 
 
 class Camera:
