@@ -2,8 +2,9 @@
 
 Nobody stands still: a sway of some millimetres moves every edge of the body. Means over a few
 images have little noise, so two of them differ along the outline of a person, and nowhere in an
-empty scene. Of eleven recorded sessions and two real videos, means two seconds apart differed in
-0.8 % of the image or more wherever somebody was in it, and in 0.5 % or less of an empty scene.
+empty scene. Of eleven recorded sessions, means within 30 images differed in 1.2 % of the image or
+more wherever somebody was in it, and in 0.5 % or less of an empty scene
+(docs/evaluation/silhouettes.md).
 """
 
 from __future__ import annotations
