@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.body.model_file import load_body_model, save_body_model
     from cardbox_tracker.body.posture import JOINT_NAMES
     from cardbox_tracker.errors import (
+        BackgroundFileError,
         BagError,
         BodyModelError,
         CameraError,
@@ -48,6 +49,7 @@ __all__ = [
     "KEYPOINT_NAMES",
     "PRESETS",
     "BackgroundConfig",
+    "BackgroundFileError",
     "BackgroundLearner",
     "BackgroundModel",
     "BagError",
@@ -78,6 +80,7 @@ _MODULES = {
     "body.model_file": ("load_body_model", "save_body_model"),
     "body.posture": ("JOINT_NAMES",),
     "errors": (
+        "BackgroundFileError",
         "BagError",
         "BodyModelError",
         "CameraError",

@@ -5,6 +5,7 @@ CardboxError
     CameraError          a calibration or a CameraInfo
     EncodingError        an image's encoding or its bytes
     InitializationError  the reference silhouettes cannot give a body
+    BackgroundFileError  a file with a learned background
     BagError             a recording that cannot be read or written
     RosMissingError      ROS 2 is not installed
 """
@@ -22,6 +23,10 @@ class BodyModelError(CardboxError):
 
 class CameraError(CardboxError):
     """A camera calibration is missing, malformed or unsupported."""
+
+
+class BackgroundFileError(CardboxError):
+    """A learned background cannot be read, written or used."""
 
 
 class EncodingError(CardboxError):

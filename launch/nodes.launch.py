@@ -42,6 +42,7 @@ ARGUMENTS = {
     "person_distance_m": ("2.0", "level distance from the camera to the person"),
     "camera_pitch_deg": ("0.0", "how far the camera looks down"),
     "side_turn": ("left", "which way the person turns for the side reference: left or right"),
+    "background_file": ("", "background: read if it fits the camera, written when it is learned"),
     "model_file": ("", "body model: read if it exists, written by every initialization"),
     "preset": ("default", "tracker settings: paper or default"),
     "rep155_id": ("", "also publish /humans/bodies/ID/... after REP-155, for this ID"),
@@ -51,7 +52,7 @@ ARGUMENTS = {
 }
 # Parameters that are launch arguments too, by node.
 GIVEN: dict[str, dict[str, type]] = {
-    "background": {"image_transport": str},
+    "background": {"image_transport": str, "background_file": str},
     "initializer": {
         "person_distance_m": float,
         "camera_pitch_deg": float,

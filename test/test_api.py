@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Written out, so that no name disappears or is added unnoticed.
 PUBLIC = {
     "BackgroundConfig",
+    "BackgroundFileError",
     "BackgroundLearner",
     "BackgroundModel",
     "BagError",

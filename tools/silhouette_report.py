@@ -23,6 +23,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
+from tools.silhouette_faults import Session, fault_lines
 
 Image = NDArray[np.uint8]
 Light = Callable[[float], float]
@@ -205,6 +206,9 @@ def report(sessions: list[Path], lit: Path | None) -> str:
             line = f"| {name} | {mean(before, 'iou'):.3f} | {mean(after, 'iou'):.3f} | {late} |"
             text.append(line)
             print(line, flush=True)
+    print("faults", flush=True)
+    faults = fault_lines(Session(f, read_masks(f / "masks.npz")) for f in sessions)
+    text += ["", *faults]
     return "\n".join(text) + "\n"
 
 

@@ -246,6 +246,11 @@ class SilhouetteExtractor:
         if self._light is not None:
             self._light.restart()
 
+    def expect_other_light(self) -> None:
+        """Say that the next image may be in another light than what was learned."""
+        if self._light is not None:
+            self._light.expect_step()
+
     def _scene_gain(self, brightness: ImageArray) -> float:
         """How much brighter the whole scene is now: the person covers less than half of it."""
         if self.config.flicker <= 0:

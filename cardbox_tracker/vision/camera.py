@@ -117,6 +117,23 @@ class Calibration:
         """True if the lens bends straight lines."""
         return bool(np.any(self.distortion != 0))
 
+    def is_same(self, other: Calibration) -> bool:
+        """Return whether ``other`` describes the same camera, whatever its frame is called."""
+        return (
+            (self.width, self.height) == (other.width, other.height)
+            and np.array_equal(self.k, other.k)
+            and self._lens() == other._lens()
+        )
+
+    def _lens(self) -> tuple[Any, ...]:
+        """Model and coefficients of the distortion; all lenses without any are alike."""
+        return (self.distortion_model, *self.distortion) if self.is_distorted else ()
+
+    def __str__(self) -> str:
+        """Return size, focal length and lens in short."""
+        lens = self.distortion_model if self.is_distorted else "no distortion"
+        return f"{self.width}x{self.height}, f {self.k[0, 0]:g} px, {lens}"
+
     def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:
         """Return the pinhole camera at the working resolution ``width`` x ``height``, px.
 
@@ -158,6 +175,11 @@ class Calibration:
             raise CameraError(
                 "the camera is not calibrated (its matrix K is all zero); calibrate it with "
                 "camera_calibration, or give its driver a calibration file"
+            )
+        if not np.all(np.isfinite(self.distortion)):
+            raise CameraError(
+                "the distortion coefficients have values that are no numbers; calibrate the camera "
+                "anew, or feed rectified images with all-zero distortion"
             )
         if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
             raise CameraError(

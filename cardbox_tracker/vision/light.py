@@ -91,6 +91,10 @@ class LightFollower:
         self._settling = 0
         self._started = False
 
+    def expect_step(self) -> None:
+        """Take the field of the next image as estimated, as after a step of the light."""
+        self._settling = max(self._settling, 1)
+
     def follow(self, brightness: ImageArray) -> FloatImage:
         """Return the background (H, W) as it is in the light of an image (H, W).
 

@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.vision.background import (
     BackgroundConfig,
-    BackgroundLearner,
     BackgroundModel,
     SilhouetteExtractor,
     brightness_of,
 )
 from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.learning import Learning
 from cardbox_tracker.vision.resize import to_working_size
 
 ImageArray = NDArray[np.uint8]
+
+# A silhouette so many times larger than in another light says that the light is another one.
+_IN_WRONG_LIGHT = 1.7
 
 
 class SilhouettePipeline:
@@ -28,6 +31,7 @@ class SilhouettePipeline:
     Attributes:
         calibration: of the images that come in.
         camera: the pinhole camera of what comes out, at the working size, without distortion.
+        learning: how far the empty scene is learned.
     """
 
     def __init__(
@@ -35,6 +39,7 @@ class SilhouettePipeline:
         calibration: Calibration,
         size: tuple[int, int],
         config: BackgroundConfig | None = None,
+        learning: type[Learning] = Learning,
     ) -> None:
         """Set up with nothing learned.
 
@@ -42,6 +47,7 @@ class SilhouettePipeline:
             calibration: of the images that come in, of any size of that aspect ratio.
             size: working size (width, height), px.
             config: settings of the background model.
+            learning: how the empty scene is learned.
 
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
@@ -51,7 +57,8 @@ class SilhouettePipeline:
         self._size = size
         self._rectifier = calibration.rectifier(*size)
         self._config = config or BackgroundConfig()
-        self._learner = BackgroundLearner()
+        self._way = learning
+        self.learning = learning(self._config.learn_images)
         self._extractor: SilhouetteExtractor | None = None
 
     @property
@@ -62,6 +69,7 @@ class SilhouettePipeline:
     @config.setter
     def config(self, config: BackgroundConfig) -> None:
         self._config = config
+        self.learning.images = config.learn_images
         if self._extractor is not None:
             self._extractor = SilhouetteExtractor(self._extractor.model, config)
 
@@ -78,12 +86,12 @@ class SilhouettePipeline:
     @property
     def learned_images(self) -> int:
         """Images of the empty scene added so far."""
-        return self._learner.count
+        return self.learning.count
 
     @property
     def has_enough(self) -> bool:
-        """True once ``config.learn_images`` images were added."""
-        return self._learner.count >= self._config.learn_images
+        """True once the scene is learned well enough for :meth:`finish_learning`."""
+        return self.learning.has_enough()
 
     def prepare(self, image: ImageArray) -> ImageArray:
         """Return ``image`` (H, W) or (H, W, 3) at the working size, without lens distortion."""
@@ -92,7 +100,7 @@ class SilhouettePipeline:
 
     def learn(self, image: ImageArray) -> None:
         """Add a prepared image, grey (H, W) or bgr (H, W, 3), of the empty scene."""
-        self._learner.add(image)
+        self.learning.add(image)
 
     def finish_learning(self) -> BackgroundModel:
         """Learn the background from the images added; later images are compared with it.
@@ -100,14 +108,30 @@ class SilhouettePipeline:
         Raises:
             ValueError: fewer than two images were added.
         """
-        model = self._learner.model()
+        model = self.learning.model()
         self._extractor = SilhouetteExtractor(model, self._config)
         return model
 
-    def relearn(self) -> None:
-        """Forget the background; it is learned again from the next images."""
-        self._learner = BackgroundLearner()
+    def relearn(self, learning: type[Learning] | None = None) -> None:
+        """Forget the background; it is learned again, in another way if one is given."""
+        self._way = learning or self._way
+        self.learning = self._way(self._config.learn_images)
         self._extractor = None
+
+    def resume(self, model: BackgroundModel, image: ImageArray) -> None:
+        """Go on with a background learned before, from a prepared image with anybody in it.
+
+        The light may have changed since: where the silhouette is much smaller in a light estimated
+        from this image, that light is taken.
+        """
+        extractor = SilhouetteExtractor(model, self._config)
+        found = np.count_nonzero(extractor(image))
+        extractor.restart()
+        other = SilhouetteExtractor(model, self._config)
+        other.expect_other_light()
+        for _ in range(2):  # the second time, without the person
+            left = np.count_nonzero(other(image))
+        self._extractor = other if found > _IN_WRONG_LIGHT * left else extractor
 
     def silhouette(self, image: ImageArray) -> ImageArray:
         """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.

@@ -9,23 +9,20 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import CameraError
+from cardbox_tracker.errors import BackgroundFileError, CameraError
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.background_advice import Findings, advice
 from cardbox_tracker.ros.nodes.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.vision.background import warm_up
-from cardbox_tracker.vision.camera_info import calibration_from_info
+from cardbox_tracker.vision.background_file import background_path
+from cardbox_tracker.vision.calibration_watch import CalibrationWatch
+from cardbox_tracker.vision.kept_background import KeptBackground
+from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
-
-# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
-_LARGE_IMAGE_BYTES = 400_000
-_LOSS_TO_WARN = 0.1
-# Well above the noise of a median over the image.
-_DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# More of the image than a person who is wholly in view covers.
-_COVERAGE_TO_WARN = 0.6
 
 
 class BackgroundNode(CardboxNode):
@@ -37,7 +34,8 @@ class BackgroundNode(CardboxNode):
         warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
-        self._info_key: tuple[Any, ...] = ()
+        path = background_path(settings.background_file)
+        self._kept = KeptBackground(path, (settings.width, settings.height))
         self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
         self._image_bytes = 0
@@ -53,6 +51,8 @@ class BackgroundNode(CardboxNode):
         kind = CompressedImage if compressed else Image
         self._image_topic = self.resolve(topic)
         self._info_topic = self.resolve("camera_info")
+        self._watch = CalibrationWatch(self._info_topic, self._image_topic)
+        self._single = SinglePublisher(self, (self._image_topic, self._info_topic))
         self.subscribe(CameraInfo, "camera_info", self._on_info, qos.SENSOR_DATA)
         self.subscribe(kind, topic, self._on_image, qos.SENSOR_DATA)
         self.offer("~/learn", self._learn)
@@ -73,35 +73,31 @@ class BackgroundNode(CardboxNode):
                 "from; is the camera running, and its CameraInfo on "
                 f"{self._info_topic}? See 'ros2 topic hz {self._image_topic}'"
             )
-        self._pipeline.relearn()
-        return (
-            f"learning the background from the next {self._pipeline.config.learn_images} images; "
-            "nobody may be in view"
-        )
+        self._kept.forget()
+        self._pipeline.relearn(WAYS[self.parameters.value.learning])
+        return f"waiting for {self._pipeline.learning.waits_for(self._image_topic)}"
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
-        roi = message.roi
-        key = (
-            message.width,
-            message.height,
-            message.distortion_model,
-            tuple(message.k),
-            tuple(message.d),
-            (roi.x_offset, roi.y_offset, roi.width, roi.height),
-            (message.binning_x, message.binning_y),
-        )
-        if key == self._info_key and self._pipeline is not None:
+        before = self._watch.remark
+        changed = self._watch.see(message)
+        if self._watch.remark and not before:
+            self.get_logger().warning(self._watch.remark)
+        calibration = self._watch.current
+        if not changed or calibration is None:
             return
-        self._info_key, self._pipeline, self._image = key, None, None
-        calibration = calibration_from_info(message, self._image_topic, self._info_topic)
         settings = self.parameters.value
-        size = (settings.width, settings.height)
-        try:
-            self._pipeline = SilhouettePipeline(calibration, size, settings.config())
-        except CameraError as error:
-            raise CameraError(
-                f"{self._info_topic}, of the images on {self._image_topic}: {error}"
-            ) from None
+        if self._pipeline is not None:
+            self.get_logger().warning(
+                f"the CameraInfo on {self._info_topic} has changed for good, to {calibration}"
+            )
+            self._kept.carry_over(self._pipeline.model)
+        self._image = None
+        self._pipeline = SilhouettePipeline(
+            calibration,
+            (settings.width, settings.height),
+            settings.config(),
+            WAYS[settings.learning],
+        )
         self.diagnostics.wait_for(f"images on {self._image_topic}")
 
     def _on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
@@ -109,7 +105,7 @@ class BackgroundNode(CardboxNode):
         self._image_bytes = len(message.data)
         pipeline = self._pipeline
         if pipeline is None:
-            if not self._info_key:
+            if not self._watch.seen:
                 self.diagnostics.wait_for(
                     f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
@@ -118,25 +114,32 @@ class BackgroundNode(CardboxNode):
         conversions.check_shape(full, pipeline.calibration, self._image_topic, self._info_topic)
         self._image = image = pipeline.prepare(full)
         if not pipeline.is_ready:
-            self._learn_from(message.header, pipeline, image)
+            self._prepare(message.header, pipeline, image)
         if pipeline.is_ready:
             self._publish(message.header, pipeline, image)
             self.diagnostics.working(sent_ns)
 
-    def _learn_from(
+    def _prepare(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
-        pipeline.learn(image)
-        if not pipeline.has_enough:
-            self.diagnostics.wait_for(
-                f"{pipeline.config.learn_images} images of the empty scene on {self._image_topic} "
-                "(learning the background: nobody may be in view)"
-            )
-            return
-        model = pipeline.finish_learning()
+        """Go on with the background of before, or learn it."""
+        done = self._kept.resume(pipeline, image)
+        if not done:
+            pipeline.learning.add(image)
+            if not pipeline.has_enough:
+                self.diagnostics.wait_for(pipeline.learning.waits_for(self._image_topic))
+                return
+            pipeline.finish_learning()
+            done = f"background learned from {pipeline.learned_images} images"
+            try:
+                done += self._kept.keep(pipeline)
+            except BackgroundFileError as error:
+                self.diagnostics.warn(str(error))
+        model = pipeline.model
+        assert model is not None
         self._mean.publish(conversions.image_message(header, model.mean, "32FC1"))
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
-        self.get_logger().info(f"background learned from {pipeline.learned_images} images")
+        self.get_logger().info(done)
 
     def _publish(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
@@ -152,12 +155,15 @@ class BackgroundNode(CardboxNode):
         self._covered = np.count_nonzero(silhouette) / silhouette.size
 
     def _values(self) -> dict[str, str]:
-        learned = 0 if self._pipeline is None else self._pipeline.learned_images
-        return {
-            "background learned from": f"{learned}/{self.parameters.value.learn_images}",
+        values = {
+            "background learned from": f"0/{self.parameters.value.learn_images}",
             "foreground (% of the image)": f"{100 * self._covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
+            "ignored CameraInfo": str(self._watch.ignored),
         }
+        if self._pipeline is not None:
+            values |= self._pipeline.learning.values()
+        return values
 
     def _drift(self) -> float:
         if self._pipeline is None or self._image is None:
@@ -165,23 +171,16 @@ class BackgroundNode(CardboxNode):
         return self._pipeline.drift(self._image)
 
     def _advice(self) -> list[str]:
-        advice = []
-        if self.diagnostics.input.loss > _LOSS_TO_WARN and self._image_bytes > _LARGE_IMAGE_BYTES:
-            advice.append(
-                f"{100 * self.diagnostics.input.loss:.0f} % of the images on {self._image_topic} "
-                f"({self._image_bytes // 1000} kB each) are lost on the way: start all nodes "
-                "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
-                "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
-            )
-        follows = self.parameters.value.follow and self.parameters.value.clean_up
-        drifted = not follows and abs(self._drift()) > _DRIFT_TO_WARN_GREY_LEVELS
-        if drifted or self._covered > _COVERAGE_TO_WARN:
-            advice.append(
-                "the whole scene changed its brightness: switch the camera's automatic exposure "
-                "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
-                "then call background/learn with nobody in view"
-            )
-        return advice
+        settings, remark = self.parameters.value, self._watch.remark
+        findings = Findings(
+            self._image_topic,
+            self.diagnostics.input.loss,
+            self._image_bytes,
+            self._drift(),
+            settings.follow and settings.clean_up,
+            self._covered,
+        )
+        return [*advice(findings), *self._single.remarks(), *([remark] if remark else [])]
 
 
 def main(args: list[str] | None = None) -> int:

@@ -17,6 +17,7 @@ from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.learning import WAYS
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
 _NEXT_LEARNING = "next learning"
@@ -39,6 +40,20 @@ class BackgroundParameters(NodeParameters):
     )
     height: int = parameter(
         240, "working resolution, height", unit="px", limits=(32, 4096), read_only=True
+    )
+    background_file: str = parameter(
+        "",
+        "file to keep the learned background in; if it exists at the start and fits the camera and "
+        "what it shows, nothing has to be learned, although somebody stands there; empty: none",
+        read_only=True,
+    )
+    learning: str = parameter(
+        next(iter(WAYS)),
+        "still: learn the empty scene once nothing moves in it; person_in_view: learn around a "
+        "person, and the rest when they step aside; always: learn from the first images, whatever "
+        "moves",
+        choices=tuple(WAYS),
+        effect=_NEXT_LEARNING,
     )
     learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
     threshold: float = shared(BackgroundConfig, "threshold")

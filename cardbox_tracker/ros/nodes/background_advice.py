@@ -1,0 +1,54 @@
+"""What the background node says about its input besides what it waits for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
+_LARGE_IMAGE_BYTES = 400_000
+_LOSS_TO_WARN = 0.1
+# Well above the noise of a median over the image.
+_DRIFT_TO_WARN_GREY_LEVELS = 12.0
+# More of the image than a person who is wholly in view covers.
+_COVERAGE_TO_WARN = 0.6
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What is known of the images.
+
+    Attributes:
+        topic: where they come from.
+        loss: share of them that never arrived.
+        image_bytes: size of one.
+        drift: how much brighter they are than the background, grey levels.
+        follows: True if the light is followed.
+        covered: share of the image that is foreground.
+    """
+
+    topic: str
+    loss: float
+    image_bytes: int
+    drift: float
+    follows: bool
+    covered: float
+
+
+def advice(findings: Findings) -> list[str]:
+    """Return what a user should do about the images, one text for each."""
+    texts = []
+    if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
+        texts.append(
+            f"{100 * findings.loss:.0f} % of the images on {findings.topic} "
+            f"({findings.image_bytes // 1000} kB each) are lost on the way: start all nodes "
+            "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
+            "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
+        )
+    drifted = not findings.follows and abs(findings.drift) > _DRIFT_TO_WARN_GREY_LEVELS
+    if drifted or findings.covered > _COVERAGE_TO_WARN:
+        texts.append(
+            "the whole scene changed its brightness: switch the camera's automatic exposure "
+            "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
+            "then call background/learn with nobody in view"
+        )
+    return texts

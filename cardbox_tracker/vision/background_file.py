@@ -1,0 +1,217 @@
+"""A learned background in a file, so that a restarted program need not see the scene empty again.
+
+The file is a NumPy archive without pickled objects: the format's name, mean and standard deviation
+of the brightness and of the colours, and the calibration of the camera. What is read is bounded by
+the working size that is expected, before any of it is unpacked.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import BackgroundFileError, CardboxError
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.chroma import ChromaModel
+from cardbox_tracker.vision.empty_scene import BackgroundModel
+
+FORMAT = "cardbox_background_1"
+
+_FORMAT, _MEAN, _STDDEV = "format", "mean", "stddev"
+_CHROMA_MEAN, _CHROMA_STDDEV = "chroma_mean", "chroma_stddev"
+_SIZE, _K, _DISTORTION, _DISTORTION_MODEL = "size", "k", "distortion", "distortion_model"
+_NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
+_COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
+# Longest text and longest list of numbers, and the overhead of one entry of the archive.
+_LONGEST_TEXT, _MOST_NUMBERS, _OVERHEAD = 64, 32, 4096
+_BRIGHTEST = 255.0
+
+
+class StoredBackground(NamedTuple):
+    """A background and the camera it was learned with.
+
+    Attributes:
+        model: the learned scene.
+        calibration: of the images it was learned from.
+    """
+
+    model: BackgroundModel
+    calibration: Calibration
+
+    def check_camera(self, calibration: Calibration, name: str) -> None:
+        """Check that ``calibration`` is that of the camera it was learned with.
+
+        Raises:
+            BackgroundFileError: it is another one; the text calls the file ``name``.
+        """
+        if not self.calibration.is_same(calibration):
+            raise BackgroundFileError(
+                f"the background in {name} was learned with another camera or calibration "
+                f"({self.calibration}) than the images have now ({calibration}); start the node "
+                "with the file of this camera, or call background/learn with nobody in view, "
+                "which replaces it"
+            )
+
+
+def background_path(name: str) -> Path | None:
+    """Return the path that ``name`` stands for, ``~`` expanded; None for an empty name.
+
+    Raises:
+        BackgroundFileError: no file can be read or written there.
+    """
+    if not name:
+        return None
+    try:
+        path = Path(name).expanduser()
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):
+            kind = "a folder" if path.is_dir() else "no ordinary file"
+            raise BackgroundFileError(
+                f"background_file {path} is {kind}; give the name of a file, such as "
+                "~/background.npz"
+            )
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise BackgroundFileError(
+            f"background_file {name} cannot be written: {reason}; choose a folder that exists and "
+            "is writable"
+        ) from None
+    return path
+
+
+def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> None:
+    """Write a background: a reader sees the old file or the new one, whole.
+
+    Raises:
+        BackgroundFileError: the file cannot be written.
+    """
+    model, calibration = stored
+    arrays: dict[str, NDArray[Any]] = {
+        _FORMAT: np.array(FORMAT),
+        _MEAN: model.mean,
+        _STDDEV: model.stddev,
+        _SIZE: np.array([calibration.width, calibration.height]),
+        _K: np.asarray(calibration.k, np.float64),
+        _DISTORTION: np.asarray(calibration.distortion, np.float64),
+        _DISTORTION_MODEL: np.array(calibration.distortion_model),
+    }
+    if model.chroma is not None:
+        arrays |= {_CHROMA_MEAN: model.chroma.mean, _CHROMA_STDDEV: model.chroma.stddev}
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+    except CardboxError as error:
+        raise BackgroundFileError(str(error)) from None
+    except OSError as error:
+        raise BackgroundFileError(
+            f"cannot write the background {os.fspath(path)}: {error.strerror}; choose a folder "
+            "that exists and is writable, on a disk with space"
+        ) from None
+
+
+def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> StoredBackground:
+    """Read a background of the working size (width, height), px.
+
+    Raises:
+        BackgroundFileError: the file cannot be read, is no background, or is of another size.
+    """
+    name = os.fspath(path)
+    try:
+        arrays = _read(Path(path), size)
+        return _checked(arrays, size)
+    except OSError as error:
+        raise BackgroundFileError(
+            f"cannot read the background {name}: {error.strerror or error}; give the file that the "
+            "background node wrote"
+        ) from None
+    # What zipfile and numpy raise for damaged archives.
+    except (
+        ValueError,
+        KeyError,
+        EOFError,
+        SyntaxError,
+        NotImplementedError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise BackgroundFileError(
+            f"{name} is no background that can be used: {error}; expected a file that the "
+            "background node wrote. Delete it, or give another name, and let the node learn with "
+            "nobody in view"
+        ) from None
+
+
+def _read(path: Path, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+    pixels = size[0] * size[1]
+    most = {_MEAN: pixels, _STDDEV: pixels, _CHROMA_MEAN: 3 * pixels, _CHROMA_STDDEV: 3 * pixels}
+    arrays: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(path) as archive:
+        names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        for key in _NEEDED:
+            if key not in names:
+                raise ValueError(f"it has no entry '{key}'")
+        for key in (*_NEEDED, *(k for k in _COLOR if k in names)):
+            with archive.open(names[key]) as file:
+                version = np.lib.format.read_magic(file)
+                if version != (1, 0):
+                    raise ValueError(f"'{key}' has version {version} of NumPy's format")
+                shape, _, kind = np.lib.format.read_array_header_1_0(file)
+            count = int(np.prod(shape, dtype=object))
+            limit = most.get(key, _LONGEST_TEXT if kind.kind == "U" else _MOST_NUMBERS)
+            if count > limit or kind.kind not in "fiU" or kind.itemsize > 4 * _LONGEST_TEXT:
+                raise ValueError(
+                    f"'{key}' has the shape {shape} and type {kind}, too much for a background of "
+                    f"{size[0]}x{size[1]}"
+                )
+            with archive.open(names[key]) as file:
+                arrays[key] = np.lib.format.read_array(file, allow_pickle=False)
+    return arrays
+
+
+def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBackground:
+    if str(arrays[_FORMAT]) != FORMAT:
+        raise ValueError(f"its format is '{arrays[_FORMAT]}'; this version reads '{FORMAT}'")
+    mean = arrays[_MEAN]
+    if mean.shape != size[::-1]:
+        found = "x".join(map(str, mean.shape[::-1]))
+        raise ValueError(f"it is of {found} px, but width and height of the node are {size}")
+    chroma = None
+    if all(key in arrays for key in _COLOR):
+        shape = 3, max(size[1] // 2, 1), max(size[0] // 2, 1)
+        chroma = ChromaModel(*(_plane(arrays, key, shape) for key in _COLOR))
+    model = BackgroundModel(
+        _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
+    )
+    width, height = (int(value) for value in arrays[_SIZE])
+    calibration = Calibration(
+        width,
+        height,
+        np.asarray(arrays[_K], np.float64).reshape(3, 3),
+        np.asarray(arrays[_DISTORTION], np.float64).ravel(),
+        str(arrays[_DISTORTION_MODEL]),
+    )
+    return StoredBackground(model, calibration)
+
+
+def _plane(
+    arrays: dict[str, NDArray[Any]], key: str, shape: tuple[int, ...]
+) -> NDArray[np.float32]:
+    plane = arrays[key]
+    if plane.shape != shape or plane.dtype != np.float32:
+        raise ValueError(f"'{key}' has the shape {plane.shape} of {plane.dtype}, expected {shape}")
+    if not (np.isfinite(plane).all() and plane.min() >= 0.0 and plane.max() <= _BRIGHTEST):
+        raise ValueError(f"'{key}' has values outside 0 to {_BRIGHTEST:g}")
+    return np.asarray(plane, np.float32)

@@ -1,0 +1,100 @@
+"""Follows a change of the camera's calibration that lasts; what is brief or invalid is ignored.
+
+A single wrong CameraInfo, or a second camera on the same topic, must not discard what was learned
+with the right one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.camera_info import calibration_from_info
+
+LASTING = 30
+"""A change is followed once so many calibrations in a row say the same: one or two seconds."""
+
+# A remark on what was ignored stays for so many good ones.
+_REMEMBERED = 150
+
+
+class CalibrationWatch:
+    """Decides which calibration of those that arrive is the camera's.
+
+    Attributes:
+        current: the one in use; None before the first valid one.
+        seen: True once any CameraInfo arrived, valid or not.
+        ignored: how many others were ignored.
+        remark: what was ignored lately, in words; empty if nothing was.
+    """
+
+    def __init__(self, topic: str, image_topic: str) -> None:
+        """``topic`` is where calibrations of ``image_topic`` come from, for the texts."""
+        self.current: Calibration | None = None
+        self.seen = False
+        self.ignored = 0
+        self.remark = ""
+        self._topic = topic
+        self._image_topic = image_topic
+        self._other: Calibration | None = None
+        self._count = 0
+        self._good = 0
+
+    def see(self, message: Any) -> bool:
+        """Take a sensor_msgs/CameraInfo; return whether the calibration in use has changed.
+
+        Raises:
+            CameraError: it is invalid, and there is no valid one yet.
+        """
+        self.seen = True
+        try:
+            calibration = calibration_from_info(message, self._image_topic, self._topic)
+            self._check(calibration)
+        except CameraError as error:
+            self._other = None
+            if self.current is None:
+                raise
+            self._ignore(
+                f"an invalid CameraInfo on {self._topic} is ignored, the one before is used: "
+                f"{error}"
+            )
+            return False
+        if self.current is not None and self.current.is_same(calibration):
+            self._back_to_good()
+            return False
+        if self.current is not None and not self._lasts(calibration):
+            self._ignore(
+                f"a CameraInfo on {self._topic} that differs from those before ({calibration} "
+                f"instead of {self.current}) is ignored; the background is kept. If the camera "
+                f"was really changed, it is followed after {LASTING} of them in a row; if not, "
+                f"see who publishes it: ros2 topic info --verbose {self._topic}"
+            )
+            return False
+        self.current, self._other, self._count = calibration, None, 0
+        self.remark = ""
+        return True
+
+    def _check(self, calibration: Calibration) -> None:
+        try:
+            calibration.camera(calibration.width, calibration.height)
+        except CameraError as error:
+            raise CameraError(
+                f"{self._topic}, of the images on {self._image_topic}: {error}"
+            ) from None
+
+    def _lasts(self, calibration: Calibration) -> bool:
+        if self._other is None or not self._other.is_same(calibration):
+            self._other, self._count = calibration, 0
+        self._count += 1
+        return self._count >= LASTING
+
+    def _ignore(self, remark: str) -> None:
+        self.ignored += 1
+        self.remark, self._good = remark, 0
+
+    def _back_to_good(self) -> None:
+        self._other, self._count = None, 0
+        self._good += 1
+        if self._good >= _REMEMBERED:
+            self.remark = ""

@@ -1,0 +1,43 @@
+"""Two publishers of a topic that one camera should publish are named, and logged once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from std_msgs.msg import String  # noqa: E402
+
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher  # noqa: E402
+
+WAIT_S = 30.0
+
+
+def wait_for(condition: Callable[[], Any]) -> Any:
+    end = time.monotonic() + WAIT_S
+    while time.monotonic() < end:
+        if value := condition():
+            return value
+        time.sleep(0.02)
+    raise AssertionError("not in time")
+
+
+def test_two_publishers_are_named_until_one_has_gone(make_node: Callable[..., Any]) -> None:
+    node, first, second = make_node(), make_node(name="left"), make_node(name="right")
+    logged: list[str] = []
+    node.get_logger().warning = logged.append  # type: ignore[method-assign]
+    watch = SinglePublisher(node, ("/image_raw", "/camera_info"))
+    first.create_publisher(String, "/image_raw", 1)
+    wait_for(lambda: node.count_publishers("/image_raw") == 1)
+    assert watch.remarks() == []
+    other = second.create_publisher(String, "/image_raw", 1)
+    (text,) = wait_for(watch.remarks)
+    assert text.startswith("2 publishers send /image_raw: /left, /right; expected one camera")
+    watch.remarks()
+    second.destroy_publisher(other)
+    wait_for(lambda: not watch.remarks())
+    assert logged == [text]

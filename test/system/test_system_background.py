@@ -1,0 +1,155 @@
+"""What must not cost the silhouette: a restart, a wrong CameraInfo, a second camera, a person."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.posture import reference_posture
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
+
+LEARN_IMAGES = 12
+RESTARTS = 2
+
+
+class Camera:
+    """A camera whose person sways by some millimetres, and the background node behind it."""
+
+    def __init__(self, graph: Any, scene: Any) -> None:
+        self.graph, self.scene = graph, scene
+        self.silhouettes = graph.collect(Image, "silhouette")
+        self.shown: dict[tuple[int, int], Any] = {}
+        self._starts = itertools.count()
+
+    def start(self, **parameters: Any) -> None:
+        graph = self.graph
+        # DDS lists a killed node for a while; topics of its own tell the new one from it.
+        self.topic = f"/camera_{next(self._starts)}/image_raw"
+        info = self.topic.replace("image_raw", "camera_info")
+        self.images = graph.node.create_publisher(Image, self.topic, qos.CAMERA)
+        self.infos = graph.node.create_publisher(CameraInfo, info, qos.CAMERA)
+        names = ("-r", f"image_raw:={self.topic}", "-r", f"camera_info:={info}")
+        self.process = graph.start(
+            "background", "--ros-args", *names, learn_images=LEARN_IMAGES, **parameters
+        )
+        ends = (self.images, self.infos)
+        graph.wait(lambda: all(end.get_subscription_count() == 1 for end in ends), "the node")
+        graph.spin(0.3)
+        self.silhouettes.clear()
+
+    def kill(self) -> None:
+        """End the node as a crash does; it is not asked how it ended."""
+        self.graph.processes.remove(self.process)
+        self.process.process.send_signal(signal.SIGKILL)
+        self.process.process.wait()
+
+    def show(self, posture: str | None, *, focal_px: float = 300.0) -> None:
+        """Publish one image and its CameraInfo."""
+        camera = self.scene.camera
+        header = Header(frame_id="optical", stamp=self.graph.next_stamp())
+        place: Any = None
+        if posture is not None:
+            place = reference_posture(posture)
+            place[0] = self.scene.body.placement.lateral_m + 0.012 * np.sin(len(self.shown) / 5)
+        truth = self.scene.silhouette(place)
+        self.shown[header.stamp.sec, header.stamp.nanosec] = truth > 0
+        info = camera_info_message(header, camera)
+        info.k[0] = info.k[4] = focal_px
+        self.infos.publish(info)
+        pixels = np.where(truth > 0, 190.0, 90.0) + np.random.default_rng().normal(
+            0, 2, truth.shape
+        )
+        self.images.publish(image_message(header, np.clip(pixels, 0, 255).astype(np.uint8)))
+
+    def iou(self, message: Any) -> float:
+        truth = self.shown[message.header.stamp.sec, message.header.stamp.nanosec]
+        found = np.frombuffer(message.data, np.uint8).reshape(truth.shape) > 0
+        return float(np.count_nonzero(found & truth) / np.count_nonzero(found | truth))
+
+    def until_silhouettes(self, posture: str | None, count: int = 1) -> tuple[int, list[Any]]:
+        """Show images until ``count`` more silhouettes came; return images shown, silhouettes."""
+        first, shown = len(self.silhouettes), 0
+
+        def came() -> bool:
+            nonlocal shown
+            self.show(posture)
+            shown += 1
+            self.graph.spin(0.05)
+            return len(self.silhouettes) >= first + count
+
+        self.graph.wait(came, f"{count} silhouettes")
+        return shown, self.silhouettes[first:]
+
+
+@pytest.fixture
+def camera(own_graph: Any, scene: Any) -> Camera:
+    return Camera(own_graph, scene)
+
+
+def test_a_good_background_is_kept(camera: Camera, tmp_path: Path) -> None:
+    graph, file = camera.graph, tmp_path / "background.npz"
+    camera.start(background_file=file)
+    camera.until_silhouettes(None)
+    assert file.exists()
+    _, silhouettes = camera.until_silhouettes("front", 5)
+    before = np.mean([camera.iou(message) for message in silhouettes[1:]])
+    assert before > 0.95
+
+    # One wrong CameraInfo.
+    camera.show("front", focal_px=301.0)
+    _, silhouettes = camera.until_silhouettes("front", 5)
+    assert min(camera.iou(message) for message in silhouettes) > before - 0.02
+    status = graph.diagnosis("background", "that differs from those before")
+    assert {value.key: value.value for value in status.values}["ignored CameraInfo"] == "1"
+
+    # A second camera on the topic.
+    second = rclpy.create_node("second_camera", context=graph.context, enable_rosout=False)
+    second.create_publisher(Image, camera.topic, qos.CAMERA)
+    values = {
+        value.key: value.value
+        for value in graph.wait(
+            lambda: next(
+                (
+                    status.values
+                    for status in [graph.diagnosis("background")]
+                    if any("/second_camera" in value.value for value in status.values)
+                ),
+                None,
+            ),
+            "the second camera's name",
+        )
+    }
+    assert any("/probe, /second_camera" in value for value in values.values())
+    second.destroy_node()
+
+    # Killed and restarted with somebody in view.
+    for _ in range(RESTARTS):
+        camera.kill()
+        camera.start(background_file=file)
+        shown, silhouettes = camera.until_silhouettes("front", 3)
+        assert shown < LEARN_IMAGES, "nothing had to be learned"
+        assert min(camera.iou(message) for message in silhouettes) > before - 0.02
+
+
+def test_nobody_is_learned_in(camera: Camera) -> None:
+    camera.start()
+    for _ in range(4 * LEARN_IMAGES):
+        camera.show("front")
+        camera.graph.spin(0.03)
+    camera.graph.diagnosis("background", "something moves in it")
+    assert not camera.silhouettes
+    camera.until_silhouettes(None)
+    _, silhouettes = camera.until_silhouettes("front", 4)
+    assert camera.iou(silhouettes[-1]) > 0.95

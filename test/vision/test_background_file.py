@@ -1,0 +1,174 @@
+"""The learned background in a file: whole or not at all, read only if it is what it should be."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.errors import BackgroundFileError
+from cardbox_tracker.vision.background_file import (
+    StoredBackground,
+    background_path,
+    load_background,
+    save_background,
+)
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.chroma import ChromaModel
+from cardbox_tracker.vision.empty_scene import BackgroundModel
+
+SIZE = (16, 12)
+K = np.array([(330.0, 0, 159.5), (0, 330.0, 119.5), (0, 0, 1)])
+CALIBRATION = Calibration(320, 240, K, np.array([0.1, 0.0, 0.0, 0.0, 0.0]))
+
+
+def planes(*shape: int) -> Any:
+    return np.random.default_rng(len(shape)).uniform(0, 255, shape).astype(np.float32)
+
+
+def stored(*, color: bool = True) -> StoredBackground:
+    chroma = ChromaModel(planes(3, 6, 8), planes(3, 6, 8)) if color else None
+    return StoredBackground(BackgroundModel(planes(12, 16), planes(12, 16), chroma), CALIBRATION)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    made = tmp_path / "background.npz"
+    save_background(stored(), made)
+    return made
+
+
+def with_entry(path: Path, **entries: Any) -> None:
+    with np.load(path) as archive:
+        arrays = dict(archive) | entries
+    np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
+
+
+@pytest.mark.parametrize("color", [False, True])
+def test_what_is_written_is_read(tmp_path: Path, color: bool) -> None:
+    original = stored(color=color)
+    save_background(original, tmp_path / "b.npz")
+    read = load_background(tmp_path / "b.npz", SIZE)
+    np.testing.assert_array_equal(read.model.mean, original.model.mean)
+    np.testing.assert_array_equal(read.model.stddev, original.model.stddev)
+    assert (read.model.chroma is None) == (not color)
+    if read.model.chroma is not None and original.model.chroma is not None:
+        np.testing.assert_array_equal(read.model.chroma.mean, original.model.chroma.mean)
+        np.testing.assert_array_equal(read.model.chroma.stddev, original.model.chroma.stddev)
+    assert read.calibration.is_same(CALIBRATION)
+    read.check_camera(CALIBRATION, "b.npz")
+    assert os.listdir(tmp_path) == ["b.npz"]
+
+
+def test_another_camera_is_refused_with_both(path: Path) -> None:
+    other = Calibration(320, 240, K + np.diag((1.0, 1.0, 0.0)), np.zeros(5))
+    with pytest.raises(BackgroundFileError, match=r"f 330 px, plumb_bob.*f 331 px, no distortion"):
+        load_background(path, SIZE).check_camera(other, "b.npz")
+
+
+def test_another_working_size_is_refused(path: Path) -> None:
+    for size in ((32, 24), (12, 16)):
+        with pytest.raises(BackgroundFileError, match=r"16x12|too much"):
+            load_background(path, size)
+
+
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"format": np.array("something_else")}, "its format is 'something_else'"),
+        ({"format": None}, "no entry 'format'"),
+        ({"mean": None}, "no entry 'mean'"),
+        ({"mean": planes(12, 16) + np.nan}, "values outside 0 to 255"),
+        ({"stddev": planes(12, 16) - 300}, "values outside 0 to 255"),
+        ({"stddev": planes(6, 16)}, "'stddev' has the shape"),
+        ({"mean": np.zeros((12, 16))}, "of float64"),
+        ({"chroma_mean": planes(3, 5, 8)}, "'chroma_mean' has the shape"),
+        ({"mean": planes(1200, 1600)}, "too much for a background"),
+        ({"distortion": np.zeros(1000)}, "too much for a background"),
+        ({"distortion_model": np.array("x" * 1000)}, "too much for a background"),
+        ({"k": np.zeros(4)}, "reshape"),
+        ({"size": np.array([320])}, "unpack"),
+    ],
+)
+def test_what_is_no_background_is_refused(path: Path, entries: Any, words: str) -> None:
+    with_entry(path, **entries)
+    with pytest.raises(BackgroundFileError, match=words) as error:
+        load_background(path, SIZE)
+    assert str(path) in str(error.value)
+
+
+def test_pickled_objects_are_never_loaded(path: Path) -> None:
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    np.savez(path, **(arrays | {"size": np.array([{}, {}], dtype=object)}))
+    with pytest.raises(BackgroundFileError, match="no background that can be used"):
+        load_background(path, SIZE)
+
+
+def test_a_huge_header_is_refused_before_anything_is_allocated(path: Path) -> None:
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    del arrays["mean"]
+    np.savez(path, **arrays)
+    header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (999999999, 999999999), }\n"
+    entry = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+    with zipfile.ZipFile(path, "a") as archive_file:
+        archive_file.writestr("mean.npy", entry)
+    with pytest.raises(BackgroundFileError, match="too much for a background"):
+        load_background(path, SIZE)
+
+
+def test_a_damaged_file_is_refused_wherever_it_is_damaged(path: Path) -> None:
+    whole = path.read_bytes()
+    rng = np.random.default_rng()
+    for length in (0, 1, 100, len(whole) // 2, len(whole) - 5):
+        path.write_bytes(whole[:length])
+        with pytest.raises(BackgroundFileError, match=r"background\.npz"):
+            load_background(path, SIZE)
+    for _ in range(200):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole), 20):
+            damaged[place] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            load_background(path, SIZE)
+        except BackgroundFileError:
+            continue
+
+
+def test_a_text_is_refused(path: Path) -> None:
+    path.write_text("sizes:\n  torso_height: 0.5\n")
+    with pytest.raises(BackgroundFileError, match="expected a file that the background node wrote"):
+        load_background(path, SIZE)
+
+
+def test_home_is_expanded_and_no_name_is_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert background_path("~/b.npz") == tmp_path / "b.npz"
+    assert background_path("") is None
+    assert os.listdir(tmp_path) == []
+
+
+def test_what_cannot_be_a_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for name, words in (
+        (str(tmp_path), "is a folder"),
+        (str(tmp_path / "pipe"), "no ordinary file"),
+        (str(tmp_path / "none" / "b.npz"), "cannot be written: No such file"),
+        ("/proc/b.npz", "cannot be written"),
+        ("/dev/null", "no ordinary file"),
+        ("~nobody_of_that_name/b.npz", "cannot be written"),
+    ):
+        with pytest.raises(BackgroundFileError, match=words):
+            background_path(name)
+
+
+def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+    with pytest.raises(BackgroundFileError, match="choose a folder that exists"):
+        save_background(stored(), tmp_path / "none" / "b.npz")
