@@ -11,14 +11,19 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from cardbox_tracker.vision.window import Window
 
 ImageArray = NDArray[np.uint8]
 
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _EIGHT = np.uint64(0x0101010101010101)
+# The smallest kernel that closes a gap of one pixel, in all eight directions.
+_CLOSING_KERNEL = np.ones((3, 3), np.uint8)
 _inline = njit(cache=True, nogil=True, inline="always")
 
 
@@ -52,6 +57,38 @@ class Regions(NamedTuple):
     ends: NDArray[np.int32]
     labels: NDArray[np.int32]
     areas_px: NDArray[np.int32]
+
+
+def clean_silhouette(
+    foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
+) -> ImageArray:
+    """Drop small specks and fill small holes of a binary image.
+
+    Args:
+        foreground: (H, W), 0 or 255.
+        min_area: smallest speck to keep, as a fraction of the image.
+        max_hole: largest hole to fill, as a fraction of the image.
+        window: all foreground is in it, with background around; the whole image if None.
+
+    Returns:
+        A new (H, W) image, 0 or 255.
+    """
+    silhouette = np.zeros(foreground.shape, np.uint8)
+    if window is not None and window.is_empty:
+        return silhouette
+    # Background that a window cuts off must not look like a hole: it has at least one side.
+    sides = () if window is None else (window.bottom - window.top, window.right - window.left)
+    if window is None or max_hole * foreground.size > min(sides):
+        window = Window(0, foreground.shape[0], 0, foreground.shape[1])
+    part = window.slices
+    # Closing, not opening: it joins what noise cut, and thin fingers survive it.
+    closed = np.ascontiguousarray(
+        cv2.morphologyEx(foreground[part], cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8
+    )
+    remove_small_regions(closed, 255, min_area * foreground.size)
+    remove_small_regions(closed, 0, max_hole * foreground.size)
+    silhouette[part] = closed
+    return silhouette
 
 
 def find_regions(image: ImageArray) -> Regions:

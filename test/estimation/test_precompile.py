@@ -24,7 +24,7 @@ from cardbox_tracker.estimation.cost import (
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
-from cardbox_tracker.vision import chroma, light, regions, shadows
+from cardbox_tracker.vision import chroma, light, regions, shadows, window
 from cardbox_tracker.vision import foreground as contrast
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
@@ -38,7 +38,7 @@ def compiled() -> dict[str, int]:
     modules: tuple[ModuleType, ...] = (
         *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
         *(particle_kernels, whole_body_moves, person_region, still_things),
-        *(contrast, regions, chroma, shadows, light),
+        *(contrast, regions, chroma, shadows, light, window),
     )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
