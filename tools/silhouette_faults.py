@@ -265,7 +265,7 @@ def fault_lines(sessions: Iterable[Session]) -> Iterator[str]:
     yield from (
         "## Faults around the background node",
         "",
-        "Before, as measured when the work was asked for: restarted with somebody in view, the "
+        "Before these faults were mended: restarted with somebody in view, the "
         "node learned them in (IoU 0.19 to 0.40, ten of ten); one CameraInfo with another focal "
         "length took the IoU of `person_a` from 0.97 to 0.23.",
         "",

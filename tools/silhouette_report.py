@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,12 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background import (
+    BackgroundConfig,
+    BackgroundLearner,
+    SilhouetteExtractor,
+    brightness_of,
+)
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 from tools.silhouette_faults import Session, fault_lines
 
@@ -36,6 +42,8 @@ _MARGIN_S = 0.2
 _LEAST = 0.004
 _LIMBS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 _STEP_S = 6.0
+# Images that are cut out by one and then by the other, and how often in all.
+_TURN, _TURNS = 10, 60
 
 
 def _lamp(time_s: float) -> float:
@@ -173,6 +181,34 @@ def session_lines(before: list[Row], after: list[Row], name: str) -> Iterator[st
         yield "| " + " | ".join(cells) + " |"
 
 
+def cost_ratio(folder: Path, grey: bool) -> float:
+    """Return the time of a silhouette over that of one before, in one run; the median of turns."""
+    truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
+    empty_s = next(s for s in truth["segments"] if s["name"] == "empty")["end_s"] - _MARGIN_S
+    with BagReader(folder / "bag") as bag:
+        pipeline = SilhouettePipeline(bag.calibration(), WORKING_SIZE)
+        learner, images = BackgroundLearner(), []
+        for image in bag.images():
+            prepared = pipeline.prepare(image.as_sent)
+            prepared = brightness_of(prepared) if grey else prepared
+            if (image.stamp_ns - bag.start_ns) / 1e9 <= empty_s:
+                learner.add(prepared)
+            else:
+                images.append(prepared.copy())
+    before, after = (SilhouetteExtractor(learner.model(), config) for config in (BEFORE, AFTER))
+    ratios = []
+    for turn in range(_TURNS):
+        some = [images[(turn * _TURN + k) % len(images)] for k in range(_TURN)]
+        times = []
+        for extractor in (before, after):
+            start = time.perf_counter()
+            for one in some:
+                extractor(one)
+            times.append(time.perf_counter() - start)
+        ratios.append(times[1] / times[0])
+    return float(np.median(ratios))
+
+
 def report(sessions: list[Path], lit: Path | None) -> str:
     """Return the document."""
     columns = ("IoU", "missing", "extra", "arms found")
@@ -206,6 +242,13 @@ def report(sessions: list[Path], lit: Path | None) -> str:
             line = f"| {name} | {mean(before, 'iou'):.3f} | {mean(after, 'iou'):.3f} | {late} |"
             text.append(line)
             print(line, flush=True)
+        grey, color = (cost_ratio(lit, is_grey) for is_grey in (True, False))
+        text += [
+            "",
+            f"Time of a silhouette there, after over before, in turns of one run: {grey:.1f} for "
+            f"grey images, {color:.1f} for images in colour.",
+        ]
+        print(text[-1], flush=True)
     print("faults", flush=True)
     faults = fault_lines(Session(f, read_masks(f / "masks.npz")) for f in sessions)
     text += ["", *faults]

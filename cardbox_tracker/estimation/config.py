@@ -69,7 +69,7 @@ class TrackerConfig:
         whole_body: settings of the filter ``whole_body``.
 
     The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
-    ``whole_body`` uses those, ``terms``, ``relocalize`` and ``lost_frames``.
+    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person`` and ``lost_frames``.
     """
 
     filter: str = setting(
@@ -120,6 +120,12 @@ class TrackerConfig:
     relocalize: bool = setting(
         False, "search again when the person was lost, or came back into the image"
     )
+    select_person: bool = setting(
+        False,
+        "only the parts of the silhouette count that can be the person, not a door, a chair or "
+        "somebody who passes by",
+        restarts=True,
+    )
     lost_iou: float = setting(
         0.4, "an image whose overlap (IoU) is below this does not fit", limits=(0.0, 1.0)
     )
@@ -157,7 +163,9 @@ def paper_preset() -> TrackerConfig:
 
 def default_preset() -> TrackerConfig:
     """Return what tracks best: the whole-body filter (``docs/architecture.md``)."""
-    return TrackerConfig(filter="whole_body", terms=(InnerCue(),), relocalize=True)
+    return TrackerConfig(
+        filter="whole_body", terms=(InnerCue(),), relocalize=True, select_person=True
+    )
 
 
 PRESETS = MappingProxyType({"paper": paper_preset, "default": default_preset})

@@ -11,6 +11,7 @@ from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation import person_region
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import background
@@ -21,6 +22,7 @@ from cardbox_tracker.vision.rasterisation import render
 def compile_all() -> None:
     """Follow a drawn person with each preset, so that all compiled code was run once."""
     background.warm_up()
+    person_region.warm_up()
     body = BodyModel()
     camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)

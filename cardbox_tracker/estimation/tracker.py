@@ -17,10 +17,11 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette, Term
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
@@ -108,6 +109,7 @@ class Tracker:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
         self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
+        self._region = PersonRegion(self.body, self.camera) if self.config.select_person else None
         self._poor_frames = 0
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
@@ -129,6 +131,17 @@ class Tracker:
             self._filter.configure(config)
         return is_new_start
 
+    def _frame(self, silhouette: Silhouette, image: Image | None) -> Frame:
+        """Return the frame as all terms get it; raises ValueError for a wrong size."""
+        frame = self._silhouette.frame(silhouette, image, self._before)
+        if self._region is None:
+            return frame
+        is_sure = self._poor_frames == 0
+        selected = self._region.select(silhouette, self._before, is_sure, image)
+        if selected is silhouette:
+            return frame
+        return self._silhouette.frame(selected, image, self._before)
+
     def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
         """Estimate the posture behind a silhouette.
 
@@ -139,7 +152,7 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        sight = self._filter.look(self._silhouette.frame(silhouette, image, self._before))
+        sight = self._filter.look(self._frame(silhouette, image))
         if sight is Sight.NOBODY:
             self._before = None
             if self.config.relocalize:

@@ -25,8 +25,9 @@ from cardbox_tracker.vision.chroma import ChromaScore
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.light import LightFollower
-from cardbox_tracker.vision.regions import remove_small_regions
+from cardbox_tracker.vision.regions import clean_silhouette
 from cardbox_tracker.vision.shadows import decide_shadows
+from cardbox_tracker.vision.window import Window, window_of
 
 __all__ = [
     "BackgroundConfig",
@@ -40,10 +41,12 @@ __all__ = [
 
 ImageArray = NDArray[np.uint8]
 
-# The smallest kernel that closes a gap of one pixel, in all eight directions.
-_CLOSING_KERNEL = np.ones((3, 3), np.uint8)
 # Pixels whose median says how bright the scene is: its error is about 4 % of their spread.
 _BRIGHTNESS_SAMPLES = 1000
+# Around foreground, so that all around it is background, and for a hand that only its colour shows.
+_MARGIN_PX, _COLOR_MARGIN_PX = 2, 8
+# Images from one that is compared by colour everywhere to the next.
+_WHOLE_EVERY = 8
 # A fraction of a darker brightness than this is all noise, grey levels.
 _DARKEST = 8.0
 
@@ -186,6 +189,8 @@ class SilhouetteExtractor:
             chroma = None if model.chroma is None else model.chroma.mean
             self._light = LightFollower(model.mean, chroma)
         self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
+        # The last silhouette's, and how many images were compared by colour.
+        self._last, self._images = Window(0, 0, 0, 0), 0
         # Allocated once: new memory for each image takes longer than the arithmetic on it.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
@@ -212,19 +217,23 @@ class SilhouetteExtractor:
             self.gain = self._scene_gain(brightness)
             expected, shares = self.model.mean, (1.0, -self.gain)
         else:
-            expected = self._light.follow(brightness)
+            expected, factor = self._light.follow(brightness)
             self.gain = self._light.level
             # In more light contrasts are larger, too: the limits are those of the learned light.
-            shares = 1.0 / max(self.gain, 1.0), -1.0 / max(self.gain, 1.0)
+            shares = 1.0 / max(self.gain, 1.0), -factor / max(self.gain, 1.0)
         cv2.addWeighted(
             brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
         )
         if config.smoothing_px > 0:
             cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
         foreground = segment_foreground(signed, self._brighter, self._darker, config.edge, score)
+        window = window_of(foreground)
         colored = None
         if self._chroma is not None and image.ndim == 3:
-            colored = self._chroma(image)
+            window, looked_at = self._colored_window(window, foreground.shape)
+            colored = self._chroma(image, looked_at)
+        else:
+            window = window.grown(_MARGIN_PX, foreground.shape)
         if config.soft_shadow > 0:
             decide_shadows(
                 foreground,
@@ -233,16 +242,37 @@ class SilhouetteExtractor:
                 colored,
                 config.darkest_shadow,
                 config.soft_shadow,
+                window,
             )
         elif colored is not None:
-            foreground[colored >= 0] = 255
-        silhouette = clean_silhouette(foreground, config.min_area, config.max_hole)
+            foreground[window.slices][colored >= 0] = 255
+        silhouette = clean_silhouette(foreground, config.min_area, config.max_hole, window)
+        self._last = window_of(silhouette)
         if self._light is not None:
             self._light.exclude(silhouette)
         return silhouette
 
+    def _colored_window(
+        self, window: Window, shape: tuple[int, ...]
+    ) -> tuple[Window, Window | None]:
+        """Return where foreground can be, and where to look for its colour; None: everywhere.
+
+        Args:
+            window: of the foreground by brightness.
+            shape: of the image.
+        """
+        number, self._images = self._images, self._images + 1
+        is_settling = self._light is not None and self._light.is_settling
+        everywhere = Window(0, shape[0], 0, shape[1])
+        near = window.joined(self._last).grown(_COLOR_MARGIN_PX, shape)
+        is_odd = any(length % 2 for length in shape)
+        if number % _WHOLE_EVERY == 0 or is_settling or is_odd or near.is_empty:
+            return everywhere, None
+        return near, near
+
     def restart(self) -> None:
         """Forget what was followed: the next image is not the one after the last."""
+        self._last, self._images = Window(0, 0, 0, 0), 0
         if self._light is not None:
             self._light.restart()
 
@@ -271,23 +301,3 @@ def warm_up() -> None:
     extractor = SilhouetteExtractor(learner.model())
     extractor(np.zeros((16, 16), np.uint8))
     extractor(np.zeros((16, 16, 3), np.uint8))
-
-
-def clean_silhouette(foreground: ImageArray, min_area: float, max_hole: float) -> ImageArray:
-    """Drop small specks and fill small holes of a binary image.
-
-    Args:
-        foreground: (H, W), 0 or 255.
-        min_area: smallest speck to keep, as a fraction of the image.
-        max_hole: largest hole to fill, as a fraction of the image.
-
-    Returns:
-        A new (H, W) image, 0 or 255.
-    """
-    # Closing, not opening: it joins what noise cut, and thin fingers survive it.
-    closed = np.ascontiguousarray(
-        cv2.morphologyEx(foreground, cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8
-    )
-    remove_small_regions(closed, 255, min_area * foreground.size)
-    remove_small_regions(closed, 0, max_hole * foreground.size)
-    return closed

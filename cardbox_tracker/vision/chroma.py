@@ -16,6 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cardbox_tracker.vision.window import Window
+
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
@@ -47,14 +49,15 @@ class ChromaModel(NamedTuple):
 
 def chroma_planes(image: ImageArray) -> ImageArray:
     """Return brightness, Cr and Cb (3, h, w) of a bgr image (H, W, 3), at half its resolution."""
+    return np.ascontiguousarray(_small(image).transpose(2, 0, 1))
+
+
+def _small(image: ImageArray) -> ImageArray:
+    """Return the same as pixels (h, w, 3)."""
     height, width = image.shape[:2]
     size = (max(width // 2, 1), max(height // 2, 1))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    colors = cv2.cvtColor(small, cv2.COLOR_BGR2YCrCb)
-    colors = cv2.blur(colors, _SMOOTHING)
-    planes = np.empty((3, *colors.shape[:2]), np.uint8)
-    cv2.split(colors, tuple(planes))
-    return planes
+    return np.asarray(cv2.blur(cv2.cvtColor(small, cv2.COLOR_BGR2YCrCb), _SMOOTHING), np.uint8)
 
 
 def bgr_of(planes: FloatImage) -> FloatImage:
@@ -95,57 +98,87 @@ class ChromaScore:
         self._edge = np.float32(edge)
         self._follow = follow
         step = max(1, round((model.mean[0].size / _SAMPLES) ** 0.5))
-        self._grid = (slice(None), slice(step // 2, None, step), slice(step // 2, None, step))
-        self._known = self._mean[self._grid]
-        self._scratch = tuple(np.empty(model.mean.shape[1:], np.float32) for _ in range(2))
+        self._grid = (slice(step // 2, None, step), slice(step // 2, None, step))
+        self._known = np.ascontiguousarray(self._mean[(slice(None), *self._grid)])
+        self._shares = np.empty((2, self._known[0].size), np.float32)
+        self._cast = np.float32(0), np.float32(0)
 
-    def __call__(self, image: ImageArray) -> FloatImage:
-        """Return a margin (H, W) for a bgr image (H, W, 3): not negative where it is foreground."""
-        height, width = image.shape[:2]
-        score, highest = self._scratch
-        planes = chroma_planes(image)
-        cast = self._cast(planes) if self._follow else (np.float32(0), np.float32(0))
-        _score(planes, self._mean, self._brightest, self._weights, cast, score)
-        cv2.dilate(score, _WINDOW, dst=highest)
-        _margin(score, highest, self._edge)
-        return np.asarray(cv2.resize(score, (width, height)), np.float32)
+    def __call__(self, image: ImageArray, window: Window | None = None) -> FloatImage:
+        """Return a margin for a bgr image (H, W, 3): not negative where it is foreground.
 
-    def _cast(self, planes: ImageArray) -> tuple[np.float32, np.float32]:
-        """Cr and Cb that the white balance has added, as shares of the brightness.
+        Args:
+            image: of the size of those learned.
+            window: where the margin is wanted, its edges at even places. Without it all of the
+                image is looked at, also for its white balance.
+
+        Returns:
+            (H, W), or of the window's size.
+        """
+        part = image if window is None else image[window.slices]
+        colors = _small(part)
+        if window is None and self._follow:
+            self._see_cast(colors)
+        place = (0, 0) if window is None else (window.top // 2, window.left // 2)
+        score = np.empty(colors.shape[:2], np.float32)
+        _score(colors, self._mean, self._brightest, self._weights, self._cast, place, score)
+        _margin(score, np.asarray(cv2.dilate(score, _WINDOW), np.float32), self._edge)
+        return np.asarray(cv2.resize(score, part.shape[1::-1]), np.float32)
+
+    def _see_cast(self, colors: ImageArray) -> None:
+        """Find Cr and Cb that the white balance has added, as shares of the brightness.
 
         Medians over the image: the person covers less than half of it.
         """
-        now = planes[self._grid].astype(np.float32)
-        brightness = np.maximum(now[0], _DARKEST)
-        ratio = now[0] / np.maximum(self._known[0], _DARKEST)
-        added = now[1:] - _NEUTRAL - ratio * (self._known[1:] - _NEUTRAL)
-        shares = (added / brightness).reshape(2, -1)
-        middle = shares.shape[1] // 2
-        shares = np.partition(shares, middle, axis=1)[:, middle]
+        _collect_shares(np.ascontiguousarray(colors[self._grid]), self._known, self._shares)
+        middle = self._shares.shape[1] // 2
+        shares = np.partition(self._shares, middle, axis=1)[:, middle]
         red, blue = np.clip(shares, -_STRONGEST_CAST, _STRONGEST_CAST).astype(np.float32)
-        return red, blue
+        self._cast = red, blue
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _score(planes: Any, mean: Any, brightest: Any, weights: Any, cast: Any, score: Any) -> None:
-    """Distance of each pixel's chroma from the background's, in units of its limit."""
+def _collect_shares(colors: Any, known: Any, shares: Any) -> None:
+    """Write by how much Cr and Cb of each sample differ from what is known, over its brightness."""
+    neutral, darkest = np.float32(_NEUTRAL), np.float32(_DARKEST)
+    count = 0
+    for v in range(known.shape[1]):
+        for u in range(known.shape[2]):
+            brightness = np.float32(colors[v, u, 0])
+            ratio = brightness / max(known[0, v, u], darkest)
+            for k in range(2):
+                now = np.float32(colors[v, u, k + 1]) - neutral
+                added = now - ratio * (known[k + 1, v, u] - neutral)
+                shares[k, count] = added / max(brightness, darkest)
+            count += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _score(
+    colors: Any, mean: Any, brightest: Any, weights: Any, cast: Any, place: Any, score: Any
+) -> None:
+    """Distance of each pixel's chroma from the background's, in units of its limit.
+
+    The colours are those of a part that begins at the row and column ``place`` of the model.
+    """
     neutral = np.float32(_NEUTRAL)
     darkest = np.float32(_DARKEST)
     lowest, highest = np.float32(_RATIOS[0]), np.float32(_RATIOS[1])
     cut_off, zero = np.float32(_CUT_OFF), np.float32(0)
-    height, width = score.shape
-    for v in range(height):
-        for u in range(width):
-            ratio = np.float32(planes[0, v, u]) / max(mean[0, v, u], darkest)
+    top, left = place
+    for y in range(colors.shape[0]):
+        v = top + y
+        for x in range(colors.shape[1]):
+            u = left + x
+            ratio = np.float32(colors[y, x, 0]) / max(mean[0, v, u], darkest)
             ratio = min(max(ratio, lowest), highest)
-            red = np.float32(planes[1, v, u]) - neutral - ratio * (mean[1, v, u] - neutral)
-            blue = np.float32(planes[2, v, u]) - neutral - ratio * (mean[2, v, u] - neutral)
-            red -= cast[0] * np.float32(planes[0, v, u])
-            blue -= cast[1] * np.float32(planes[0, v, u])
+            red = np.float32(colors[y, x, 1]) - neutral - ratio * (mean[1, v, u] - neutral)
+            blue = np.float32(colors[y, x, 2]) - neutral - ratio * (mean[2, v, u] - neutral)
+            red -= cast[0] * np.float32(colors[y, x, 0])
+            blue -= cast[1] * np.float32(colors[y, x, 0])
             red *= weights[0, v, u]
             blue *= weights[1, v, u]
             distance = np.sqrt(red * red + blue * blue)
-            score[v, u] = distance if ratio * brightest[v, u] < cut_off else zero
+            score[y, x] = distance if ratio * brightest[v, u] < cut_off else zero
 
 
 @njit(cache=True, nogil=True)

@@ -1,8 +1,8 @@
 """Follows the light of the scene, so that a background learned once stays right.
 
 Slow drift, an automatic gain or a lamp multiply the background by a factor that varies slowly over
-the image: one level for all of it, times a coarse field. Both are estimated in every image from
-pixels outside the person, so that nobody who stands still becomes background.
+the image: one level for all of it, times a coarse field. Both are estimated from pixels outside the
+person, so that nobody who stands still becomes background.
 """
 
 from __future__ import annotations
@@ -30,8 +30,10 @@ _DARKEST, _BRIGHTEST = 10.0, 250.0
 _SAME = 0.004
 # Brightness of blue, green and red.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
-# The field comes nearer to its estimate by this fraction in each image: half of it in 7 images.
-_RATE = 0.1
+# The level is estimated in every image, the field in every third, and in each after a step.
+_EVERY = 3
+# The field comes nearer to its estimate by this fraction each time: half of it in 7 images.
+_RATE = 1.0 - 0.9**_EVERY
 # A pixel whose brightness differs from the expected one by more is no background.
 _TOLERANCE, _TOLERANCE_AFTER_STEP = 0.1, 0.4
 # A change of the level from one image to the next by more is a step of the light: a lamp, a gain.
@@ -65,7 +67,7 @@ class LightFollower:
         self._small = np.ascontiguousarray(mean[_GRID], np.float32)
         self._size = self._small.shape[1], self._small.shape[0]
         self._mean = mean
-        self._now = np.empty_like(mean)
+        self._now, self._scaled = np.empty_like(mean), np.empty_like(mean)
         channels = mean[None]
         if chroma is not None:
             planes = [cv2.resize(one, mean.shape[::-1]) for one in chroma[1:]]
@@ -90,30 +92,37 @@ class LightFollower:
         self._person = np.zeros(self._size[::-1], np.uint8)
         self._settling = 0
         self._started = False
+        self._images = 0
+        self._relative, self._highest_field = self._mean, 1.0
 
     def expect_step(self) -> None:
         """Take the field of the next image as estimated, as after a step of the light."""
         self._settling = max(self._settling, 1)
 
-    def follow(self, brightness: ImageArray) -> FloatImage:
-        """Return the background (H, W) as it is in the light of an image (H, W).
+    def follow(self, brightness: ImageArray) -> tuple[FloatImage, float]:
+        """Return the background (H, W) and a factor: their product is as bright as it is now.
 
-        The array is the same in each call.
+        Args:
+            brightness: of an image, (H, W).
+
+        Returns:
+            An array that the next call may change, and a number.
         """
         self._estimate(brightness)
-        if np.all(np.abs(self._field - 1.0) < _SAME):
-            np.multiply(self._mean, np.float32(self.level), out=self._now)
-        else:
-            field = cv2.resize(self._field, self._mean.shape[::-1])
-            cv2.multiply(self._mean, field, dst=self._now, scale=self.level)
+        if self.level * self._highest_field * self._highest < _BRIGHTEST:
+            return self._relative, self.level
+        np.multiply(self._relative, np.float32(self.level), out=self._now)
         self._cut_off()
-        return self._now
+        return self._now, 1.0
+
+    @property
+    def is_settling(self) -> bool:
+        """True in the images after a step of the light, in which little is known of it."""
+        return self._settling > 0
 
     def _cut_off(self) -> None:
         """Let no channel of what is expected be brighter than a camera can tell."""
-        factor = self.level * float(self._field.max())
-        if factor * self._highest < _BRIGHTEST:
-            return
+        factor = self.level * self._highest_field
         where = np.flatnonzero(self._brightest > _BRIGHTEST / factor)
         now = self._now.ravel()
         factors = now[where] / np.maximum(self._mean.ravel()[where], 1.0)
@@ -134,6 +143,9 @@ class LightFollower:
             self._settling = _SETTLING
         self._started = True
         self.level = level
+        number, self._images = self._images, self._images + 1
+        if number % _EVERY and self._settling == 0:
+            return
         person, rate, tolerance, around = self._person, _RATE, _TOLERANCE, self._fine
         if self._settling > 0:
             # The person may have moved since.
@@ -144,10 +156,17 @@ class LightFollower:
         # Where nothing is known, there is no change.
         self._field += np.float32(rate) * (1.0 + change / (weight + _DOUBT) - self._field)
         self._fine = cv2.resize(self._field, self._size).reshape(small.shape)
+        self._highest_field = float(self._field.max())
+        if self._highest_field < 1.0 + _SAME and float(self._field.min()) > 1.0 - _SAME:
+            self._relative = self._mean
+        else:
+            field = cv2.resize(self._field, self._mean.shape[::-1])
+            cv2.multiply(self._mean, field, dst=self._scaled)
+            self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray) -> None:
         """Take the person's place (H, W) from the silhouette found in the last image."""
-        if np.count_nonzero(silhouette) > _COVERAGE * silhouette.size:
+        if cv2.countNonZero(silhouette) > _COVERAGE * silhouette.size:
             self._settling = _SETTLING
         if self._settling > 0:
             self._settling -= 1

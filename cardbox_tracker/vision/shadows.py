@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -24,8 +27,7 @@ _REACH_PX = 2
 
 # Eight pixels at a time, where rows are made of such.
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-_ALL_WHITE = np.uint64(0xFFFFFFFFFFFFFFFF)
-_NOTHING = np.full((1, 1), -1, np.float32)
+_NOTHING = np.zeros((1, 1), np.uint8)
 
 
 def decide_shadows(
@@ -35,6 +37,7 @@ def decide_shadows(
     colored: FloatImage | None,
     darkest: float,
     softest: float,
+    window: Window | None = None,
 ) -> None:
     """Add what the colour finds to ``foreground`` and take soft shadows away, in place.
 
@@ -44,16 +47,25 @@ def decide_shadows(
         foreground: (H, W), 0 or 255, by brightness alone.
         difference: image minus background, (H, W), grey levels.
         per_level: one grey level as a fraction of the background, (H, W).
-        colored: not negative where the colour differs, (H, W); None without colour.
+        colored: not negative where the colour differs, of the window's size; None without colour.
         darkest: a shadow is darker by less than this fraction.
         softest: around a pixel of a shadow, that fraction varies by less than this.
+        window: all foreground is in it; its columns are multiples of 8 if the width is one; the
+            whole image if None.
     """
-    margin = _NOTHING if colored is None else colored
-    queues = np.empty((2, foreground.size), np.int32)
+    window = window or Window(0, foreground.shape[0], 0, foreground.shape[1])
+    part = foreground[window.slices]
+    by_color = _NOTHING
+    if colored is not None:
+        by_color = np.asarray(cv2.inRange(colored, 0.0, np.inf), np.uint8)
+    # Row and column of the candidates, and of those that are let in.
+    queues = np.empty((4, part.size), np.int32)
     limits = np.float32(-darkest), np.float32(softest)
     words = foreground.view(np.uint64) if foreground.shape[1] % 8 == 0 else _NO_WORDS
     has_color = colored is not None
-    _decide(foreground, words, difference, per_level, margin, has_color, limits, queues)
+    if has_color:
+        cv2.bitwise_or(part, by_color, dst=part)
+    _decide(foreground, words, difference, per_level, by_color, has_color, limits, window, queues)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -77,40 +89,41 @@ def _decide(
     words: Any,
     difference: Any,
     per_level: Any,
-    colored: Any,
+    by_color: Any,
     has_color: Any,
     limits: Any,
+    window: Any,
     queues: Any,
 ) -> None:
     height, width = foreground.shape
+    top, bottom, left, right = window
     darkest, softest = limits
-    candidates, queue = queues[0], queues[1]
+    rows, columns = queues[0], queues[1]
+    queued_rows, queued_columns = queues[2], queues[3]
     dark = np.uint8(_DARK)
-    for v in range(height):
-        for u in range(width):
-            code = foreground[v, u]
-            darker = difference[v, u] * per_level[v, u]
-            code = min(code, dark) if darkest < darker < 0 else code
-            if has_color:
-                code = np.uint8(255) if colored[v, u] >= 0 else code
-            foreground[v, u] = code
     number = 0
-    for v in range(height):
-        u = 0
-        while u < width:
-            if u % 8 == 0 and u // 8 < words.shape[1]:
-                word = words[v, u // 8]
-                if word == 0 or word == _ALL_WHITE:
-                    u += 8
+    for v in range(top, bottom):
+        start = left
+        while start < right:
+            end = right
+            if words.shape[1] > 0:
+                end = start + 8
+                if words[v, start // 8] == 0:
+                    start = end
                     continue
-            if foreground[v, u] == dark:
-                candidates[number] = v * width + u
-                number += 1
-            u += 1
+            for u in range(start, end):
+                darker = difference[v, u] * per_level[v, u]
+                if foreground[v, u] > 0 and darkest < darker < 0:
+                    if has_color and by_color[v - top, u - left] > 0:
+                        continue
+                    foreground[v, u] = dark
+                    rows[number], columns[number] = v, u
+                    number += 1
+            start = end
     # From the background, as far as the shadow is soft.
     count = 0
     for index in range(number):
-        v, u = candidates[index] // width, candidates[index] % width
+        v, u = rows[index], columns[index]
         outside = (
             (v > 0 and foreground[v - 1, u] == 0)
             or (v + 1 < height and foreground[v + 1, u] == 0)
@@ -119,11 +132,11 @@ def _decide(
         )
         if outside and _is_soft(difference, per_level, v, u, softest):
             foreground[v, u] = 0
-            queue[count] = candidates[index]
+            queued_rows[count], queued_columns[count] = v, u
             count += 1
     begin = 0
     while begin < count:
-        v, u = queue[begin] // width, queue[begin] % width
+        v, u = queued_rows[begin], queued_columns[begin]
         begin += 1
         for k in range(4):
             y = v + (k == 0) - (k == 1)
@@ -132,24 +145,24 @@ def _decide(
                 continue
             if _is_soft(difference, per_level, y, x, softest):
                 foreground[y, x] = 0
-                queue[count] = y * width + x
+                queued_rows[count], queued_columns[count] = y, x
                 count += 1
     # Beside the outline the square reaches into the person: those last pixels go without it.
     begin = 0
     for _ in range(_REACH_PX):
         last = count
         for index in range(begin, last):
-            v, u = queue[index] // width, queue[index] % width
+            v, u = queued_rows[index], queued_columns[index]
             for k in range(4):
                 y = v + (k == 0) - (k == 1)
                 x = u + (k == 2) - (k == 3)
                 inside = y >= 0 and y < height and x >= 0 and x < width
                 if inside and foreground[y, x] == dark:
                     foreground[y, x] = 0
-                    queue[count] = y * width + x
+                    queued_rows[count], queued_columns[count] = y, x
                     count += 1
         begin = last
     for index in range(number):
-        v, u = candidates[index] // width, candidates[index] % width
+        v, u = rows[index], columns[index]
         if foreground[v, u] == dark:
             foreground[v, u] = 255

@@ -29,14 +29,14 @@ def test_the_paper_preset_is_table_one() -> None:
     assert config.strategy == "drs"
     # One cycle a frame whose best particle is the result, and nothing else.
     assert (config.cycles, config.average, config.terms, config.explore) == (1, 1, (), 0.0)
-    assert not config.relocalize
+    assert not config.relocalize and not config.select_person
 
 
 def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
     default, paper = default_preset(), paper_preset()
     assert (paper.filter, default.filter) == ("hierarchical", "whole_body")
     assert set(FILTERS) == {"hierarchical", "whole_body"} == set(tracker.FILTERS)
-    assert default.relocalize
+    assert default.relocalize and default.select_person
 
 
 @pytest.mark.parametrize(

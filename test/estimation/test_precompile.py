@@ -12,6 +12,7 @@ from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation import person_region, still_things
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost import (
     inner_cue_kernels,
@@ -23,7 +24,7 @@ from cardbox_tracker.estimation.cost import (
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import TRACKING, Tracker
-from cardbox_tracker.vision import chroma, light, regions, shadows
+from cardbox_tracker.vision import chroma, light, regions, shadows, window
 from cardbox_tracker.vision import foreground as contrast
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
@@ -36,8 +37,8 @@ def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (
         *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
-        *(particle_kernels, whole_body_moves),
-        *(contrast, regions, chroma, shadows, light),
+        *(particle_kernels, whole_body_moves, person_region, still_things),
+        *(contrast, regions, chroma, shadows, light, window),
     )
     return {
         f"{module.__name__}.{name}": len(value.signatures)
@@ -69,7 +70,9 @@ def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
         seen.setflags(write=image.flags.writeable)
         silhouette = extractor(seen)
         read_only = np.frombuffer(silhouette.tobytes(), np.uint8).reshape(silhouette.shape)
-        for pixels in (silhouette, np.zeros_like(silhouette), read_only, read_only):
+        crowded = silhouette.copy()
+        crowded[:60, :60] = 255
+        for pixels in (silhouette, np.zeros_like(silhouette), crowded, read_only, read_only):
             state = tracker.track(pixels, seen).state
         assert state == TRACKING
     assert compiled() == before

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -15,6 +16,7 @@ from cardbox_tracker.vision.background import (
     SilhouetteExtractor,
     clean_silhouette,
 )
+from cardbox_tracker.vision.window import window_of
 
 PLAIN = BackgroundConfig(clean_up=False)
 H, W = 120, 160
@@ -194,3 +196,14 @@ def test_cleaning_leaves_its_input() -> None:
     made[25, 25] = 255
     clean_silhouette(made, 0.01, 0.01)
     assert made[25, 25] == 255
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(-1.5, 3.0), st.sampled_from([0.0, 0.01, 0.1, 0.6]))
+def test_cleaning_in_a_window_gives_the_same(seed: int, rare: float, max_hole: float) -> None:
+    noise = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, (60, 80)), (0, 0), 2.0)
+    made = np.where(noise > rare * noise.std(), 255, 0).astype(np.uint8)
+    window = window_of(made).grown(2, made.shape)
+    np.testing.assert_array_equal(
+        clean_silhouette(made, 0.01, max_hole, window), clean_silhouette(made, 0.01, max_hole)
+    )

@@ -14,6 +14,7 @@ from cardbox_tracker.vision.background import (
     SilhouetteExtractor,
 )
 from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, bgr_of, chroma_planes
+from cardbox_tracker.vision.window import Window
 
 H, W = 120, 160
 PERSON = (slice(30, 110), slice(60, 100))
@@ -126,3 +127,22 @@ def test_equal_to_numpy(seed: int, shape: tuple[int, int], edge: float) -> None:
     expected = np.asarray(cv2.resize(margin, shape[::-1])).reshape(shape)
     made = ChromaScore(ChromaModel(mean, stddev), 2.0, 7.0, edge)(image).reshape(shape)
     np.testing.assert_allclose(made, expected, atol=1e-3)
+
+
+def test_a_window_gives_the_same_inside() -> None:
+    rng = np.random.default_rng(3)
+    planes = chroma_planes(scene()).astype(np.float32)
+    score = ChromaScore(ChromaModel(planes, np.ones_like(planes)), 2.0, 7.0, 0.5)
+    image = noisy(scene(as_bright_as_the_wall()), 5.0, rng)
+    whole, window = score(image), Window(16, 96, 24, 104)
+    part = score(image, window)
+    # At its edges the surroundings are missing.
+    np.testing.assert_array_equal(part[8:-8, 8:-8], whole[window.slices][8:-8, 8:-8])
+
+
+def test_what_only_its_colour_shows_is_followed_from_image_to_image() -> None:
+    made, whole = extractor(), np.zeros(8)
+    for number in range(1, 20):
+        image = np.roll(scene(as_bright_as_the_wall()), 2 * number, axis=1)
+        whole = extractor()(image)
+        assert np.count_nonzero(made(image) != whole) < 0.02 * np.count_nonzero(whole)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.vision.regions import remove_small_regions
+from cardbox_tracker.vision.regions import find_regions, remove_small_regions
 
 
 def image(*rows: str) -> np.ndarray:
@@ -88,3 +88,32 @@ def test_equal_to_labelling_every_pixel(
     np.testing.assert_array_equal(
         recoloured(before, colour, area_px), by_labels(before, colour, area_px)
     )
+
+
+def painted(before: np.ndarray) -> np.ndarray:
+    """Each region's number plus 1 where it is."""
+    regions = find_regions(before)
+    labels = np.zeros(before.shape, np.int32)
+    for row, start, end, label in zip(*regions[:4], strict=True):
+        labels[row, start:end] = label + 1
+    return labels
+
+
+def test_regions_by_hand() -> None:
+    before = image("x..xx", "x.x.x", "xxx..", "....x")
+    np.testing.assert_array_equal(
+        painted(before), [[1, 0, 0, 2, 2], [1, 0, 1, 0, 2], [1, 1, 1, 0, 0], [0, 0, 0, 0, 3]]
+    )
+    assert find_regions(before).areas_px.tolist() == [6, 3, 1]
+
+
+@given(arrays(np.bool_, st.tuples(st.integers(1, 12), st.integers(1, 20))))
+@settings(max_examples=60, deadline=None)
+def test_regions_are_those_of_opencv(pixels: np.ndarray) -> None:
+    before = 255 * pixels.astype(np.uint8)
+    before.setflags(write=False)
+    count, labels = cv2.connectedComponents(before.copy(), connectivity=4)
+    found = painted(before)
+    pairs = set(zip(labels.ravel().tolist(), found.ravel().tolist(), strict=True))
+    assert len(pairs) == count if (labels == 0).any() else len(pairs) == count - 1
+    assert find_regions(before).areas_px.tolist() == np.bincount(found.ravel())[1:].tolist()

@@ -31,6 +31,11 @@ def _of_preset(kind: type[FilterConfig] | type[TrackerConfig], name: str, part: 
     )
 
 
+def _chosen(text: str, preset: bool) -> bool:
+    """Return what ``preset``, ``always`` or ``never`` means."""
+    return preset if text == "preset" else text == "always"
+
+
 @dataclass(frozen=True)
 class TrackerParameters(NodeParameters):
     """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
@@ -58,6 +63,9 @@ class TrackerParameters(NodeParameters):
         default="preset",
         choices=("preset", "always", "never"),
         was="recover",
+    )
+    select_person: str = shared(
+        TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")
     )
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
@@ -98,9 +106,8 @@ class TrackerParameters(NodeParameters):
             strategy=base.strategy if self.strategy == "preset" else self.strategy,
             cycles=self.cycles or base.cycles,
             average=self.average or base.average,
-            relocalize=(
-                base.relocalize if self.relocalize == "preset" else self.relocalize == "always"
-            ),
+            relocalize=_chosen(self.relocalize, base.relocalize),
+            select_person=_chosen(self.select_person, base.select_person),
             lost_iou=self.lost_iou,
             lost_frames=self.lost_frames,
         )

@@ -292,9 +292,10 @@ def test_tracker_settings_override_the_preset() -> None:
         arm_survival_rate=0.3,
         torso_translation_noise_m=0.05,
         relocalize="always",
+        select_person="always",
     ).config()
     assert isinstance(config, TrackerConfig)
-    assert config.strategy == "srs" and config.relocalize
+    assert config.strategy == "srs" and config.relocalize and config.select_person
     assert config.torso.particles == config.arm.particles == 50
     assert config.arm.survival_rate == 0.3
     assert config.torso.survival_rate == TrackerConfig().torso.survival_rate

@@ -1,0 +1,104 @@
+"""What things look like that came to a rest before the background, such as an open door.
+
+A hand before such a thing is inside its region of the silhouette, but looks different from it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+ImageArray = NDArray[np.uint8]
+
+# A pixel that changes by more grey levels, in any channel, shows something else.
+_CHANGE = 18
+# Images in which a pixel has to stay the same before it is known, and after which it is forgotten
+# while something is before it: at 15 Hz half a second and ten.
+_KNOWN, _LONGEST = 8, 150
+
+BACKGROUND, PERSON, THING = 0, 1, 2
+"""What a pixel shows, as far as the silhouette says."""
+UNKNOWN, SAME, CHANGED = 0, 1, 2
+"""What the image says of a pixel of a thing."""
+
+
+class StillThings:
+    """The pixels of things that are not the person and stay where they are."""
+
+    def __init__(self) -> None:
+        """Start with nothing known."""
+        self._looks: ImageArray | None = None
+        self._counts = np.zeros((0, 0), np.int16)
+
+    def forget(self) -> None:
+        """Forget all of them."""
+        self._looks = None
+
+    def compare(self, image: ImageArray) -> NDArray[np.uint8]:
+        """Return ``UNKNOWN``, ``SAME`` or ``CHANGED`` for each pixel of an image (H, W[, 3])."""
+        found = np.zeros(image.shape[:2], np.uint8)
+        planes = _planes(image)
+        if self._looks is not None and self._looks.shape == planes.shape:
+            _compare(planes, self._looks, self._counts, found)
+        return found
+
+    def learn(self, image: ImageArray, shows: NDArray[np.uint8]) -> None:
+        """Take an image in which each pixel ``shows`` background, person or a thing, (H, W)."""
+        planes = _planes(image)
+        if self._looks is None or self._looks.shape != planes.shape:
+            self._looks = np.zeros_like(planes)
+            self._counts = np.zeros(planes.shape[:2], np.int16)
+        _learn(planes, shows, self._looks, self._counts)
+
+
+def _planes(image: ImageArray) -> ImageArray:
+    """Return an image (H, W) or (H, W, 3) as (H, W, channels); what is read-only as a copy."""
+    # Compiled code has another version for memory that may not be written to.
+    pixels = np.require(image, requirements=("C", "W"))
+    return pixels[..., None] if pixels.ndim == 2 else pixels
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _change(image: Any, looks: Any, v: Any, u: Any) -> Any:
+    """The largest difference of a pixel's channels."""
+    largest: Any = 0
+    for k in range(looks.shape[2]):
+        largest = max(largest, abs(np.int32(image[v, u, k]) - np.int32(looks[v, u, k])))
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _compare(image: Any, looks: Any, counts: Any, found: Any) -> None:
+    height, width = counts.shape
+    for v in range(height):
+        for u in range(width):
+            if counts[v, u] >= _KNOWN:
+                found[v, u] = CHANGED if _change(image, looks, v, u) > _CHANGE else SAME
+
+
+@njit(cache=True, nogil=True)
+def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
+    height, width = counts.shape
+    for v in range(height):
+        for u in range(width):
+            count = counts[v, u]
+            if shows[v, u] != THING:
+                if count != 0:
+                    counts[v, u] = 0
+                continue
+            if count > 0 and _change(image, looks, v, u) <= _CHANGE:
+                counts[v, u] = min(count + 1, _LONGEST)
+                # Follows the light.
+                for k in range(looks.shape[2]):
+                    now, before = image[v, u, k], looks[v, u, k]
+                    looks[v, u, k] = before + np.uint8(now > before) - np.uint8(now < before)
+            elif count > _KNOWN:
+                # Something is before it.
+                counts[v, u] = count - 1
+            else:
+                counts[v, u] = 1
+                for k in range(looks.shape[2]):
+                    looks[v, u, k] = image[v, u, k]

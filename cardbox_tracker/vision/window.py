@@ -1,0 +1,86 @@
+"""The part of an image that has foreground, so that the rest costs no time."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+ImageArray = NDArray[np.uint8]
+
+
+class Window(NamedTuple):
+    """Part of an image: rows ``top`` to ``bottom`` and columns ``left`` to ``right``, ends not."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """What an array is indexed with."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+    @property
+    def is_empty(self) -> bool:
+        """True without any pixel."""
+        return self.bottom <= self.top or self.right <= self.left
+
+    def joined(self, other: Window) -> Window:
+        """Return the smallest window with both in it; one without pixels does not count."""
+        if self.is_empty or other.is_empty:
+            return other if self.is_empty else self
+        return Window(
+            min(self.top, other.top),
+            max(self.bottom, other.bottom),
+            min(self.left, other.left),
+            max(self.right, other.right),
+        )
+
+    def grown(self, margin_px: int, shape: tuple[int, ...]) -> Window:
+        """Return it with a margin, within an image of ``shape``, its edges at multiples of 8.
+
+        Without pixels it stays so.
+        """
+        if self.is_empty:
+            return Window(0, 0, 0, 0)
+        low = (8 * ((edge - margin_px) // 8) for edge in (self.top, self.left))
+        high = (-8 * (-(edge + margin_px) // 8) for edge in (self.bottom, self.right))
+        (top, left), (bottom, right) = low, high
+        return Window(max(top, 0), min(bottom, shape[0]), max(left, 0), min(right, shape[1]))
+
+
+def window_of(image: ImageArray) -> Window:
+    """Return a window with all pixels that are not 0 of an image (H, W), contiguous.
+
+    It is the smallest one up to eight columns at either side, and has none of an empty image.
+    """
+    if image.shape[1] % 8:
+        return Window(*_bounds(image.view(np.uint8), 1))
+    return Window(*_bounds(image.view(np.uint64), 8))
+
+
+@njit(cache=True, nogil=True)
+def _bounds(words: Any, pixels: Any) -> Any:
+    """First row, row after the last, first column and column after the last, of words of pixels."""
+    height, width = words.shape
+    top, bottom = height, 0
+    columns = np.zeros(width, words.dtype)
+    for v in range(height):
+        row = words[v, 0] & np.uint8(0)
+        for u in range(width):
+            row |= words[v, u]
+            columns[u] |= words[v, u]
+        if row != 0:
+            top, bottom = min(top, v), v + 1
+    if bottom == 0:
+        return 0, 0, 0, 0
+    left, right = 0, width
+    while columns[left] == 0:
+        left += 1
+    while columns[right - 1] == 0:
+        right -= 1
+    return top, bottom, left * pixels, right * pixels
