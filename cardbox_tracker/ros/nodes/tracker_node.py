@@ -86,7 +86,9 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
-        self._pairing.waits = body.appearance is not None
+        self._pairing.waits = body.appearance is not None or bool(body.unknown)
+        if body.doubt:
+            self.get_logger().warning(body.doubt)
         self._build("new body model")
         self._wait()
 
