@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from cardbox_tracker.body.model import PROPORTIONS, BodyModel
 from cardbox_tracker.body.ranges import check_range
-from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, FloatArray
+from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, FloatArray
 
 STATURE_M = 1.72
 """The stature that ``DEFAULT_SIZES`` belongs to."""
@@ -64,6 +64,8 @@ def body_from_proportions(
     breadths = list(BREADTHS)
     if shoulder_breadth_m is not None:
         breadth, top = SIZE_INDEX["shoulder_breadth"], SIZE_INDEX["torso_top_width"]
+        limits = SIZES[breadth].minimum_m, SIZES[breadth].maximum_m
+        check_range("shoulder_breadth", shoulder_breadth_m, *limits, "m")
         sizes[top] *= shoulder_breadth_m / sizes[breadth]
         sizes[breadth] = shoulder_breadth_m
         breadths.remove("shoulder_breadth")

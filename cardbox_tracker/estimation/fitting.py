@@ -17,7 +17,7 @@ from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.initialization.first_sight import fit_first_sight, upper_body
-from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
+from cardbox_tracker.estimation.initialization.part_colors import torso_colors
 from cardbox_tracker.vision.camera import Camera
 
 # Frames without anybody after which somebody else may come.
@@ -73,7 +73,9 @@ class Fitting:
         except InitializationError:
             return None
         self._is_due, self._worse, self._ious = False, 0, list[float]()
-        self._clothes, self._frames, self._other = fit.body.appearance, 0, 0
+        worn = fit.body.appearance
+        self._clothes = None if worn is None else worn.histograms[TORSO]
+        self._frames = self._other = 0
         return fit.body
 
     def after(self, is_somebody: bool, iou: float | None) -> None:
@@ -110,10 +112,10 @@ class Fitting:
         self._frames += 1
         if self._frames % _COMPARE_EVERY:
             return
-        worn = seen_appearance(image, silhouette, body, self._camera, posture)
-        if worn is None or worn.is_grey != self._clothes.is_grey:
+        now = torso_colors(image, silhouette, body, self._camera, posture)
+        if now is None or len(now) != len(self._clothes):
             return
-        before, now = (clothes.histograms[TORSO] for clothes in (self._clothes, worn))
+        before = self._clothes
         alike = np.sum(np.sqrt(before * now)) / np.sqrt(before.sum() * now.sum())
         self._other = self._other + 1 if -np.log(alike) > _OTHER_CLOTHES else 0
         if self._other >= _OTHER_TIMES:
