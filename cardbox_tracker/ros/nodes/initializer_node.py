@@ -94,7 +94,8 @@ class InitializerNode(CardboxNode):
                 self._describe(self._body)
 
     def _capture(self, name: str) -> str:
-        return self._references.capture(name, self.parameters.value.capture_frames)
+        given = self.parameters.value
+        return self._references.capture(name, given.capture_frames, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Measure in another thread, so that silhouettes and captures are still served."""
