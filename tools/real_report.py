@@ -326,7 +326,8 @@ def main(arguments: list[str] | None = None) -> int:
     figures = "\n".join(report(frames, results, options))
     options.output.write_text(replaced(document, figures), encoding="utf-8")
     if options.sheet is not None:
-        cv2.imwrite(str(options.sheet), sheet_of(frames, results[SHOWN][0]))
+        quality = (cv2.IMWRITE_JPEG_QUALITY, 85)
+        cv2.imwrite(str(options.sheet), sheet_of(frames, results[SHOWN][0]), quality)
     return 0
 
 
