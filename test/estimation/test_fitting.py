@@ -9,6 +9,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.proportions import body_from_proportions, sizes_of_stature
 from cardbox_tracker.body.sizes import SIZE_INDEX
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation import fitting
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN, Tracker
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -17,6 +19,7 @@ from cardbox_tracker.vision.camera import Camera
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 NOBODY = np.zeros((240, 320), np.uint8)
 BROAD = 1.25
+SHIRTS = ((40, 60, 200), (200, 90, 30))
 
 
 def person(stature_m: float, hip_height_m: float, broad: float = 1.0) -> BodyModel:
@@ -93,6 +96,38 @@ def test_the_next_person_is_fitted_after_the_image_was_empty() -> None:
     track.track(silhouette(second))
     assert track.body is not fitted
     assert track.body.size("waist_width") < fitted.size("waist_width")
+
+
+@pytest.mark.parametrize("is_other", [True, False])
+def test_the_next_person_is_told_by_the_clothes(is_other: bool) -> None:
+    track = tracker(distance_m=2.0)
+    seen = silhouette(person(1.75, -0.62))
+    first, second = (np.where(seen[..., None] > 0, c, 90).astype(np.uint8) for c in SHIRTS)
+    track.track(seen, first)
+    fitted = track.body
+    for _ in range(12):
+        track.track(seen, first)
+    assert track.body is fitted
+    for _ in range(12):
+        track.track(seen, second if is_other else first)
+    assert (track.body is not fitted) == is_other
+    assert track.body.unknown == ()
+
+
+def test_what_does_not_fit_is_not_tried_with_every_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    tries: list[int] = []
+
+    def refuse(*_: object) -> None:
+        tries.append(1)
+        raise InitializationError("nothing fits")
+
+    monkeypatch.setattr(fitting, "fit_first_sight", refuse)
+    track = tracker(distance_m=2.0)
+    seen = silhouette(person(1.75, -0.62))
+    for _ in range(50):
+        track.track(seen)
+    assert 2 <= len(tries) <= 3
+    assert track.body.unknown
 
 
 def test_the_same_seed_gives_the_same_body() -> None:
