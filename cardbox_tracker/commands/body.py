@@ -6,6 +6,8 @@ import argparse
 import math
 from pathlib import Path
 
+from cardbox_tracker.commands.arguments import add_camera_pitch
+
 NAME = "body"
 HELP = "make a body model from a person's stature, without a recording"
 
@@ -43,13 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the middle of the hips above the camera's centre, metres, negative below it; "
         "without it, what the first silhouette shows",
     )
-    parser.add_argument(
-        "--camera-pitch-deg",
-        type=float,
-        default=0.0,
-        metavar="P",
-        help="positive when the camera looks down",
-    )
+    add_camera_pitch(parser)
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
     )
