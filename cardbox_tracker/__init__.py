@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import load_body_model, save_body_model
     from cardbox_tracker.body.posture import JOINT_NAMES
+    from cardbox_tracker.body.proportions import body_from_proportions
     from cardbox_tracker.errors import (
         BackgroundFileError,
         BagError,
@@ -68,6 +69,7 @@ __all__ = [
     "SilhouetteExtractor",
     "Tracker",
     "TrackerConfig",
+    "body_from_proportions",
     "initialize_body",
     "load_body_model",
     "load_calibration",
@@ -78,6 +80,7 @@ _MODULES = {
     "body.kinematics": ("KEYPOINT_NAMES",),
     "body.model": ("BodyModel",),
     "body.model_file": ("load_body_model", "save_body_model"),
+    "body.proportions": ("body_from_proportions",),
     "body.posture": ("JOINT_NAMES",),
     "errors": (
         "BackgroundFileError",

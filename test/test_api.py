@@ -42,6 +42,7 @@ PUBLIC = {
     "SilhouetteExtractor",
     "Tracker",
     "TrackerConfig",
+    "body_from_proportions",
     "initialize_body",
     "load_body_model",
     "load_calibration",

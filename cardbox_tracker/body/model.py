@@ -14,11 +14,14 @@ from cardbox_tracker.body.appearance import Appearance
 from cardbox_tracker.body.person import Person
 from cardbox_tracker.body.placement import CAMERA_POSE, PLACEMENT, CameraPose, Placement
 from cardbox_tracker.body.posture import SIDE_TURNS
-from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.sizes import SIZE_NAMES, FloatArray
 from cardbox_tracker.errors import BodyModelError
 
 CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
+
+MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
+"""Where the sizes are from: reference postures, or the proportions of people of a stature."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,12 @@ class BodyModel:
         camera_pose: how the camera stands.
         side_turn: the way the person turned for the side reference, ``left`` or ``right``.
         appearance: the colours of the person's parts; None if they were not learned.
+        source: one of ``SOURCES``; what is from proportions is less exact.
+        unknown: names of sizes and of ``PLACEMENT`` whose values here are mere guesses; a tracker
+            fits them to the first silhouette of a person.
 
     Raises:
-        BodyModelError: ``side_turn`` is neither.
+        BodyModelError: ``side_turn`` or ``source`` is none of those, or a name is not known.
     """
 
     person: Person = field(default_factory=Person)
@@ -41,11 +47,20 @@ class BodyModel:
     camera_pose: CameraPose = CameraPose()
     side_turn: str = "left"
     appearance: Appearance | None = None
+    source: str = MEASURED
+    unknown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check ``side_turn``; the parts check themselves."""
+        """Check the words; the parts check themselves."""
         if self.side_turn not in SIDE_TURNS:
             raise BodyModelError(f"side_turn is {self.side_turn!r}; expected one of {SIDE_TURNS}")
+        if self.source not in SOURCES:
+            raise BodyModelError(f"source is {self.source!r}; expected one of {SOURCES}")
+        for name in self.unknown:
+            if name not in (*PLACEMENT, *SIZE_NAMES):
+                raise BodyModelError(
+                    f"unknown names {name!r}; expected sizes, or any of {', '.join(PLACEMENT)}"
+                )
 
     @classmethod
     def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:
@@ -53,8 +68,8 @@ class BodyModel:
 
         Args:
             sizes: shape (18,), metres; the default sizes without it.
-            values: any of ``CONSTANTS``, ``side_turn`` and ``appearance``; what is left out has
-                its default.
+            values: any of ``CONSTANTS``, ``side_turn``, ``appearance``, ``source`` and
+                ``unknown``; what is left out has its default.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -66,7 +81,8 @@ class BodyModel:
         """Return the same model with other numbers.
 
         Args:
-            values: any of ``sizes``, ``CONSTANTS``, ``side_turn`` and ``appearance``.
+            values: any of ``sizes``, ``CONSTANTS``, ``side_turn``, ``appearance``, ``source`` and
+                ``unknown``.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -95,5 +111,13 @@ class BodyModel:
         return self.person.size(name)
 
     def __str__(self) -> str:
-        """Return one line a size, in centimetres."""
-        return str(self.person)
+        """Return one line a size, in centimetres; a last one if they were not measured."""
+        return f"{self.person}\n{self.doubt}" if self.doubt else str(self.person)
+
+    @property
+    def doubt(self) -> str:
+        """What a reader should know of sizes that were not measured; else empty."""
+        if self.source == MEASURED:
+            return ""
+        text = "sizes from the proportions of people, not measured: less exact"
+        return f"{text}; unknown: {', '.join(self.unknown)}" if self.unknown else text

@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from cardbox_tracker.body.appearance import Appearance
-from cardbox_tracker.body.model import CONSTANTS, BodyModel
+from cardbox_tracker.body.model import CONSTANTS, MEASURED, PROPORTIONS, BodyModel
 from cardbox_tracker.body.sizes import SIZE_NAMES, SIZES
 from cardbox_tracker.errors import BodyModelError
 
@@ -24,16 +24,28 @@ _UNITS = {"length": "m", "angle": "rad"}
 _TOP_KEYS = ("format", "units", *CONSTANTS, "side_turn", "sizes")
 # A file without it is complete: older ones have none, and neither have bodies given by hand.
 _APPEARANCE = "appearance"
+# A file without them is of a measured person, of whom everything is known.
+_SOURCE, _UNKNOWN = "source", "unknown"
+_HEADERS = {
+    MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
+    "tracked.",
+    PROPORTIONS: "# A person from the proportions of people, not measured: less exact.",
+}
 _LINE_LENGTH = 96
 
 
 def dumps_body_model(model: BodyModel) -> str:
     """Return the YAML text of ``model``; equal models give equal texts."""
     lines = [
-        "# A person measured by cardbox_tracker: what does not change while they are tracked.",
+        _HEADERS[model.source],
         f"format: {FORMAT}",
         "units: {length: m, angle: rad}",
     ]
+    if model.source != MEASURED:
+        lines.append(f"{_SOURCE}: {model.source}")
+    if model.unknown:
+        lines.append("# guesses, which are fitted to the first silhouette of a person")
+        lines.append(f"{_UNKNOWN}: [{', '.join(model.unknown)}]")
     for name, (_, _, _, meaning) in CONSTANTS.items():
         lines.append(f"{name}: {_yaml_number(model.constants[name])}  # {meaning}")
     lines.append(f"side_turn: {model.side_turn}  # the way the person turned in the side reference")
@@ -135,7 +147,7 @@ class _StrictLoader(yaml.SafeLoader):
 def _from_mapping(data: object) -> BodyModel:
     if not isinstance(data, dict):
         raise BodyModelError("expected a mapping with the keys " + ", ".join(_TOP_KEYS))
-    _check_keys(data, _TOP_KEYS, "", optional=(_APPEARANCE,))
+    _check_keys(data, _TOP_KEYS, "", optional=(_APPEARANCE, _SOURCE, _UNKNOWN))
     if data["format"] != FORMAT:
         raise BodyModelError(f"format is {data['format']!r}; this version reads '{FORMAT}'")
     if not isinstance(data["units"], dict):
@@ -155,7 +167,15 @@ def _from_mapping(data: object) -> BodyModel:
         **{name: _number(data[name], name) for name in CONSTANTS},
         side_turn=data["side_turn"],
         appearance=_appearance(data[_APPEARANCE]) if _APPEARANCE in data else None,
+        source=data.get(_SOURCE, MEASURED),
+        unknown=_names(data.get(_UNKNOWN, [])),
     )
+
+
+def _names(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        raise BodyModelError(f"{_UNKNOWN} is {value!r}; expected a list such as [distance_m]")
+    return tuple(value)
 
 
 def _appearance(value: object) -> Appearance:

@@ -40,6 +40,17 @@ def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--seed", type=seed, default=0, help=f"random seed of {what}")
 
 
+def add_camera_pitch(parser: argparse.ArgumentParser) -> None:
+    """Add ``--camera-pitch-deg``."""
+    parser.add_argument(
+        "--camera-pitch-deg",
+        type=float,
+        default=0.0,
+        metavar="P",
+        help="positive when the camera looks down",
+    )
+
+
 def span(text: str) -> TimeSpan:
     """Return the span that ``T0:T1`` means, in seconds from the start of the recording.
 

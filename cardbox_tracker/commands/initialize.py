@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_recording, add_seed, span
+from cardbox_tracker.commands.arguments import add_camera_pitch, add_recording, add_seed, span
 from cardbox_tracker.errors import CardboxError
 
 NAME = "initialize"
@@ -46,13 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="left",
         help="which way the person turns for --side, as they see it",
     )
-    parser.add_argument(
-        "--camera-pitch-deg",
-        type=float,
-        default=0.0,
-        metavar="P",
-        help="positive when the camera looks down",
-    )
+    add_camera_pitch(parser)
     add_seed(parser, "the hypotheses")
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"

@@ -10,6 +10,7 @@ from collections.abc import Container, Sequence
 from cardbox_tracker import __version__
 from cardbox_tracker.commands import (
     benchmark,
+    body,
     call,
     demo,
     evaluate,
@@ -26,6 +27,7 @@ COMMANDS: tuple[Command, ...] = (
     demo,
     synthesize,
     initialize,
+    body,
     track,
     benchmark,
     urdf,

@@ -33,14 +33,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="MODEL.yaml",
-        help="the person, from 'cardbox initialize' or the node initializer",
+        help="the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
     )
     parser.add_argument(
         "--start",
         type=time,
         required=True,
         metavar="T",
-        help="second at which the person stands as for --front; tracking starts there",
+        help="second at which the person stands as for --front; tracking starts there. A body of "
+        "'cardbox body' is fitted to the first silhouette from then on, in any posture",
     )
     parser.add_argument(
         "--csv",
@@ -87,12 +88,14 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.recordings.track import track_recording
 
     body = load_body_model(options.model)
+    if body.doubt:
+        print(f"{options.model}: {body.doubt}")
     config = _config(options)
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
         total_s = max(1e-9, bag.duration_s - options.start)
         with (
-            ResultBag(options.bag, body, source.frame_id) as results,
+            ResultBag(options.bag, source.frame_id) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(

@@ -7,7 +7,7 @@ Only ``tracking`` and ``uncertain`` have a posture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -17,10 +17,11 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import Image, Silhouette, Term
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
@@ -86,20 +87,28 @@ class Tracker:
         """Set up for ``body``; the camera is pitched as the body model says.
 
         Args:
-            body: the measured person.
+            body: the person. What is unknown of them is fitted while tracking, which replaces the
+                attribute ``body``; until then no estimate is better than ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
             silhouette: another implementation of the silhouette's term, for comparison.
             make_filter: another filter than that of the settings.
         """
-        self.body = body
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._silhouette = silhouette or CompiledSilhouette(body, self.camera)
-        self._terms = self._built(self.config)
         self._make_filter = make_filter
+        self._fitting = None
+        if body.unknown:
+            fits = self._rng.spawn(1)[0]
+            self._fitting = Fitting(body, self.camera, self.config, fits)
+        self._use(body, silhouette or CompiledSilhouette(body, self.camera))
+
+    def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
+        """Track ``body`` from the next silhouette on."""
+        self.body, self._silhouette = body, silhouette
+        self._terms = self._built(self.config)
         self.reset()
 
     def _built(self, config: TrackerConfig) -> list[Term]:
@@ -131,16 +140,12 @@ class Tracker:
             self._filter.configure(config)
         return is_new_start
 
-    def _frame(self, silhouette: Silhouette, image: Image | None) -> Frame:
-        """Return the frame as all terms get it; raises ValueError for a wrong size."""
-        frame = self._silhouette.frame(silhouette, image, self._before)
+    def _person_in(self, silhouette: Silhouette, image: Image | None) -> Silhouette:
+        """Return what of a silhouette can be the person; raises ValueError for a wrong size."""
         if self._region is None:
-            return frame
-        is_sure = self._poor_frames == 0
-        selected = self._region.select(silhouette, self._before, is_sure, image)
-        if selected is silhouette:
-            return frame
-        return self._silhouette.frame(selected, image, self._before)
+            return silhouette
+        self._silhouette.frame(silhouette, image)
+        return self._region.select(silhouette, self._before, self._poor_frames == 0, image)
 
     def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
         """Estimate the posture behind a silhouette.
@@ -152,7 +157,23 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        sight = self._filter.look(self._frame(silhouette, image))
+        silhouette = self._person_in(silhouette, image)
+        if self._fitting is None:
+            return self._track(silhouette, image)
+        fitted = self._fitting.before(silhouette, image)
+        if fitted is not None:
+            self._use(fitted, CompiledSilhouette(fitted, self.camera))
+        estimate = self._track(silhouette, image)
+        self._fitting.after(estimate.state != NO_PERSON, estimate.iou)
+        if estimate.posture is not None:
+            there = estimate.placed(self.body)
+            self._fitting.compare(silhouette, image, there, estimate.posture)
+        if self.body.unknown and estimate.state == TRACKING:
+            return replace(estimate, state=UNCERTAIN)
+        return estimate
+
+    def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
+        sight = self._filter.look(self._silhouette.frame(silhouette, image, self._before))
         if sight is Sight.NOBODY:
             self._before = None
             if self.config.relocalize:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
+    fit_text,
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
@@ -41,11 +42,10 @@ def initialize_from_recording(
 def describe(result: InitializationResult) -> str:
     """Return the sizes and the fit, as text for a person."""
     body, placement = result.body, result.body.placement
-    fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
     return (
         f"{body}\n"
         f"mid-hip {100 * abs(placement.hip_height_m):.1f} cm "
         f"{'above' if placement.hip_height_m > 0 else 'below'} the camera, "
         f"{placement.distance_m:g} m away from it\n"
-        f"fit (IoU): {fits}, mean {result.mean_iou:.3f}"
+        f"{fit_text(result)}"
     )

@@ -21,12 +21,11 @@ _LATCHED = ("/body_model", "/robot_description")
 class ResultBag:
     """Context that collects estimates in a bag; without a path it does nothing."""
 
-    def __init__(self, path: Path | None, body: BodyModel, frame_id: str) -> None:
+    def __init__(self, path: Path | None, frame_id: str) -> None:
         """Set up; the file is opened on entry and appears, whole, on exit."""
         self._writer = None if path is None else BagWriter(path, compress=True, latched=_LATCHED)
-        self._body = body
         self._frame_id = frame_id
-        self._is_first = True
+        self._described: BodyModel | None = None
         self._outputs = OutputStream()
 
     def __enter__(self) -> ResultBag:
@@ -53,11 +52,11 @@ class ResultBag:
 
     def _write(self, bag: BagWriter, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
         stamp, optical = frame.stamp_ns, self._frame_id
-        body, camera = self._body, tracker.camera
-        if self._is_first:
+        body, camera = tracker.body, tracker.camera
+        if body is not self._described:
             bag.write_string("/body_model", stamp, dumps_body_model(body))
             bag.write_string("/robot_description", stamp, urdf_from_body(body, optical or None))
-        self._is_first = False
+        self._described = body
         bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         overlay = draw_overlay(frame.brightness, body, camera, estimate)

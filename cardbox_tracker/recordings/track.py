@@ -98,7 +98,11 @@ def track_recording(
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
             if draw is not None:
-                draw(draw_overlay(frame.brightness, body, tracker.camera, estimate, _VIDEO_SCALE))
+                draw(
+                    draw_overlay(
+                        frame.brightness, tracker.body, tracker.camera, estimate, _VIDEO_SCALE
+                    )
+                )
             for observe in observers:
                 observe(frame, estimate, tracker)
         if frames == 0:

@@ -37,7 +37,7 @@ def results(
     recording: Any, source: SilhouetteSource, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, TrackSummary]:
     folder = tmp_path_factory.mktemp("results")
-    with ResultBag(folder / "bag", recording.body, source.frame_id) as bag:
+    with ResultBag(folder / "bag", source.frame_id) as bag:
         summary = track_recording(
             *(source, recording.body, default_preset(), 0, 0.0, folder / "person.csv"),
             observers=(bag.add,),

@@ -9,6 +9,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, SIDE_TURNS
 from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.wording import rounded_down
 from cardbox_tracker.settings import check, setting
 
 MAX_PITCH_RAD = float(np.radians(80.0))
@@ -99,13 +100,34 @@ class InitializationResult:
         return float(np.mean(list(self.iou.values())))
 
 
+GOOD_IOU = 0.8
+"""Clean silhouettes of people who hold the postures fit about as well or better."""
+
+
+def fit_text(result: InitializationResult) -> str:
+    """Return how well the references fit, with a warning where it is not well, for a person."""
+    text = f"fit (IoU) {_fits(result)}, mean {rounded_down(result.mean_iou)}"
+    doubtful = [name for name in REFERENCE_NAMES if result.iou[name] < GOOD_IOU]
+    if not doubtful:
+        return text
+    names = " and ".join(f"'{name}'" for name in doubtful)
+    return (
+        f"{text}; warning: {names} below {GOOD_IOU:.2f}, sizes may be wrong: look at the "
+        f"silhouettes, and capture {names} again"
+    )
+
+
+def _fits(result: InitializationResult) -> str:
+    return ", ".join(f"{name} {rounded_down(iou)}" for name, iou in result.iou.items())
+
+
 def check_fit(result: InitializationResult, config: InitializationConfig) -> None:
     """Refuse references that the model fits poorly, all together or one of them.
 
     Raises:
         InitializationError: the text has every fit, and names the references that fit too poorly.
     """
-    fits = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
+    fits = _fits(result)
     advice = (
         f"check person_distance_m ({config.distance_m:g} m), the camera's pitch "
         f"({np.degrees(config.camera_pitch_rad):g} degrees), the side the person turned to "
@@ -113,8 +135,8 @@ def check_fit(result: InitializationResult, config: InitializationConfig) -> Non
     )
     if result.mean_iou < config.min_iou:
         raise InitializationError(
-            f"the model fits the references poorly (IoU {fits}; mean {result.mean_iou:.2f}, "
-            f"expected {config.min_iou:.2f} or more); {advice}"
+            f"the model fits the references poorly (IoU {fits}; mean "
+            f"{rounded_down(result.mean_iou)}, expected {config.min_iou:.2f} or more); {advice}"
         )
     poor = [name for name in REFERENCE_NAMES if result.iou[name] < config.least_iou]
     if poor:

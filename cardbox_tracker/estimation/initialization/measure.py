@@ -32,8 +32,8 @@ from cardbox_tracker.body.posture import (
     RIGHT_ARM,
     reference_posture,
 )
+from cardbox_tracker.body.proportions import sizes_of_stature
 from cardbox_tracker.body.sizes import (
-    DEFAULT_SIZES,
     N_SIZES,
     SIZE_INDEX,
     SIZE_LIMITS,
@@ -65,7 +65,6 @@ from cardbox_tracker.vision.camera import Camera
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
 """Subset and the reference that shows it, in the order of the paper."""
 
-_DEFAULT_STATURE_M = 1.72
 # Among people of one stature, lengths along the bones scatter by about 6 %, breadths and depths by
 # about 20 % (ANSUR II, 2012, rounded), and small offsets by 1.5 cm or more.
 _LENGTH_SCATTER, _BREADTH_SCATTER, _LEAST_SCATTER_M = 0.06, 0.20, 0.015
@@ -144,7 +143,7 @@ class _Search:
         stature = stature_m(references["front"], skeleton, camera, config.distance_m)
         self._shoulder_height_m = skeleton.shoulder_height_m
         self._hip_height_m = skeleton.shoulder_height_m - SHOULDER_TO_HIP * stature
-        sizes = DEFAULT_SIZES * stature / _DEFAULT_STATURE_M
+        sizes = sizes_of_stature(stature)
         sizes[_BREADTH] = skeleton.shoulder_breadth_m
         sizes[_UPPER_ARM], sizes[_FOREARM] = skeleton.upper_arm_m, skeleton.forearm_m
         sizes = np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1])

@@ -111,13 +111,63 @@ def learn_histograms(
             for part in range(len(counts)):
                 if name == "arms" or part not in (HAND, FOREARM):
                     counts[part] += np.bincount(bins[labels[name] == part], minlength=len(counts.T))
+    return _histograms(counts, channels), brightness
+
+
+def seen_appearance(
+    image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
+) -> Appearance | None:
+    """Learn what can be learned of a person in any posture: hands look like the face.
+
+    Args:
+        image: (H, W, 3) bgr or (H, W).
+        silhouette: (H, W) of the person.
+        body: the person, at their place.
+        camera: working camera, pitched as the body model says.
+        posture: theirs, (12,).
+
+    Returns:
+        None if head or torso are not seen.
+    """
+    labels = part_labels(body, camera, posture, silhouette)
+    channels = 1 if image.ndim == 2 else 3
+    torso = image.reshape(-1, channels)[labels.ravel() == TORSO]
+    if len(torso) < _MIN_PX or np.count_nonzero(labels == _FACE) < _MIN_PX:
+        return None
+    brightness = np.median(torso, axis=0)
+    bins = _bins(image, steps_of_levels(brightness, brightness))
+    counts = np.zeros((len(PARTS) + 1, bins_of(channels)))
+    for part in range(len(counts)):
+        # Where the hand is, is not known yet, and what looks like a forearm may be the torso.
+        if part not in (HAND, FOREARM):
+            counts[part] = np.bincount(bins[labels == part], minlength=len(counts.T))
+    return Appearance.of(_histograms(counts, channels), brightness)
+
+
+def torso_colors(
+    image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
+) -> FloatArray | None:
+    """Return the histogram (bins,) of the torso as :func:`seen_appearance` has it, or None."""
+    torso = image[part_labels(body, camera, posture, silhouette) == TORSO]
+    if len(torso) < _MIN_PX:
+        return None
+    pixels = torso.reshape(len(torso), 1, -1)
+    brightness = np.median(pixels[:, 0].astype(np.float64), axis=0)
+    bins = _bins(pixels, steps_of_levels(brightness, brightness)).ravel()
+    counts = np.bincount(bins, minlength=bins_of(pixels.shape[2])).astype(np.float64)
+    colors: FloatArray = _smoothed(counts[None], pixels.shape[2])[0]
+    return colors
+
+
+def _histograms(counts: FloatArray, channels: int) -> FloatArray:
+    """Return histograms (5, bins) of counts (6, bins), the last of which is the face's."""
     counts[HEAD] += counts[_FACE]
     for part, instead in ((LEGS, TORSO), (_FACE, HEAD), (HAND, _FACE), (FOREARM, TORSO)):
         if counts[part].sum() < _MIN_PX:
             counts[part] = counts[instead]
     histograms = _smoothed(counts, channels)
     histograms[HAND] = (1 - _FACE_SHARE) * histograms[HAND] + _FACE_SHARE * histograms[_FACE]
-    return histograms[: len(PARTS)], brightness
+    return histograms[: len(PARTS)]
 
 
 def _bins(image: Image, steps: NDArray[np.int32]) -> NDArray[np.int32]:

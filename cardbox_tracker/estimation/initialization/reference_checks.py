@@ -29,6 +29,7 @@ from cardbox_tracker.estimation.initialization.outline import (
 )
 from cardbox_tracker.estimation.initialization.references import POSTURE_TEXT
 from cardbox_tracker.estimation.initialization.skeleton import BREADTH_OF_SPAN
+from cardbox_tracker.estimation.initialization.wording import rounded_down, rounded_up
 from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
@@ -203,8 +204,9 @@ def _problem_of_arms(view: _View, arms: _Arms) -> str:
     head = view.crown_m("arms") - arms.shoulder_m
     if arms.span_m < MIN_SPAN_TO_HEAD * head:
         return (
-            f"reference 'arms': the arms are not stretched (they span {arms.span_m / head:.1f} "
-            f"times the height of head and neck, expected {MIN_SPAN_TO_HEAD:.1f} or more); "
+            "reference 'arms': the arms are not stretched (they span "
+            f"{rounded_down(arms.span_m / head, 1)} times the height of head and neck, "
+            f"expected {MIN_SPAN_TO_HEAD:.1f} or more); "
             f"{_again('arms')}"
         )
     return ""
@@ -223,10 +225,10 @@ def _problem_of_front(view: _View, arms: _Arms) -> str:
         problem = "the arms touch the body"
     elif ratio < MIN_ARMS_TO_FRONT:
         return (
-            f"references 'front' and 'arms': 'arms' is only {ratio:.2f} times as wide as 'front' "
-            f"(expected {MIN_ARMS_TO_FRONT:.2f} or more); the arms are not stretched sideways in "
-            "'arms', or too far from the body in 'front', or the person came nearer; capture both "
-            "again"
+            f"references 'front' and 'arms': 'arms' is only {rounded_down(ratio)} times as wide as "
+            f"'front' (expected {MIN_ARMS_TO_FRONT:.2f} or more); the arms are not stretched "
+            "sideways in 'arms', or too far from the body in 'front', or the person came "
+            "nearer; capture both again"
         )
     else:
         return ""
@@ -241,7 +243,7 @@ def _problem_of_side(view: _View, arms: _Arms) -> str:
         return ""
     return (
         f"reference 'side': the person did not turn by 90 degrees (the shoulders are "
-        f"{100 * turned:.0f} % as wide as from the front, expected "
+        f"{rounded_up(100 * turned, 0)} % as wide as from the front, expected "
         f"{100 * MAX_SIDE_SHOULDERS:.0f} % or less); {_again('side')}"
     )
 

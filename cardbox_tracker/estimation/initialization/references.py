@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.wording import rounded_down, rounded_up
 from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
@@ -58,15 +59,15 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
     share = np.count_nonzero(silhouette) / silhouette.size
     if share < MIN_PERSON_FRACTION:
         raise InitializationError(
-            f"reference '{name}': nobody is in the image ({100 * share:.1f} % foreground, "
-            f"expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of the camera "
-            f"and {POSTURE_TEXT[name]}"
+            f"reference '{name}': nobody is in the image ({rounded_down(100 * share, 1)} % "
+            f"foreground, expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of "
+            f"the camera and {POSTURE_TEXT[name]}"
         )
     if share > MAX_PERSON_FRACTION:
         raise InitializationError(
-            f"reference '{name}': {100 * share:.0f} % of the image are foreground, more than a "
-            "person can be; the background was learned in another light or with somebody in it: "
-            "leave the image and learn it again (background/learn)"
+            f"reference '{name}': {rounded_up(100 * share, 0)} % of the image are foreground, more "
+            "than a person can be; the background was learned in another light or with somebody "
+            "in it: leave the image and learn it again (background/learn)"
         )
     for border, pixels in (
         ("left", silhouette[:, 0]),
@@ -101,8 +102,8 @@ def check_references(references: Mapping[str, Silhouette]) -> None:
         if likeness > MAX_LIKENESS:
             action = "the person did not turn" if name == "side" else "the arms were not raised"
             raise InitializationError(
-                f"references 'front' and '{name}' are too alike (IoU {likeness:.2f}, expected "
-                f"below {MAX_LIKENESS:.2f}): {action}; capture '{name}' again: "
+                f"references 'front' and '{name}' are too alike (IoU {rounded_up(likeness)}, "
+                f"expected below {MAX_LIKENESS:.2f}): {action}; capture '{name}' again: "
                 f"{POSTURE_TEXT[name]}"
             )
 

@@ -22,7 +22,7 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
-from cardbox_tracker.estimation.initialization.config import InitializationResult
+from cardbox_tracker.estimation.initialization.config import InitializationResult, fit_text
 from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
@@ -94,7 +94,8 @@ class InitializerNode(CardboxNode):
                 self._describe(self._body)
 
     def _capture(self, name: str) -> str:
-        return self._references.capture(name, self.parameters.value.capture_frames)
+        given = self.parameters.value
+        return self._references.capture(name, given.capture_frames, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Measure in another thread, so that silhouettes and captures are still served."""
@@ -179,12 +180,11 @@ class InitializerNode(CardboxNode):
 
 
 def _answer(result: InitializationResult) -> str:
-    fit = ", ".join(f"{name} {iou:.2f}" for name, iou in result.iou.items())
     sizes = ", ".join(
         f"{name} {100 * value:.1f}"
         for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)
     )
-    return f"measured; fit (IoU) {fit}, mean {result.mean_iou:.2f}; sizes in cm: {sizes}"
+    return f"measured; {fit_text(result)}; sizes in cm: {sizes}"
 
 
 def main(args: list[str] | None = None) -> int:

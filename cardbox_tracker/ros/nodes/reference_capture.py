@@ -9,6 +9,8 @@ from sensor_msgs.msg import Image
 
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.asked_outline import check_asked
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.references import (
     Silhouette,
     average_silhouette,
@@ -20,6 +22,7 @@ from cardbox_tracker.ros.messages.conversions import (
     silhouette_of,
     stamp_ns,
 )
+from cardbox_tracker.vision.camera import Camera
 
 # As many as the parameter capture_frames allows.
 _KEPT = 30
@@ -67,14 +70,19 @@ class ReferenceCapture:
                 "it learn the empty scene, then step in front of the camera"
             )
 
-    def capture(self, name: str, frames: int) -> str:
+    def capture(
+        self, name: str, frames: int, camera: Camera | None, config: InitializationConfig
+    ) -> str:
         """Keep the majority of the latest ``frames`` silhouettes as the reference ``name``.
+
+        Where the working camera is known already, they are compared with what was asked for.
 
         Returns:
             What was done and what is missing, for a person.
 
         Raises:
-            InitializationError: there is no silhouette, nobody in it, or they are cut off.
+            InitializationError: there is no silhouette, nobody in it, they are cut off, or hold
+                another of the postures.
         """
         self.check_running()
         messages = list(self._recent)[-frames:]
@@ -89,11 +97,14 @@ class ReferenceCapture:
         silhouettes = [silhouette_of(message) for message in alike]
         silhouette = average_silhouette(silhouettes)
         check_reference(name, silhouette)
+        warning = ""
+        if camera is not None and silhouette.shape == (camera.height, camera.width):
+            warning = check_asked(name, silhouette, camera, config)
         stamps = {stamp_ns(message.header.stamp) for message in alike}
         images = [m for m in self._recent_images if stamp_ns(m.header.stamp) in stamps]
         self.captured[name] = silhouette
         self.images[name] = [image_of(message) for message in images]
-        text = f"captured '{name}' from {len(silhouettes)} silhouettes"
+        text = f"captured '{name}' from {len(silhouettes)} silhouettes{warning}"
         age_s = time.monotonic() - self._received_s
         if age_s > _OLD_S:
             text += f"; the latest came {age_s:.0f} s ago, is the camera running?"

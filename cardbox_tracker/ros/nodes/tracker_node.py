@@ -86,7 +86,9 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
-        self._pairing.waits = body.appearance is not None
+        self._pairing.waits = body.appearance is not None or bool(body.unknown)
+        if body.doubt:
+            self.get_logger().warning(body.doubt)
         self._build("new body model")
         self._wait()
 
@@ -134,7 +136,10 @@ class TrackerNode(CardboxNode):
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
         image = conversions.image_behind(silhouette, seen)
+        before = self._tracker.body
         estimate = self._tracker.track(silhouette, image)
+        if self._tracker.body is not before:
+            self.get_logger().info(f"fitted to the person in the image:\n{self._tracker.body}")
         self._outputs.publish(header, estimate, silhouette, self._tracker)
         self._report.add(estimate)
         self.diagnostics.working(sent_ns)

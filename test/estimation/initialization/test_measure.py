@@ -16,6 +16,8 @@ from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
+    check_fit,
+    fit_text,
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE
@@ -319,6 +321,21 @@ def test_arms_of_another_posture_are_measured_where_the_check_is_off() -> None:
         initialize_body(references, CAMERA, InitializationConfig())
     config = InitializationConfig(check_postures=False, least_iou=0.3)
     assert initialize_body(references, CAMERA, config).mean_iou > 0.6
+
+
+@pytest.mark.parametrize("iou", [0.5999, 0.595, 0.6 - 1e-6])
+def test_a_fit_below_its_bound_is_not_told_as_the_bound(iou: float) -> None:
+    result = InitializationResult(BodyModel(), {"front": iou, "side": iou, "arms": iou}, {}, {})
+    with pytest.raises(InitializationError, match=r"mean 0\.59, expected 0\.60 or more"):
+        check_fit(result, InitializationConfig())
+
+
+def test_a_reference_that_fits_so_so_is_warned_of_by_name() -> None:
+    result = InitializationResult(BodyModel(), {"front": 0.9, "side": 0.799, "arms": 0.8}, {}, {})
+    check_fit(result, InitializationConfig())
+    assert "side 0.79, arms 0.80, mean 0.83; warning: 'side' below 0.80" in fit_text(result)
+    fine = InitializationResult(BodyModel(), dict.fromkeys(("front", "side", "arms"), 0.8), {}, {})
+    assert "warning" not in fit_text(fine)
 
 
 def test_the_required_fit_is_a_setting() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM, SIDE_TURNS, reference_posture
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
 from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.asked_outline import check_asked
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.reference_checks import (
     check_postures,
     posture_problems,
@@ -173,6 +176,31 @@ def test_whoever_came_nearer_is_told_so(name: str) -> None:
     found = problems(all_seen(body, **{name: near}), body)
     assert len(found) == 1
     assert f"'{name}'" in found[0]
+
+
+@pytest.mark.parametrize("name", ["front", "side", "arms"])
+@pytest.mark.parametrize("other", ["front", "side", "arms"])
+@pytest.mark.parametrize("factor", [0.85, 1.1])
+def test_another_posture_is_named_at_its_capture(name: str, other: str, factor: float) -> None:
+    body = BODY.with_values(sizes=DEFAULT_SIZES * factor)
+    config = InitializationConfig(distance_m=BODY.placement.distance_m)
+    silhouette = seen(other, body)
+    if name == other:
+        assert check_asked(name, silhouette, CAMERA, config) == ""
+        return
+    with pytest.raises(InitializationError, match=f"'{name}': it looks like '{other}'"):
+        check_asked(name, silhouette, CAMERA, config)
+    unchecked = replace(config, check_postures=False)
+    assert check_asked(name, silhouette, CAMERA, unchecked) == ""
+
+
+def test_what_looks_like_no_posture_is_warned_of_at_its_capture() -> None:
+    config = InitializationConfig(distance_m=BODY.placement.distance_m)
+    silhouette = np.zeros((240, 320), np.uint8)
+    silhouette[60:, 60:260] = 255
+    text = check_asked("front", silhouette, CAMERA, config)
+    assert "it looks little like 'front' (outline's IoU 0." in text
+    assert "expected 0.60 or more" in text
 
 
 def test_all_of_it_is_an_error() -> None:

@@ -1,0 +1,72 @@
+"""``cardbox body``: somebody of a stature, from the proportions of people."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import add_camera_pitch
+
+NAME = "body"
+HELP = "make a body model from a person's stature, without a recording"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox body``."""
+    parser.add_argument(
+        "--stature",
+        type=float,
+        required=True,
+        metavar="M",
+        help="height of the person, metres, crown to floor",
+    )
+    parser.add_argument(
+        "--distance",
+        type=float,
+        default=None,
+        metavar="M",
+        help="from the camera to the person, metres along the floor; without it, it is found from "
+        "the first silhouette, to about a fifth",
+    )
+    parser.add_argument(
+        "--shoulder-breadth",
+        type=float,
+        default=None,
+        metavar="M",
+        help="between the shoulder joints, metres; without it, and for all other breadths, what "
+        "the first silhouette shows",
+    )
+    parser.add_argument(
+        "--hip-height",
+        type=float,
+        default=None,
+        metavar="M",
+        help="of the middle of the hips above the camera's centre, metres, negative below it; "
+        "without it, what the first silhouette shows",
+    )
+    add_camera_pitch(parser)
+    parser.add_argument(
+        "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the body model and print its sizes.
+
+    Raises:
+        CardboxError: a number is impossible, or the model cannot be written.
+    """
+    from cardbox_tracker.body.model_file import save_body_model
+    from cardbox_tracker.body.proportions import body_from_proportions
+
+    body = body_from_proportions(
+        options.stature,
+        options.distance,
+        options.shoulder_breadth,
+        options.hip_height,
+        math.radians(options.camera_pitch_deg),
+    )
+    save_body_model(body, options.output)
+    print(body)
+    print(f"wrote {options.output}")

@@ -1,0 +1,213 @@
+"""Fit a body from proportions to the first silhouette of a person, whatever they do in it.
+
+A body that was not measured (:mod:`cardbox_tracker.body.proportions`) lacks how high the hips are,
+how broad the person and their clothes are, and maybe the distance. All of that is searched together
+with the posture, in turns:
+
+1. The whole-body filter looks for postures of the body as it is so far.
+2. Bodies around it are rated in the best of these postures, with a prior that keeps them near the
+   proportions of people; the best body stays.
+
+Lengths along the bones are not searched: one outline in an unknown posture does not show them.
+Where there is an image, colours are learned, too (:mod:`.part_colors`): skin from the face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.proportions import BREADTHS
+from cardbox_tracker.body.sizes import SIZE_INDEX, SIZE_LIMITS, FloatArray
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Image, Silhouette
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering.pose_filter import Sight
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.initialization.outline import filled
+from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
+from cardbox_tracker.estimation.initialization.references import (
+    MAX_PERSON_FRACTION,
+    MIN_PERSON_FRACTION,
+    lateral_m,
+)
+from cardbox_tracker.estimation.initialization.standing import at_height_of
+from cardbox_tracker.estimation.initialization.wording import rounded_down
+from cardbox_tracker.vision.camera import Camera
+
+MIN_IOU = 0.6
+"""A silhouette that the fitted body explains less well than this shows no person to fit."""
+
+# Distances tried where none is given: people whom this camera sees from the hips up.
+_DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
+_BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
+_ROUNDS, _BODIES, _POSTURES = 6, 60, 12
+# Standard deviations of the prior, the distance's and the breadths' as logarithms; breadths as
+# among people of one stature and in clothes. The noise of a round is this fraction of them, and
+# shrinks.
+_DISTANCE_SD, _HEIGHT_SD_M, _BREADTH_SD = 0.25, 0.10, 0.20
+_NOISE, _SHRINK = 0.5, 0.75
+# Cost of one standard deviation, as a share of the silhouette's pixels, as in the initialization.
+_PRIOR = 0.003
+
+
+def upper_body(silhouette: Silhouette) -> Silhouette | None:
+    """Return the person of a silhouette (H, W): its largest region.
+
+    Returns:
+        None if that is nobody, or their head is above the image.
+    """
+    seen = filled(silhouette)
+    share = np.count_nonzero(seen) / seen.size
+    if not MIN_PERSON_FRACTION <= share <= MAX_PERSON_FRACTION or seen[0].any():
+        return None
+    return seen
+
+
+@dataclass(frozen=True)
+class FirstSight:
+    """A body as it was fitted, and how well.
+
+    Attributes:
+        body: nothing in it is unknown any more.
+        iou: of the fitted body and the silhouette.
+    """
+
+    body: BodyModel
+    iou: float
+
+
+def fit_first_sight(
+    body: BodyModel,
+    camera: Camera,
+    silhouette: Silhouette,
+    image: Image | None,
+    config: TrackerConfig,
+    rng: np.random.Generator,
+) -> FirstSight:
+    """Find what is unknown of a body in one silhouette.
+
+    Args:
+        body: with ``unknown`` values.
+        camera: working camera.
+        silhouette: (H, W), 0 or 255, as :func:`upper_body` returns it.
+        image: (H, W, 3) bgr or (H, W) of the same frame, from which colours are learned.
+        config: settings of the tracker; of these ``whole_body``.
+        rng: source of the noise.
+
+    Raises:
+        InitializationError: nothing fits it.
+    """
+    camera = camera.with_pitch(body.camera_pose.pitch_rad)
+    found, posture, iou = _Search(body, camera, silhouette, config, rng).run()
+    if iou < MIN_IOU:
+        raise InitializationError(
+            f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
+            f"{MIN_IOU:.2f} or more)"
+        )
+    if image is not None and found.appearance is None:
+        found = found.with_values(
+            appearance=seen_appearance(image, silhouette, found, camera, posture)
+        )
+    return FirstSight(found.with_values(unknown=()), iou)
+
+
+class _Search:
+    """Bodies and postures in turns, against one silhouette."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        camera: Camera,
+        seen: Silhouette,
+        config: TrackerConfig,
+        rng: np.random.Generator,
+    ) -> None:
+        self._prior, self._camera, self._seen, self._config = body, camera, seen, config
+        self._rng = rng
+        unknown = body.unknown
+        # Unknown values in their standard deviations: distance, height of the hips, breadths.
+        self._spread = np.array(
+            [
+                _DISTANCE_SD if "distance_m" in unknown else 0.0,
+                _HEIGHT_SD_M if "hip_height_m" in unknown else 0.0,
+                *[_BREADTH_SD if name in unknown else 0.0 for name in BREADTHS],
+            ]
+        )
+
+    def run(self) -> tuple[BodyModel, FloatArray, float]:
+        """Return the fitted body, the posture (12,) it has, and its IoU."""
+        self._base = self._prior
+        if "distance_m" in self._prior.unknown:
+            placed = [self._standing(distance_m) for distance_m in _DISTANCES_M]
+            self._base = min(placed, key=lambda body: self._postures(body)[1][0])
+        else:
+            self._base = self._standing(self._prior.placement.distance_m)
+        best, noise = np.zeros(len(self._spread)), _NOISE
+        for _ in range(_ROUNDS):
+            postures, _ = self._postures(self._body(best))
+            steps = best + noise * self._rng.standard_normal((_BODIES, len(best)))
+            steps[0] = best
+            ratings = [self._rate(step, postures) for step in steps]
+            best = steps[int(np.argmin(ratings))]
+            noise *= _SHRINK
+        body = self._body(best)
+        postures, _ = self._postures(body)
+        cost = self._cost(body, postures)
+        _, costs_px, areas_px = cost.bodies(postures)
+        common = 0.5 * (cost.silhouette_px + areas_px[0] - costs_px[0])
+        iou = float(common / (cost.silhouette_px + areas_px[0] - common))
+        x_m, z_m = postures[0, 12:].tolist()
+        place, unknown = body.placement, body.unknown
+        body = body.with_values(
+            distance_m=place.distance_m - (x_m if "distance_m" in unknown else 0.0),
+            hip_height_m=place.hip_height_m + (z_m if "hip_height_m" in unknown else 0.0),
+            lateral_m=float(postures[0, 0]),
+        )
+        return body, postures[0, :12], iou
+
+    def _standing(self, distance_m: float) -> BodyModel:
+        """The body at a distance, as high and as far aside as the silhouette's head."""
+        body = self._prior.with_values(
+            distance_m=distance_m, lateral_m=lateral_m(self._seen, self._camera, distance_m)
+        )
+        if "hip_height_m" not in self._prior.unknown:
+            return body
+        return at_height_of(self._seen, body, self._camera)
+
+    def _body(self, steps: FloatArray) -> BodyModel:
+        """The body that is so many standard deviations off the one to begin with."""
+        values = steps * self._spread
+        sizes = self._base.sizes.copy()
+        sizes[_BREADTHS] *= np.exp(values[2:])
+        place = self._base.placement
+        return self._base.with_values(
+            sizes=np.clip(sizes, SIZE_LIMITS[:, 0], SIZE_LIMITS[:, 1]),
+            distance_m=float(place.distance_m * np.exp(values[0])),
+            hip_height_m=float(place.hip_height_m + values[1]),
+        )
+
+    def _rate(self, steps: FloatArray, postures: FloatArray) -> float:
+        own = np.sum(np.where(self._spread > 0, steps, 0.0) ** 2)
+        return float(self._cost(self._body(steps), postures).bodies(postures)[0].min()) + (
+            _PRIOR * float(own)
+        )
+
+    def _cost(self, body: BodyModel, postures: FloatArray) -> WholeBodyCost:
+        cost = WholeBodyCost(body, self._camera, self._config.whole_body.cost)
+        cost.see(self._seen, postures[0])
+        return cost
+
+    def _postures(self, body: BodyModel) -> tuple[FloatArray, FloatArray]:
+        """The best states (n, 14) of a body, best first, and their ratings (n,)."""
+        silhouette = CompiledSilhouette(body, self._camera)
+        search = WholeBodyFilter(self._config, silhouette, self._rng)
+        if search.look(silhouette.frame(self._seen)) is not Sight.PERSON:
+            return np.zeros((1, 14)), np.array([np.inf])
+        search.follow(())
+        order = np.argsort(search.ratings, kind="stable")[:_POSTURES]
+        return search.states[order], search.ratings[order]

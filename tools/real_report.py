@@ -1,0 +1,335 @@
+r"""Track real people whom nobody measured, and compare with what MediaPipe sees in the same images.
+
+python -m tools.real_report --session DIR \
+    --output docs/evaluation/real.md --sheet docs/images/real.jpg
+
+The session is a folder with ``bag/``, ``reference.json`` (segments, and MediaPipe's landmarks in
+pixels) and ``mediapipe_masks.npz``. There is no truth: MediaPipe is a fair reference in the image.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.initialization.first_sight import upper_body
+from cardbox_tracker.estimation.initialization.references import lateral_m
+from cardbox_tracker.estimation.initialization.standing import at_height_of
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
+from tools.real_sheet import contact_sheet
+from tools.silhouette_report import read_masks
+
+Image = NDArray[np.uint8]
+FloatArray = NDArray[np.float64]
+
+LANDMARKS = tuple(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "elbow", "wrist"))
+WRIST = 0.757
+"""Elbow to wrist, of elbow to knuckles (de Leva, 1996): the model's hand is the knuckles."""
+
+BEGIN, END = "<!-- figures of tools.real_report -->", "<!-- end of the figures -->"
+_MARGIN_S = 0.2
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Every image with a person, N of them, in order.
+
+    Attributes:
+        camera: working camera.
+        images: (N, H, W, 3), bgr.
+        silhouettes: (N, H, W), 0 or 255, of the background model.
+        masks: MediaPipe's, (N, H, W), 0 or 255.
+        landmarks_px: MediaPipe's, (N, 6, 2), as ``LANDMARKS``; nan where there is none.
+        clips: name of the clip, (N,).
+    """
+
+    camera: Camera
+    images: Image
+    silhouettes: Image
+    masks: Image
+    landmarks_px: FloatArray
+    clips: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What is tracked, and with which silhouettes.
+
+    Attributes:
+        name: in the table.
+        silhouettes: ``ours``, ``region`` (the largest region of ours) or ``mediapipe``.
+        fits: the body is fitted to the first silhouette; else it is a guess put at its place.
+        distance: the distance is given.
+        colors: images are given, too.
+        anew: tracking starts anew with each clip.
+    """
+
+    name: str
+    silhouettes: str = "region"
+    fits: bool = True
+    distance: bool = True
+    colors: bool = True
+    anew: bool = True
+
+
+VARIANTS = (
+    Variant("not fitted, silhouettes as they are", "ours", fits=False),
+    Variant("fitted, silhouettes as they are", "ours"),
+    Variant("not fitted, largest region", fits=False),
+    Variant("**fitted, largest region**"),
+    Variant("the same without colours", colors=False),
+    Variant("the same, distance not given", distance=False),
+    Variant("the same, one run through all clips", anew=False),
+    Variant("fitted, MediaPipe's masks", "mediapipe"),
+    Variant("the same without colours", "mediapipe", colors=False),
+)
+SHOWN = VARIANTS[3]
+"""The one that is reported by clip and drawn."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out: estimates and bodies (N,), errors (N, 6) in px (nan without), IoU (N,)."""
+
+    estimates: list[Estimate]
+    bodies: list[BodyModel]
+    errors_px: FloatArray
+    iou: FloatArray
+
+
+def read_frames(folder: Path) -> Frames:
+    """Read a session, and cut out its silhouettes.
+
+    Raises:
+        CardboxError: the folder is no such session.
+    """
+    try:
+        reference = json.loads((folder / "reference.json").read_text(encoding="utf-8"))
+        masks = read_masks(folder / "mediapipe_masks.npz")
+        numbers = {f["stamp_ns"]: i for i, f in enumerate(reference["frames"])}
+        first = reference["segments"][0]
+    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        raise CardboxError(
+            f"{folder} is no session of real people: {error!r}; expected bag/, reference.json and "
+            "mediapipe_masks.npz"
+        ) from None
+    empty = TimeSpan(first["start_s"] + _MARGIN_S, first["end_s"] - _MARGIN_S)
+    with BagReader(folder / "bag") as bag:
+        source = SilhouetteSource(bag, empty)
+        frames = list(source.frames(first["end_s"]))
+    chosen = [numbers[frame.stamp_ns] for frame in frames]
+    seen = [reference["frames"][i] for i in chosen]
+    return Frames(
+        source.camera,
+        np.array([frame.image for frame in frames]),
+        np.array([frame.silhouette for frame in frames]),
+        np.where(masks[chosen], 255, 0).astype(np.uint8),
+        np.array([_landmarks(frame) for frame in seen]),
+        np.array([frame["segment"] for frame in seen]),
+    )
+
+
+def _landmarks(frame: dict[str, Any]) -> list[list[float]]:
+    found = frame.get("mediapipe_px", {})
+    return [found.get(name, [np.nan, np.nan]) for name in LANDMARKS]
+
+
+def projected(keypoints_m: FloatArray, camera: Camera) -> FloatArray:
+    """Return shoulders, elbows and wrists (6, 2), px, of keypoints (6, 3), metres, optical."""
+    points = keypoints_m.copy()
+    for elbow, hand in ((1, 2), (4, 5)):
+        points[hand] = points[elbow] + WRIST * (points[hand] - points[elbow])
+    return camera.project(points)
+
+
+def track(frames: Frames, variant: Variant, stature_m: float, distance_m: float, seed: int) -> Run:
+    """Track every frame in one of the ways."""
+    config, camera = default_preset(), frames.camera
+    count = len(frames.clips)
+    errors, iou = np.full((count, len(LANDMARKS)), np.nan), np.full(count, np.nan)
+    estimates, bodies = [], []
+    tracker = None
+    for i, clip in enumerate(frames.clips):
+        silhouette = _silhouette(frames, variant, i)
+        if tracker is None or (variant.anew and clip != frames.clips[i - 1]):
+            body = body_from_proportions(stature_m, distance_m if variant.distance else None)
+            if not variant.fits:
+                body = _placed(body.with_values(unknown=()), silhouette, camera)
+            tracker = Tracker(body, camera, config, np.random.default_rng(seed))
+        estimate = tracker.track(silhouette, frames.images[i] if variant.colors else None)
+        estimates.append(estimate)
+        bodies.append(tracker.body)
+        if estimate.posture is None or estimate.keypoints_m is None:
+            continue
+        away = projected(estimate.keypoints_m, camera) - frames.landmarks_px[i]
+        errors[i] = np.hypot(away[:, 0], away[:, 1])
+        cost = WholeBodyCost(tracker.body, camera, config.whole_body.cost)
+        iou[i] = _iou(cost, estimate, frames.masks[i])
+    return Run(estimates, bodies, errors, iou)
+
+
+def _silhouette(frames: Frames, variant: Variant, i: int) -> Image:
+    if variant.silhouettes == "mediapipe":
+        mask: Image = frames.masks[i]
+        return mask
+    seen: Image = frames.silhouettes[i]
+    if variant.silhouettes == "ours":
+        return seen
+    person = upper_body(seen)
+    return np.zeros_like(seen) if person is None else person
+
+
+def _placed(body: BodyModel, silhouette: Image, camera: Camera) -> BodyModel:
+    """A guess at the height of the head and as far aside as it."""
+    person = upper_body(silhouette)
+    if person is None:
+        return body
+    aside = lateral_m(person, camera, body.placement.distance_m)
+    return at_height_of(person, body.with_values(lateral_m=aside), camera)
+
+
+def _iou(cost: WholeBodyCost, estimate: Estimate, mask: Image) -> float:
+    """Overlap of the drawn model and a mask, in the rows that the tracker looks at."""
+    assert estimate.posture is not None
+    assert estimate.offset_m is not None
+    state = np.concatenate([estimate.posture, estimate.offset_m])
+    cost.see(mask, state)
+    _, costs_px, areas_px = cost.bodies(state[None])
+    common = 0.5 * (cost.silhouette_px + areas_px[0] - costs_px[0])
+    return float(common / max(cost.silhouette_px + areas_px[0] - common, 1.0))
+
+
+def silhouette_iou(frames: Frames, silhouettes: str) -> FloatArray:
+    """Return the overlap (N,) of silhouettes and MediaPipe's masks."""
+    found = []
+    for i, mask in enumerate(frames.masks):
+        seen = _silhouette(frames, Variant("", silhouettes), i)
+        union = np.count_nonzero(seen | mask)
+        found.append(np.count_nonzero(seen & mask) / union if union else np.nan)
+    return np.array(found)
+
+
+def cells(runs: list[Run], chosen: NDArray[np.bool_]) -> list[str]:
+    """Return the figures of some frames (N,), of all runs together."""
+    errors = np.concatenate([run.errors_px[chosen] for run in runs])
+    missing = np.mean([np.count_nonzero(np.isnan(run.iou[chosen])) for run in runs])
+    if missing == np.count_nonzero(chosen):
+        return ["-"] * 5 + [f"{missing:.0f} of {np.count_nonzero(chosen)}"]
+    joints = np.nanmean(errors, axis=0).reshape(2, 3).mean(axis=0)
+    iou = np.nanmean([run.iou[chosen] for run in runs])
+    of = f"{missing:.0f} of {np.count_nonzero(chosen)}"
+    return [f"{np.nanmean(errors):.1f}", *(f"{e:.1f}" for e in joints), f"{iou:.2f}", of]
+
+
+_HEADER = "mean, px | shoulders | elbows | wrists | model's IoU | frames without estimate"
+
+
+def report(
+    frames: Frames, results: dict[Variant, list[Run]], given: argparse.Namespace
+) -> Iterator[str]:
+    """Yield the document's lines."""
+    everything = np.ones(len(frames.clips), bool)
+    clips = list(dict.fromkeys(frames.clips.tolist()))
+    yield (
+        f"{len(clips)} clips, {len(frames.clips)} frames; the body is that of `cardbox body "
+        f"--stature {given.stature:g} --distance {given.distance:g}` for everybody; means over "
+        f"{given.seeds} seeds."
+    )
+    yield ""
+    yield f"| what | {_HEADER} |"
+    yield "|---|" + "---|" * 6
+    for variant, runs in results.items():
+        yield f"| {variant.name} | " + " | ".join(cells(runs, everything)) + " |"
+    yield ""
+    yield "By clip, of the row in bold:"
+    yield ""
+    ious = {kind: silhouette_iou(frames, kind) for kind in ("ours", "region")}
+    yield f"| clip | {_HEADER} | silhouette's IoU | of its largest region |"
+    yield "|---|" + "---|" * 8
+    for clip in clips:
+        chosen = frames.clips == clip
+        line = [*cells(results[SHOWN], chosen)]
+        line += [f"{np.nanmean(values[chosen]):.2f}" for values in ious.values()]
+        yield f"| {clip} | " + " | ".join(line) + " |"
+    line = [*cells(results[SHOWN], everything)]
+    line += [f"{np.nanmean(values):.2f}" for values in ious.values()]
+    yield "| **all** | " + " | ".join(line) + " |"
+    yield ""
+
+
+def replaced(document: str, figures: str) -> str:
+    """Return the document with other figures between its two marks.
+
+    Raises:
+        CardboxError: it has no marks.
+    """
+    before, begin, rest = document.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise CardboxError(f"the document has no marks {BEGIN} and {END}; the figures go between")
+    return f"{before}{begin}\n{figures}\n{end}{after}"
+
+
+def sheet_of(frames: Frames, run: Run) -> Image:
+    """Return the middle of each clip with model and landmarks."""
+    numbers = [np.flatnonzero(frames.clips == clip) for clip in dict.fromkeys(frames.clips)]
+    middles = [int(of_clip[len(of_clip) // 2]) for of_clip in numbers]
+    return contact_sheet(
+        [
+            (
+                frames.images[i],
+                frames.masks[i],
+                frames.landmarks_px[i],
+                run.bodies[i],
+                run.estimates[i],
+            )
+            for i in middles
+        ],
+        frames.camera,
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Track, and write the document and the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
+    parser.add_argument("--session", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--stature", type=float, default=1.75, metavar="M")
+    parser.add_argument("--distance", type=float, default=1.5, metavar="M")
+    parser.add_argument("--seeds", type=int, default=3, metavar="N")
+    parser.add_argument("--output", type=Path, required=True, metavar="FILE.md")
+    parser.add_argument("--sheet", type=Path, metavar="FILE.jpg", help="contact sheet to write")
+    options = parser.parse_args(arguments)
+    frames = read_frames(options.session)
+    results = {}
+    for variant in VARIANTS:
+        given = (options.stature, options.distance)
+        results[variant] = [track(frames, variant, *given, seed) for seed in range(options.seeds)]
+        chosen = np.ones(len(frames.clips), bool)
+        print(variant.name, *cells(results[variant], chosen), sep=" | ", flush=True)
+    document = options.output.read_text(encoding="utf-8")
+    figures = "\n".join(report(frames, results, options))
+    options.output.write_text(replaced(document, figures), encoding="utf-8")
+    if options.sheet is not None:
+        quality = (cv2.IMWRITE_JPEG_QUALITY, 85)
+        cv2.imwrite(str(options.sheet), sheet_of(frames, results[SHOWN][0]), quality)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
