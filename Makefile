@@ -54,15 +54,19 @@ $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyp
 	@rm -rf build/lib build/bdist.* *.egg-info
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build/lib build/bdist.* *.egg-info
-	@echo "compiling the tracker's inner loop, once, for about half a minute"
+	@touch $@
+
+$(VENV)/compiled: $(VENV)/package
+	@echo "compiling the tracker's inner loop, once, for about a minute"
 	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.precompile
 	@touch $@
 
 .PHONY: setup
-setup: $(VENV)/package
+setup: $(VENV)/compiled
 
+# The tests compile the tree, so the installed copy need not be.
 .PHONY: lint
-lint: setup
+lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 

@@ -18,6 +18,7 @@ TEST = [
     "mypy>=1.11",
     "pytest>=7.4",
     "pytest-timeout>=2.3",
+    "pytest-xdist>=3.5",
     "ruff>=0.6",
     "types-PyYAML",
     "types-tqdm",
