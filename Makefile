@@ -90,7 +90,7 @@ SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.js
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
-		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation; fi
+		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; fi
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

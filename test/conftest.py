@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import signal
+import socket
 import zlib
 from collections import deque
 from collections.abc import Iterator
@@ -62,12 +63,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def _domains() -> Iterator[int]:
-    """Domains that no other process of this run has; other runs begin elsewhere."""
+    """Domains that no other process of this run has, nor any other run on this machine."""
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     share = MOST_DOMAINS // workers
     run = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
     for number in itertools.count(zlib.crc32(run.encode())):
-        yield 1 + WORKER * share + number % share
+        domain = 1 + WORKER * share + number % share
+        if _is_free(domain):
+            yield domain
+
+
+def _is_free(domain: int) -> bool:
+    """Return whether no DDS participant has taken the domain's first port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return False
+    return True
 
 
 _DOMAINS = _domains()

@@ -15,7 +15,7 @@ from cardbox_tracker.body.person import Person
 from cardbox_tracker.body.placement import CAMERA_POSE, PLACEMENT, CameraPose, Placement
 from cardbox_tracker.body.posture import SIDE_TURNS
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.errors import BodyModelError
+from cardbox_tracker.errors import BodyModelError, quoted
 
 CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
@@ -45,7 +45,9 @@ class BodyModel:
     def __post_init__(self) -> None:
         """Check ``side_turn``; the parts check themselves."""
         if self.side_turn not in SIDE_TURNS:
-            raise BodyModelError(f"side_turn is {self.side_turn!r}; expected one of {SIDE_TURNS}")
+            raise BodyModelError(
+                f"side_turn is {quoted(self.side_turn)}; expected one of {SIDE_TURNS}"
+            )
 
     @classmethod
     def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:

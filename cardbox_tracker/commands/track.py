@@ -14,6 +14,7 @@ from cardbox_tracker.commands.arguments import (
     particle_count,
     time,
 )
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
     )
     add_seed(parser, "the filters")
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -86,13 +88,19 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource
     from cardbox_tracker.recordings.track import track_recording
 
+    check_outputs(
+        (options.csv, options.video),
+        options.force,
+        inputs=(options.recording, options.model),
+        results=() if options.bag is None else (options.bag,),
+    )
     body = load_body_model(options.model)
     config = _config(options)
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
         total_s = max(1e-9, bag.duration_s - options.start)
         with (
-            ResultBag(options.bag, body, source.frame_id) as results,
+            ResultBag(options.bag, body, source.frame_id, options.force) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(

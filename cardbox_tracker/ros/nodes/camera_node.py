@@ -14,6 +14,7 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
+from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.input_parameters import CameraParameters
 from cardbox_tracker.ros.runtime import qos
@@ -47,7 +48,9 @@ class CameraNode(CardboxNode):
         self._capture = open_video(settings.file) if settings.file else self._open_device()
         self._period_s = self._period(settings.rate_hz)
         self._calibration = (
-            load_calibration(settings.calibration_file) if settings.calibration_file else None
+            load_calibration(user_path(settings.calibration_file))
+            if settings.calibration_file
+            else None
         )
         self._locked = bool(settings.file) or not settings.lock_exposure
         self._stop = threading.Event()
