@@ -59,6 +59,7 @@ setup(
     ],
     python_requires=">=3.11",
     install_requires=[
+        "lz4>=4.3",
         "matplotlib>=3.8",
         "numba>=0.60",
         "numpy>=1.26",

@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_recording, add_seed, span
+from cardbox_tracker.commands.arguments import add_recording, add_seed, print_remarks, span
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "initialize"
@@ -90,6 +90,7 @@ def run(options: argparse.Namespace) -> None:
         source = SilhouetteSource(bag, options.background)
         with progress_bar("initialize") as show:
             result = initialize_from_recording(source, spans, config, show)
+    print_remarks(source)
     save_body_model(result.body, options.output)
     print(describe(result))
     print(f"wrote {options.output}")

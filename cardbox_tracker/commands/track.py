@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     add_recording,
     add_seed,
     particle_count,
+    print_remarks,
     time,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
@@ -121,6 +122,7 @@ def run(options: argparse.Namespace) -> None:
         f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
+    print_remarks(source)
     for path in (options.csv, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")

@@ -10,7 +10,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
@@ -18,7 +17,7 @@ from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.input_parameters import CameraParameters
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 from cardbox_tracker.vision.camera_device import (
@@ -157,7 +156,7 @@ def main(args: list[str] | None = None) -> int:
         epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
     )
     parser.add_argument("--list", action="store_true", help="list devices and modes, and exit")
-    if parser.parse_args(remove_ros_args(command_line)[1:]).list:
+    if parser.parse_args(own_arguments(command_line)).list:
         print(describe_devices())
         return 0
     return run_node(CameraNode, command_line)
