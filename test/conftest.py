@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
 import signal
@@ -9,16 +10,24 @@ import socket
 import zlib
 from collections import deque
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.precompile import compile_all
 
 # How long an example takes says nothing of the program on a busy machine.
 settings.register_profile("untimed", deadline=None)
-settings.load_profile("untimed")
+settings.register_profile(
+    "long",
+    deadline=None,
+    max_examples=int(os.environ.get("RELIABILITY_EXAMPLES", "1")),
+    suppress_health_check=list(HealthCheck),
+    database=None,
+)
+settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untimed")
 
 # A shell that starts a command in the background has it ignore Ctrl-C, and so would all it starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -60,6 +69,34 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     if items and hasattr(items[0].config, "workerinput"):
         items.sort(key=rank)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Note the promise that a test is of, and how many inputs it tried, for 'make reliability'."""
+    marker = item.get_closest_marker("promise")
+    if marker is None:
+        return (yield)
+    tried = itertools.count()
+    handle = getattr(getattr(item, "obj", None), "hypothesis", None)
+    if handle is not None:
+        inner = handle.inner_test
+
+        @functools.wraps(inner)
+        def counted(*given: Any, **named: Any) -> Any:
+            next(tried)
+            return inner(*given, **named)
+
+        handle.inner_test = counted
+    else:
+        next(tried)
+    try:
+        return (yield)
+    finally:
+        if handle is not None:
+            handle.inner_test = inner
+        item.user_properties.append(("promise", marker.args[0]))
+        item.user_properties.append(("tried", next(tried)))
 
 
 def _domains() -> Iterator[int]:

@@ -90,6 +90,8 @@ def _unpacked_sizes(file: BinaryIO, size: int) -> Iterator[tuple[int, int]]:
         kind, length = struct.unpack("<BQ", file.read(9))
         at += 9 + length
         # Damaged files are refused by the reader, which says what is wrong.
+        if at > size:
+            return
         if kind == _CHUNK and length >= 24:
             yield kind, struct.unpack("<QQQ", file.read(24))[2]
         elif kind == _CHUNK_INDEX and length >= 8 and at <= size:

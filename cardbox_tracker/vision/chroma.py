@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from cardbox_tracker.compiling import njit
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]

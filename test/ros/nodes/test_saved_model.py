@@ -39,6 +39,7 @@ def context(ros_domain: int) -> Iterator[Context]:
     context.try_shutdown()
 
 
+@pytest.mark.promise("A model_file that cannot be used is told when the node starts")
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -97,6 +98,7 @@ def test_a_home_folder_is_known_to_every_node(
         make(context=context, parameter_overrides=overrides, enable_rosout=False)
 
 
+@pytest.mark.promise("A measurement that cannot be saved costs no second posing")
 def test_a_folder_that_is_gone_costs_no_second_posing(
     context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
