@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import importlib
 import itertools
 import os
 import signal
 import socket
+import warnings
 import zlib
 from collections import deque
 from collections.abc import Iterator
@@ -17,6 +20,11 @@ from hypothesis import HealthCheck, settings
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.precompile import compile_all
+
+with contextlib.suppress(ImportError), warnings.catch_warnings():
+    # What rclpy imports with the first message uses modules that Python has deprecated.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    importlib.import_module("lark")
 
 # How long an example takes says nothing of the program on a busy machine.
 settings.register_profile("untimed", deadline=None)

@@ -15,6 +15,9 @@ from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_sm
 
 FloatArray = NDArray[np.float64]
 
+# Far beyond any lens; what follows from it still is a number.
+_LARGEST_OF_K = 1e9
+
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 
 
@@ -157,6 +160,11 @@ class Calibration:
             raise CameraError(
                 "the camera is not calibrated (its matrix K is all zero); calibrate it with "
                 "camera_calibration, or give its driver a calibration file"
+            )
+        if np.max(np.abs(self.k)) > _LARGEST_OF_K:
+            raise CameraError(
+                "the camera's matrix K has values that no lens gives; expected some hundreds or "
+                "thousands of pixels: calibrate it with camera_calibration"
             )
         if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
             raise CameraError(

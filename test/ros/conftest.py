@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-
-with contextlib.suppress(ImportError), warnings.catch_warnings():
-    # What rclpy imports with the first message uses modules that Python has deprecated.
-    warnings.simplefilter("ignore", DeprecationWarning)
-    importlib.import_module("lark")
 
 
 @pytest.fixture

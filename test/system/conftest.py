@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib
 import itertools
 import os
 import signal
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,11 +22,6 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.ros.runtime.processes import EXECUTABLES
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
-
-with contextlib.suppress(ImportError), warnings.catch_warnings():
-    # What rclpy imports with the first message uses modules that Python has deprecated.
-    warnings.simplefilter("ignore", DeprecationWarning)
-    importlib.import_module("lark")
 
 # A limit for what hangs, not for what is slow.
 WAIT_S = 90.0

@@ -31,10 +31,10 @@ def test_a_row_is_a_function_and_its_promise(tmp_path: Path) -> None:
         Row("It holds", "test/a/test_b.py::test_c", 1234),
         Row("It fails", "test/a/test_b.py::test_d", 7, 1),
     ]
-    page = with_table(f"# A\n\n{BEGIN}\nold\n{END}\n\nmore\n", rows)
+    page = with_table(f"# A\n\n{BEGIN}\nstale\n{END}\n\nmore\n", rows)
     assert "| It holds | `test/a/test_b.py::test_c` | 1,234 | all |" in page
     assert "| It fails | `test/a/test_b.py::test_d` | 7 | **no: 1 failed** |" in page
-    assert "old" not in page
+    assert "stale" not in page
     assert page.startswith("# A\n") and page.endswith(f"{END}\n\nmore\n")
     assert with_table(page, rows) == page
     with pytest.raises(CardboxError, match="has no"):
