@@ -20,6 +20,7 @@ from cardbox_tracker.commands import (
     urdf,
 )
 from cardbox_tracker.commands.command import Command
+from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
 
 # In the order of 'cardbox --help'.
@@ -65,11 +66,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"{words[0]!r} is no longer a subcommand; use {RETIRED[words[0]]!r}")
     options = parser.parse_args(words)
     try:
-        options.run(options)
-        sys.stdout.flush()
+        with ended_by_signals():
+            options.run(options)
+            sys.stdout.flush()
     except CardboxError as error:
         print(f"cardbox {options.command}: {error}", file=sys.stderr)
         return 1
+    except Terminated as end:
+        print(f"cardbox {options.command}: terminated", file=sys.stderr)
+        return 128 + end.signal
     except KeyboardInterrupt:
         print(f"cardbox {options.command}: interrupted", file=sys.stderr)
         return 130
