@@ -70,6 +70,22 @@ class LightFollower:
             mean: brightness of the background, (H, W).
             chroma: brightness, Cr and Cb of it at any resolution, (3, h, w); None: it is grey.
         """
+        self._prepare(mean, chroma)
+        self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
+        self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)
+        self.restart()
+
+    def replace(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
+        """Go on with another background of the same size, in the light as it is."""
+        self._prepare(mean, chroma)
+        self._spread()
+
+    def factors(self) -> FloatImage:
+        """Return how bright each pixel (H, W) is now, as a factor of what was learned."""
+        field = cv2.resize(self._field, self._mean.shape[::-1])
+        return np.asarray(self.level * field, np.float32)
+
+    def _prepare(self, mean: FloatImage, chroma: FloatImage | None) -> None:
         self._small = np.ascontiguousarray(mean[_GRID], np.float32)
         self._size = self._small.shape[1], self._small.shape[0]
         self._mean = mean
@@ -88,9 +104,6 @@ class LightFollower:
             np.float32
         )
         self._highest = float(self._brightest.max())
-        self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
-        self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)
-        self.restart()
 
     def restart(self) -> None:
         """Forget the light and the person; the next image may be of any other moment."""
@@ -178,6 +191,10 @@ class LightFollower:
             # The next estimate adds to this one what its smoothing has left.
             self._base = self._field.copy()
         self._fine = cv2.resize(self._field, self._size).reshape(small.shape)
+        self._spread()
+
+    def _spread(self) -> None:
+        """Put the field's light on the background."""
         self._highest_field = float(self._field.max())
         if self._highest_field < 1.0 + _SAME and float(self._field.min()) > 1.0 - _SAME:
             self._relative = self._mean
