@@ -53,7 +53,7 @@ class SceneMotion:
 
     def add(self, brightness: ImageArray) -> float:
         """Look at an image (H, W); return the share of the pixels that have moved so far."""
-        self._latest.append(_small(brightness))
+        self._latest.append(small_image(brightness))
         self._count += 1
         if self._count == self._of:
             self._first = self._mean()
@@ -66,15 +66,18 @@ class SceneMotion:
         return np.asarray(sum(self._latest) / np.float32(len(self._latest)), np.float32)
 
 
-def _small(brightness: ImageArray) -> FloatImage:
+def small_image(brightness: ImageArray | FloatImage) -> FloatImage:
+    """Return an image (H, W) at half the resolution, smoothed, for :func:`changed_pixels`."""
     height, width = brightness.shape
     size = (max(width // _SCALE, 1), max(height // _SCALE, 1))
     small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(small, (0, 0), _SMOOTHING_PX), np.float32)
 
 
-def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
-    """Return where two images (h, w) differ by more than their noise, in whatever light.
+def changed_pixels(
+    before: FloatImage, after: FloatImage, times_noise: float = _TIMES_NOISE
+) -> Mask:
+    """Return where two images (h, w) differ by so many times their noise, in whatever light.
 
     The level of the light and the noise are medians: what moves covers less than half of it.
     """
@@ -82,4 +85,4 @@ def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
     # In more light differences are larger, too.
     difference = np.abs(after - level * before) / max(level, 1.0)
     noise = _FROM_MEDIAN * float(np.median(difference))
-    return np.asarray(difference > min(max(_LEAST, _TIMES_NOISE * noise), _MOST), np.bool_)
+    return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)
