@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError, EncodingError
 from cardbox_tracker.vision.camera import Calibration, Camera
+from cardbox_tracker.vision.camera_checks import matrix_problem
 from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed
 
 ImageArray = NDArray[np.uint8]
@@ -164,13 +165,18 @@ def camera_of(message: CameraInfo) -> Camera:
     """Return the pinhole camera of a ``silhouette/camera_info``.
 
     Raises:
-        CameraError: the matrix is all zero or the image is distorted.
+        CameraError: it has no size, no camera has such a matrix, or the image is distorted.
     """
     k = message.k
-    if not (k[0] > 0 and k[4] > 0):
+    if not (message.width and message.height):
+        problem = f"is for an image of {message.width}x{message.height}"
+    else:
+        problem = matrix_problem(np.array(k).reshape(3, 3), message.width, message.height)
+        problem = problem and f"is not calibrated: its matrix K {problem}"
+    if problem:
         raise CameraError(
-            "the silhouette's CameraInfo is not calibrated (K all zero); take the silhouette and "
-            "its camera_info from the background node"
+            f"the silhouette's CameraInfo {problem}; take the silhouette and its camera_info from "
+            "the background node"
         )
     if any(message.d):
         raise CameraError(
