@@ -68,6 +68,7 @@ class InitializerNode(CardboxNode):
             Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
         )
         self.diagnostics.extra = self._values
+        self.diagnostics.source = f"silhouettes on {self._topic}"
         self.diagnostics.wait_for(
             f"silhouettes on {self._topic} (is the background node running, and has it learned?)"
         )
@@ -84,7 +85,8 @@ class InitializerNode(CardboxNode):
         self._camera = conversions.camera_of(message)
 
     def _on_silhouette(self, message: Image, sent_ns: int) -> None:
-        self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
+            return
         self._references.add(message)
         self._guide.draw(message, self._camera, self.parameters.value)
         self.diagnostics.working(sent_ns)

@@ -89,7 +89,8 @@ class CardboxNode(Node):
             try:
                 callback(message, int(info["source_timestamp"]))
             except CardboxError as error:
-                self.diagnostics.problem(str(error))
+                kind = f"{type(error).__name__} in {topic}"
+                self.diagnostics.problem(str(error), kind)
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
@@ -123,12 +124,12 @@ class CardboxNode(Node):
         try:
             text = action()
         except CardboxError as error:
-            self.get_logger().warning(f"{name}: {error}")
+            self.diagnostics.say(f"{name} refused", f"{name}: {error}", warning=True)
             return False, str(error)
         except Exception as error:
             self._unexpected(f"service {name}", error)
             return False, f"unexpected error, see the log of {self.get_name()}: {error!r}"
-        self.get_logger().info(f"{name}: {text}")
+        self.diagnostics.say(name, f"{name}: {text}")
         return True, text
 
     def close(self) -> None:
@@ -137,7 +138,8 @@ class CardboxNode(Node):
     def _unexpected(self, where: str, error: Exception) -> None:
         if not self.context.ok():
             return  # a signal is ending the node
-        self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
+        text = f"unexpected error in {where}: {error!r}; please report it"
+        self.diagnostics.problem(text, f"unexpected error in {where}")
         self.get_logger().debug(traceback.format_exc())
 
 
