@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime.recent import RecentImages
 
 Deliver = Callable[[Image, Image | None, int], None]
 """Takes a silhouette, its image if there is one, and when the silhouette left its sender, ns."""
@@ -31,7 +31,7 @@ class ImagePairing:
         """Hand on to ``deliver``."""
         self.waits = True
         self._deliver = deliver
-        self._images: deque[Image] = deque(maxlen=_KEPT)
+        self._images = RecentImages(_KEPT)
         self._waiting: tuple[Image, int] | None = None
         # None is expected before the first one: perhaps nobody sends any.
         self._patience = 0
@@ -64,7 +64,7 @@ class ImagePairing:
             silhouette, sent_ns = self._waiting
             self._waiting = None
             if image is not None:
-                while self._images and self._images.popleft() is not image:
+                while len(self._images) and self._images.popleft() is not image:
                     pass
             self._deliver(silhouette, image, sent_ns)
 
