@@ -35,8 +35,6 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Camera
 
-_NICENESS = 5
-
 
 class InitializerNode(CardboxNode):
     """Captures reference silhouettes and measures the person in them."""
@@ -156,6 +154,7 @@ class InitializerNode(CardboxNode):
             raise InitializationError("the initializer was stopped")
 
     def _progress(self, fraction: float) -> None:
+        self._wait(0.0)
         self._guide.show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
@@ -192,7 +191,7 @@ def _answer(result: InitializationResult) -> str:
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     # The tracker, which gets the same silhouettes, has priority.
-    os.nice(_NICENESS)
+    os.nice(5)
     return run_node(InitializerNode, args)
 
 

@@ -25,6 +25,8 @@ PERIOD_S = 1.0
 # Without input for so long, and for so many periods, it has ceased.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
+# Results whose latency says something.
+_ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
 
@@ -126,9 +128,22 @@ class NodeDiagnostics:
             self._node.get_logger().warning(f"{self.source} have ceased: {_CEASED}")
         self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {_CEASED}"
 
+    def _slowness(self) -> dict[str, str]:
+        """Return what to say where results need longer than images have time."""
+        if len(self._latencies_ms) < _ENOUGH:
+            return {}
+        latency_ms, period_ms = np.median(self._latencies_ms), self.input.period_ns / 1e6
+        if not 0 < period_ms < latency_ms:
+            return {}
+        return {
+            "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
+            f"{period_ms:.0f} ms, so that images wait or are left out; take fewer particles or "
+            "cycles, a smaller working resolution, or fewer images a second"
+        }
+
     def _remarks(self) -> list[str]:
         """Return all warnings of now; each kind that is new is logged."""
-        found = self.input.remarks() | self.advice()
+        found = self.input.remarks() | self._slowness() | self.advice()
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)

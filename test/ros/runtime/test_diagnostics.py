@@ -209,3 +209,14 @@ def test_good_images_between_do_not_open_the_log(
         diagnostics.problem(f"encoding '{number}'", "EncodingError in image_raw")
         diagnostics.working()
     assert len(logged.lines) == 3
+
+
+@pytest.mark.parametrize(("periods", "slow"), [(0.5, False), (3.0, True)])
+def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
+    make_node: Callable, periods: float, slow: bool
+) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    for frame in range(40):
+        diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
+        diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
+    assert ("fewer particles" in diagnostics._status().message) is slow
