@@ -74,13 +74,13 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            f"cardbox = {NAME}.commands.main:main",
-            f"background = {NAME}.ros.nodes.background_node:main",
-            f"initializer = {NAME}.ros.nodes.initializer_node:main",
-            f"tracker = {NAME}.ros.nodes.tracker_node:main",
-            f"camera = {NAME}.ros.nodes.camera_node:main",
-            f"play_bag = {NAME}.ros.nodes.play_bag_node:main",
-            f"cardbox_nodes = {NAME}.ros.nodes.single_process:main",
+            f"cardbox = {NAME}.start:cardbox",
+            f"background = {NAME}.start:background",
+            f"initializer = {NAME}.start:initializer",
+            f"tracker = {NAME}.start:tracker",
+            f"camera = {NAME}.start:camera",
+            f"play_bag = {NAME}.start:play_bag",
+            f"cardbox_nodes = {NAME}.start:cardbox_nodes",
         ],
     },
 )

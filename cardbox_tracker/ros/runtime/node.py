@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
+from cardbox_tracker import interrupts
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
@@ -157,9 +158,16 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     """Create what works until it is told to stop; return the process's exit code."""
+    with interrupts.only_noted():
+        return _run(create, args, work)
+
+
+def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     try:
         rclpy.init(args=args)
     except Exception as error:
+        if interrupts.were_received():
+            return 0
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
     node: N | None = None
@@ -171,13 +179,14 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
         gc.freeze()
         work(node)
     except CardboxError as error:
-        get_logger("cardbox_tracker").fatal(str(error))
-        return 1
+        if ok():
+            get_logger("cardbox_tracker").fatal(str(error))
+            return 1
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except Exception:
         # A signal shuts ROS down at any point; exceptions that follow from it are expected.
-        if ok():
+        if ok() and not interrupts.were_received():
             raise
     finally:
         if node is not None:
