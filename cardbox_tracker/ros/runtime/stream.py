@@ -38,8 +38,8 @@ class Step(Enum):
 class StampOrder:
     """Says of each stamp how it follows those before.
 
-    Where two publishers with different clocks take turns, the first to go on is followed; the other
-    one's images are foreign.
+    A jump is followed at once. If the next image is of the time before the jump, that goes on, and
+    images of the other time are foreign: two publishers with different clocks, or one wrong stamp.
     """
 
     def __init__(self) -> None:
@@ -47,6 +47,7 @@ class StampOrder:
         self._last_ns: int | None = None
         # Where the stamps were before they jumped.
         self._left_ns: int | None = None
+        self._has_jumped = False
         self._foreign = 0
 
     def see(self, stamp_ns: int) -> Step:
@@ -59,14 +60,18 @@ class StampOrder:
             return Step.NEXT
         spacing_ns = stamp_ns - last_ns
         if -_RESTART_NS <= spacing_ns < _PAUSE_NS:
-            self._foreign = 0
+            self._foreign, self._has_jumped = 0, False
             if spacing_ns <= 0:
                 return Step.LATE if spacing_ns else Step.REPEATED
             self._last_ns = stamp_ns
             return Step.NEXT
-        if self._is_foreign(stamp_ns):
+        if self._has_jumped and self._left_ns is not None:
+            if 0 < stamp_ns - self._left_ns < _PAUSE_NS:
+                self._has_jumped, self._left_ns, self._last_ns = False, last_ns, stamp_ns
+                return Step.NEXT
+        elif self._is_foreign(stamp_ns):
             return Step.FOREIGN
-        self._left_ns, self._last_ns = last_ns, stamp_ns
+        self._has_jumped, self._left_ns, self._last_ns = True, last_ns, stamp_ns
         return Step.GAP if spacing_ns > 0 else Step.RESTART
 
     def _is_foreign(self, stamp_ns: int) -> bool:
