@@ -3,6 +3,7 @@
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
+# make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove all that the above made
@@ -54,15 +55,19 @@ $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyp
 	@rm -rf build/lib build/bdist.* *.egg-info
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build/lib build/bdist.* *.egg-info
-	@echo "compiling the tracker's inner loop, once, for about half a minute"
+	@touch $@
+
+$(VENV)/compiled: $(VENV)/package
+	@echo "compiling the tracker's inner loop, once, for about a minute"
 	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.precompile
 	@touch $@
 
 .PHONY: setup
-setup: $(VENV)/package
+setup: $(VENV)/compiled
 
+# The tests compile the tree, so the installed copy need not be.
 .PHONY: lint
-lint: setup
+lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
@@ -86,7 +91,13 @@ SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.js
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
-		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation; fi
+		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; fi
+
+# Fewer examples: make reliability EXAMPLES=1000
+EXAMPLES ?= 100000
+.PHONY: reliability
+reliability: $(VENV)/package
+	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
 
 # In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
 COLCON := build/colcon

@@ -18,6 +18,7 @@ TEST = [
     "mypy>=1.11",
     "pytest>=7.4",
     "pytest-timeout>=2.3",
+    "pytest-xdist>=3.5",
     "ruff>=0.6",
     "types-PyYAML",
     "types-tqdm",
@@ -58,6 +59,7 @@ setup(
     ],
     python_requires=">=3.11",
     install_requires=[
+        "lz4>=4.3",
         "matplotlib>=3.8",
         "numba>=0.60",
         "numpy>=1.26",

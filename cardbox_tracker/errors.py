@@ -55,3 +55,22 @@ class RosMissingError(CardboxError):
             f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
             "a ROS 2 Jazzy installation"
         )
+
+
+_MOST_CHARACTERS = 200
+_MOST_OF_A_VALUE = 60
+
+
+def cut(text: str, most: int = _MOST_CHARACTERS) -> str:
+    """Return ``text`` or its beginning: what strangers send must not fill the log."""
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def quoted(value: object) -> str:
+    """Return ``value`` as it would be written in Python, or the beginning of that."""
+    if isinstance(value, str):
+        return repr(value[:_MOST_OF_A_VALUE]) + "..." * (len(value) > _MOST_OF_A_VALUE)
+    try:
+        return cut(repr(value), _MOST_OF_A_VALUE)
+    except (ValueError, RecursionError):  # such as of a number of thousands of digits
+        return f"a value of type {type(value).__name__}"

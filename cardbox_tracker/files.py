@@ -1,34 +1,224 @@
-"""Write a result so that a reader finds the whole of it or none."""
+"""Write a result so that a reader finds the whole of it or none of it."""
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
+import re
+import secrets
+import shutil
+import stat
+import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError
 
+# In the names of temporary files: whoever finds one after a crash knows what it is.
+_MARK = ".unfinished-"
+_STEM_LENGTH = 100
+_MOST_LINKS = 40
+
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` with the same suffix; rename it when all went well.
 
+    Where ``path`` is a link, the file that it points to is replaced. A pipe or a device, such as
+    ``/dev/stdout``, is not replaced but written to, at the end. Temporary files for the same
+    ``path`` whose writer was killed are removed.
+
     Raises:
-        CardboxError: the folder of ``path`` cannot be written, or ``path`` is a folder itself.
+        CardboxError: the folder of ``path`` cannot be written, or ``path`` is no file that can.
+    """
+    if is_written_in_place(path):
+        with _copied_to(Path(path)) as temporary:
+            yield temporary
+        return
+    target = resolved(path)
+    with claimed_name(target, is_folder=False) as temporary:
+        yield temporary
+        with contextlib.suppress(OSError):
+            # Whoever could read the former file can read the new one.
+            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+        os.replace(temporary, target)
+
+
+@contextmanager
+def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
+    """Yield a new empty file or folder beside ``target``; remove what is left of it at the end.
+
+    Its name is unpredictable and nothing that exists is opened. It is locked as long as this
+    process lives, so that the next run can tell a leftover from the work of another process.
+
+    Raises:
+        CardboxError: the folder of ``target`` cannot be written.
+    """
+    _remove_leftovers(target)
+    name = f".{target.stem[:_STEM_LENGTH]}{_MARK}{secrets.token_hex(8)}{target.suffix}"
+    temporary = target.with_name(name)
+    try:
+        if is_folder:
+            temporary.mkdir()
+            descriptor = os.open(temporary, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        else:
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+            descriptor = os.open(temporary, flags, 0o666)
+    except OSError as error:
+        raise _refused(target, error) from None
+    try:
+        _lock(descriptor)
+        yield temporary
+    finally:
+        _remove(temporary)
+        os.close(descriptor)
+
+
+def resolved(path: str | os.PathLike[str]) -> Path:
+    """Return the file that ``path`` means: where it is a link, what the link points to.
+
+    Raises:
+        CardboxError: it is a folder, or its links lead in a circle.
     """
     target = Path(path)
     if target.is_dir():
         raise CardboxError(f"cannot write {target}: it is a folder; give the name of a file")
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}{target.suffix}")
+    if not target.is_symlink():
+        return target
+    end = Path(os.path.realpath(target))
+    if end.is_symlink():
+        raise CardboxError(f"cannot write {target}: its links lead in a circle; remove it")
+    return end
+
+
+def user_path(name: str) -> Path:
+    """Return the path that a user wrote, where ``~`` is a home folder.
+
+    Raises:
+        CardboxError: it is that of a user who is not there.
+    """
     try:
-        temporary.touch()
+        return Path(name).expanduser()
+    except RuntimeError:
+        raise CardboxError(f"{name}: there is no such user; give the whole path") from None
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Say before the work what :func:`atomic_path` would say after it.
+
+    Raises:
+        CardboxError: the folder of ``path`` cannot be written, or ``path`` is no file that can.
+    """
+    try:
+        if is_written_in_place(path):
+            return
+        target = resolved(path)
+        os.stat(target.parent)
+        with contextlib.suppress(FileNotFoundError):
+            os.stat(target)
     except OSError as error:
-        raise CardboxError(
-            f"cannot write {target}: {error.strerror}; choose a folder that exists and is writable"
-        ) from None
+        raise _refused(Path(path), error) from None
+    if not target.parent.is_dir():
+        raise _refused(target, "Not a directory")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise _refused(target, "Permission denied")
+
+
+def is_written_in_place(path: str | os.PathLike[str]) -> bool:
+    """Return whether ``path`` is no file that can be replaced: a pipe, a terminal, ``/dev/null``.
+
+    Raises:
+        CardboxError: it is a disk or a socket.
+    """
     try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return False
+    if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
+        what = "a disk" if stat.S_ISBLK(mode) else "a socket"
+        raise CardboxError(f"cannot write {os.fspath(path)}: it is {what}; give the name of a file")
+    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or _descriptor_behind(path) is not None
+
+
+def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
+    """The name in /proc of the open file that ``path`` leads to, such as of /dev/stdout."""
+    here = os.path.abspath(path)
+    for _ in range(_MOST_LINKS):
+        folder, name = os.path.split(here)
+        folder = os.path.realpath(folder)
+        if re.fullmatch(r"/proc/\d+/(task/\d+/)?fd", folder):
+            return f"{folder}/{name}"
+        if not os.path.islink(here):
+            return None
+        here = os.path.normpath(os.path.join(folder, os.readlink(here)))
+    return None
+
+
+@contextmanager
+def _copied_to(target: Path) -> Iterator[Path]:
+    """Yield a path in a folder of its own; copy what was written there to ``target``."""
+    with tempfile.TemporaryDirectory(prefix="cardbox-") as folder:
+        temporary = Path(folder) / f"output{target.suffix}"
+        temporary.touch()
         yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+        sys.stdout.flush()
+        try:
+            with temporary.open("rb") as source, os.fdopen(_open(target), "wb") as sink:
+                shutil.copyfileobj(source, sink)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise _refused(target, error) from None
+
+
+def _open(target: Path) -> int:
+    """Open for writing without creating or emptying anything."""
+    name = _descriptor_behind(target)
+    own = f"/proc/{os.getpid()}/fd/"
+    if name is not None and name.startswith(own):
+        # Opened anew it would begin at the start of the file, and what is printed later, too.
+        return os.dup(int(name.removeprefix(own)))
+    return os.open(target, os.O_WRONLY | os.O_APPEND)
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove temporary files and folders of ``target`` whose writer is gone."""
+    stem, suffix = re.escape(target.stem[:_STEM_LENGTH]), re.escape(target.suffix)
+    pattern = re.compile(rf"\.{stem}{re.escape(_MARK)}[0-9a-f]{{16}}{suffix}")
+    with contextlib.suppress(OSError), os.scandir(target.parent) as entries:
+        for entry in entries:
+            if not pattern.fullmatch(entry.name) or entry.is_symlink():
+                continue
+            if entry.stat(follow_symlinks=False).st_uid != os.geteuid():
+                continue
+            descriptor = os.open(entry.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            try:
+                if _lock(descriptor):
+                    _remove(Path(entry.path))
+            finally:
+                os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # somebody has it, or the file system knows no locks
+        return False
+    return True
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _refused(target: Path, error: OSError | str) -> CardboxError:
+    reason = error if isinstance(error, str) else error.strerror
+    return CardboxError(
+        f"cannot write {target}: {reason}; choose a folder that exists and is writable"
+    )

@@ -31,25 +31,33 @@ def were_received() -> bool:
     return _received.is_set()
 
 
-def leave_at_once(code: int) -> None:
-    """From now on a signal ends the process with ``code``: for imports, when nothing is open."""
+def note() -> None:
+    """Take note that a signal has come."""
+    _received.set()
 
-    def leave(_: int, __: FrameType | None) -> NoReturn:
-        os._exit(code)
+
+def leave_at_once(code: int | None = None) -> None:
+    """From now on a signal ends the process with ``code``: for imports, when nothing is open.
+
+    None is 128 and the signal's number, as shells have it.
+    """
+
+    def leave(number: int, _: FrameType | None) -> NoReturn:
+        os._exit(128 + number if code is None else code)
 
     for number in _SIGNALS:
         signal.signal(number, leave)
 
 
 def interrupt_commands() -> None:
-    """From now on either signal raises KeyboardInterrupt, so that what was begun is cleaned up."""
+    """From now on Ctrl-C raises KeyboardInterrupt; what SIGTERM does is ``commands/signals.py``."""
 
     def interrupt(_: int, __: FrameType | None) -> NoReturn:
-        _received.set()
+        note()
         raise KeyboardInterrupt
 
-    for number in _SIGNALS:
-        signal.signal(number, interrupt)
+    signal.signal(signal.SIGINT, interrupt)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def cardbox_nodes() -> int:
 
 def cardbox() -> int:
     """Run the command ``cardbox``."""
-    interrupts.leave_at_once(interrupts.INTERRUPTED)
+    interrupts.leave_at_once()
     main = import_module("cardbox_tracker.commands.main").main
     interrupts.interrupt_commands()
     code: int = main()

@@ -1,18 +1,157 @@
-"""What all tests share."""
+"""What all tests share: two processes for a whole run, a ROS domain for each graph of nodes."""
 
 from __future__ import annotations
 
-import pytest
-from hypothesis import settings
+import contextlib
+import functools
+import importlib
+import itertools
+import os
+import signal
+import socket
+import warnings
+import zlib
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
 
+import pytest
+from hypothesis import HealthCheck, settings
+
+from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.precompile import compile_all
+
+with contextlib.suppress(ImportError), warnings.catch_warnings():
+    # What rclpy imports with the first message uses modules that Python has deprecated.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    importlib.import_module("lark")
 
 # How long an example takes says nothing of the program on a busy machine.
 settings.register_profile("untimed", deadline=None)
-settings.load_profile("untimed")
+settings.register_profile(
+    "long",
+    deadline=None,
+    max_examples=int(os.environ.get("RELIABILITY_EXAMPLES", "1")),
+    suppress_health_check=list(HealthCheck),
+    database=None,
+)
+settings.load_profile("long" if "RELIABILITY_EXAMPLES" in os.environ else "untimed")
+
+# A shell that starts a command in the background has it ignore Ctrl-C, and so would all it starts.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+PROCESSES = 2
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+# Above 101, domains collide with ephemeral ports.
+MOST_DOMAINS = 100
+
+# These take longest; begun first, none of them is left over at the end for one process alone.
+LONGEST = ("system", "estimation", "evaluation", "demo", "benchmarks", "recordings")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Divide a run of all files among processes; whoever names files or -n decides themselves.
+
+    Much of the time is spent waiting for nodes. Files stay whole, since their tests share graphs.
+    """
+    if (
+        config.pluginmanager.hasplugin("xdist")
+        and not hasattr(config, "workerinput")
+        and config.args_source == pytest.Config.ArgsSource.TESTPATHS
+        and config.option.numprocesses is None
+        and not config.option.usepdb
+    ):
+        config.option.numprocesses = PROCESSES
+        config.option.dist = "loadfile"
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the folders that take longest first."""
+
+    def rank(item: pytest.Item) -> int:
+        folder = item.path.relative_to(item.config.rootpath / "test").parts[0]
+        return LONGEST.index(folder) if folder in LONGEST else len(LONGEST)
+
+    if items and hasattr(items[0].config, "workerinput"):
+        items.sort(key=rank)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Note the promise that a test is of, and how many inputs it tried, for 'make reliability'."""
+    marker = item.get_closest_marker("promise")
+    if marker is None:
+        return (yield)
+    tried = itertools.count()
+    handle = getattr(getattr(item, "obj", None), "hypothesis", None)
+    if handle is not None:
+        inner = handle.inner_test
+
+        @functools.wraps(inner)
+        def counted(*given: Any, **named: Any) -> Any:
+            next(tried)
+            return inner(*given, **named)
+
+        handle.inner_test = counted
+    else:
+        next(tried)
+    try:
+        return (yield)
+    finally:
+        if handle is not None:
+            handle.inner_test = inner
+        item.user_properties.append(("promise", marker.args[0]))
+        item.user_properties.append(("tried", next(tried)))
+
+
+def _domains() -> Iterator[int]:
+    """Domains that no other process of this run has, nor any other run on this machine."""
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    share = MOST_DOMAINS // workers
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
+    for number in itertools.count(zlib.crc32(run.encode())):
+        domain = 1 + WORKER * share + number % share
+        if _is_free(domain):
+            yield domain
+
+
+def _is_free(domain: int) -> bool:
+    """Return whether no DDS participant has taken the domain's first port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return False
+    return True
+
+
+_DOMAINS = _domains()
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["ROS_DOMAIN_ID"] = str(next(_DOMAINS))
+
+
+@pytest.fixture
+def ros_domain() -> int:
+    """A ROS domain with nobody else in it."""
+    return next(_DOMAINS)
+
+
+@pytest.fixture(scope="session")
+def ros_domains() -> Iterator[int]:
+    """What gives further such domains."""
+    return _DOMAINS
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _compiled_kernels() -> None:
-    """Compile once, before nodes of several tests would do so at the same time."""
-    compile_all()
+    """Compile once, before nodes of several tests would do so at the same time.
+
+    It takes a minute where nothing is in the cache; each process begins with another preset and
+    finds the rest done by the other.
+    """
+    presets = deque(PRESETS)
+    presets.rotate(WORKER)
+    compile_all(tuple(presets))

@@ -15,7 +15,7 @@ from cardbox_tracker.body.person import Person
 from cardbox_tracker.body.placement import CAMERA_POSE, PLACEMENT, CameraPose, Placement
 from cardbox_tracker.body.posture import SIDE_TURNS
 from cardbox_tracker.body.sizes import SIZE_NAMES, FloatArray
-from cardbox_tracker.errors import BodyModelError
+from cardbox_tracker.errors import BodyModelError, quoted
 
 CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
@@ -53,13 +53,16 @@ class BodyModel:
     def __post_init__(self) -> None:
         """Check the words; the parts check themselves."""
         if self.side_turn not in SIDE_TURNS:
-            raise BodyModelError(f"side_turn is {self.side_turn!r}; expected one of {SIDE_TURNS}")
+            raise BodyModelError(
+                f"side_turn is {quoted(self.side_turn)}; expected one of {SIDE_TURNS}"
+            )
         if self.source not in SOURCES:
-            raise BodyModelError(f"source is {self.source!r}; expected one of {SOURCES}")
+            raise BodyModelError(f"source is {quoted(self.source)}; expected one of {SOURCES}")
         for name in self.unknown:
             if name not in (*PLACEMENT, *SIZE_NAMES):
                 raise BodyModelError(
-                    f"unknown names {name!r}; expected sizes, or any of {', '.join(PLACEMENT)}"
+                    f"unknown names {quoted(name)}; expected sizes, or any of "
+                    + ", ".join(PLACEMENT)
                 )
 
     @classmethod

@@ -6,18 +6,15 @@ The same text travels on the ``body_model`` topic, so a saved file and a message
 from __future__ import annotations
 
 import os
-import tempfile
 import textwrap
-from collections.abc import Hashable
-from pathlib import Path
 from typing import Any
-
-import yaml
 
 from cardbox_tracker.body.appearance import Appearance
 from cardbox_tracker.body.model import CONSTANTS, MEASURED, PROPORTIONS, BodyModel
 from cardbox_tracker.body.sizes import SIZE_NAMES, SIZES
-from cardbox_tracker.errors import BodyModelError
+from cardbox_tracker.errors import BodyModelError, CardboxError, cut, quoted
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
 FORMAT = "cardbox_body_model/1"
 _UNITS = {"length": "m", "angle": "rad"}
@@ -76,10 +73,8 @@ def loads_body_model(text: str, source: str = "body model") -> BodyModel:
         BodyModelError: the text is no body model; the error names the key at fault.
     """
     try:
-        data = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, ValueError) as error:  # such as of a date that no calendar has
-        raise BodyModelError(f"{source} is not valid YAML: {error}") from None
-    except BodyModelError as error:
+        data = parse_small_yaml(text)
+    except SmallYamlError as error:
         raise BodyModelError(f"{source}: {error}") from None
     try:
         return _from_mapping(data)
@@ -96,11 +91,10 @@ def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
         BodyModelError: the file cannot be read or is no body model.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        text = read_small_text(path)
+    except SmallYamlError as error:
         raise BodyModelError(
-            f"cannot read the body model {os.fspath(path)}: {reason}; give the file that "
+            f"cannot read the body model {os.fspath(path)}: {error}; give the file that "
             "'cardbox initialize' or the initializer node wrote"
         ) from None
     return loads_body_model(text, source=os.fspath(path))
@@ -112,36 +106,18 @@ def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
     Raises:
         BodyModelError: the file cannot be written.
     """
-    target = Path(path)
-    temporary = None
     try:
-        descriptor, temporary = tempfile.mkstemp(
-            dir=target.parent, prefix=f".{target.name}.", text=True
-        )
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
             file.write(dumps_body_model(model))
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, target)
+    except CardboxError as error:
+        raise BodyModelError(str(error)) from None
     except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
         raise BodyModelError(
-            f"cannot write the body model {target}: {error.strerror}; choose a folder that exists "
-            "and is writable"
+            f"cannot write {os.fspath(path)}: {error.strerror}; choose a folder that exists and is "
+            "writable"
         ) from None
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """A loader that refuses a key given twice, where YAML would silently keep the last one."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        keys = [key.value for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise BodyModelError(f"key '{key}' is given twice; keep one")
-        return super().construct_mapping(node, deep)
 
 
 def _from_mapping(data: object) -> BodyModel:
@@ -149,18 +125,23 @@ def _from_mapping(data: object) -> BodyModel:
         raise BodyModelError("expected a mapping with the keys " + ", ".join(_TOP_KEYS))
     _check_keys(data, _TOP_KEYS, "", optional=(_APPEARANCE, _SOURCE, _UNKNOWN))
     if data["format"] != FORMAT:
-        raise BodyModelError(f"format is {data['format']!r}; this version reads '{FORMAT}'")
+        raise BodyModelError(f"format is {quoted(data['format'])}; this version reads '{FORMAT}'")
     if not isinstance(data["units"], dict):
-        raise BodyModelError(f"units is {data['units']!r}; expected {{length: m, angle: rad}}")
+        raise BodyModelError(
+            f"units is {quoted(data['units'])}; expected {{length: m, angle: rad}}"
+        )
     _check_keys(data["units"], tuple(_UNITS), "units.")
     for kind, unit in _UNITS.items():
         if data["units"][kind] != unit:
             raise BodyModelError(
-                f"units.{kind} is {data['units'][kind]!r}; expected '{unit}': convert the values"
+                f"units.{kind} is {quoted(data['units'][kind])}; expected '{unit}': convert the "
+                "values"
             )
     sizes = data["sizes"]
     if not isinstance(sizes, dict):
-        raise BodyModelError(f"sizes is {sizes!r}; expected a mapping of the {len(SIZES)} sizes")
+        raise BodyModelError(
+            f"sizes is {quoted(sizes)}; expected a mapping of the {len(SIZES)} sizes"
+        )
     _check_keys(sizes, SIZE_NAMES, "sizes.")
     return BodyModel.of(
         sizes=[_number(sizes[name], f"sizes.{name}") for name in SIZE_NAMES],  # type: ignore[arg-type]
@@ -195,7 +176,9 @@ def _check_keys(
     known = (*expected, *optional)
     for key in mapping:
         if key not in known:
-            raise BodyModelError(f"unknown key '{prefix}{key}'; known are {', '.join(known)}")
+            raise BodyModelError(
+                f"unknown key '{prefix}{cut(str(key), 60)}'; known are {', '.join(known)}"
+            )
     for key in expected:
         if key not in mapping:
             raise BodyModelError(f"missing key '{prefix}{key}'")
@@ -204,7 +187,8 @@ def _check_keys(
 def _number(value: object, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise BodyModelError(
-            f"'{key}' is {value!r}; expected a plain number in the unit of the file, such as 0.27"
+            f"'{key}' is {quoted(value)}; expected a plain number in the unit of the file, such as "
+            "0.27"
         )
     try:
         return float(value)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
+    from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 
 def add_recording(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +22,12 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
         metavar="T0:T1",
         help="seconds during which nobody is in view",
     )
+
+
+def print_remarks(source: SilhouetteSource) -> None:
+    """Tell what is odd about a recording on the standard error."""
+    for remark in source.remarks:
+        print(f"cardbox: {remark}", file=sys.stderr)
 
 
 def add_preset(parser: argparse.ArgumentParser, default: str) -> None:

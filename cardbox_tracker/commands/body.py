@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_camera_pitch
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "body"
 HELP = "make a body model from a person's stature, without a recording"
@@ -49,17 +50,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
     )
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
     """Write the body model and print its sizes.
 
     Raises:
-        CardboxError: a number is impossible, or the model cannot be written.
+        CardboxError: a number is impossible, or the model exists or cannot be written.
     """
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.body.proportions import body_from_proportions
 
+    check_outputs((options.output,), options.force)
     body = body_from_proportions(
         options.stature,
         options.distance,

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
     )
-    add_preset(parser, "paper")
+    add_preset(parser, "default")
     add_seed(parser, "the recording and the filters")
 
 

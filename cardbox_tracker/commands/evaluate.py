@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     run_count,
     seed_count,
 )
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "evaluate"
 HELP = "repeat the paper's experiments, or compare recorded sessions with their truth"
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="processes; without it, one per core",
     )
     add_seed(parser, "recordings and filters")
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -75,6 +77,10 @@ def run(options: argparse.Namespace) -> None:
     Raises:
         CardboxError: a session cannot be read, or the results cannot be written.
     """
+    name = "sessions.md" if options.sessions else "report.md"
+    inputs = options.sessions or ([options.session] if options.session else [])
+    check_outputs((), options.force, inputs=inputs, results=(options.output / name,))
+
     from cardbox_tracker.evaluation.paper.evaluate import evaluate
     from cardbox_tracker.evaluation.paper.runner import default_jobs
 

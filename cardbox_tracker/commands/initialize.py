@@ -6,8 +6,14 @@ import argparse
 import math
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_pitch, add_recording, add_seed, span
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.commands.arguments import (
+    add_camera_pitch,
+    add_recording,
+    add_seed,
+    print_remarks,
+    span,
+)
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
@@ -51,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
     )
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -77,20 +84,13 @@ def run(options: argparse.Namespace) -> None:
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    _check_folder(options.output)
+    check_outputs((options.output,), options.force, inputs=(options.recording,))
     spans = {name: getattr(options, name) for name in _REFERENCES}
     with BagReader(options.recording) as bag:
         source = SilhouetteSource(bag, options.background)
         with progress_bar("initialize") as show:
             result = initialize_from_recording(source, spans, config, show)
+    print_remarks(source)
     save_body_model(result.body, options.output)
     print(describe(result))
     print(f"wrote {options.output}")
-
-
-def _check_folder(output: Path) -> None:
-    """Refuse an output that cannot be written before a minute of work, not after it."""
-    folder = output.parent
-    if not folder.is_dir():
-        reason = "Not a directory" if folder.exists() else "No such file or directory"
-        raise CardboxError(f"cannot write {output}: {reason}; choose a folder that exists")

@@ -20,6 +20,7 @@ from cardbox_tracker.commands import (
     urdf,
 )
 from cardbox_tracker.commands.command import Command
+from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.interrupts import INTERRUPTED, were_received
 
@@ -63,15 +64,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     try:
-        parser = build_parser(words)
-        if name in RETIRED:
-            parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
-        options = parser.parse_args(words)
-        options.run(options)
-        sys.stdout.flush()
+        with ended_by_signals():
+            parser = build_parser(words)
+            if name in RETIRED:
+                parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
+            options = parser.parse_args(words)
+            options.run(options)
+            sys.stdout.flush()
     except CardboxError as error:
         print(f"cardbox {name}: {error}", file=sys.stderr)
         return 1
+    except Terminated as end:
+        print(f"cardbox {name}: terminated", file=sys.stderr)
+        return 128 + end.signal
     except KeyboardInterrupt:
         return _interrupted(name)
     except BrokenPipeError:

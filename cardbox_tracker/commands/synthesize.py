@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import add_seed
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "synthesize"
 HELP = "record a synthetic person, with ground truth"
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="BAG",
-        help="recording to write; must not exist",
+        help="recording to write",
     )
     add_seed(parser, "noise and sway")
     parser.add_argument(
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--compressed", action="store_true", help="write JPEG images instead of raw ones"
     )
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -43,6 +45,7 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.simulation.session import synthesize_session
 
+    check_outputs((), options.force, results=(options.output,))
     with progress_bar("synthesize") as show:
         synthesize_session(
             options.output,
@@ -50,6 +53,7 @@ def run(options: argparse.Namespace) -> None:
             seed=options.seed,
             storage=options.storage,
             compressed=options.compressed,
+            overwrite=options.force,
             progress=show,
         )
     print(f"wrote {options.output}")

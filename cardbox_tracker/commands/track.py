@@ -12,8 +12,10 @@ from cardbox_tracker.commands.arguments import (
     add_recording,
     add_seed,
     particle_count,
+    print_remarks,
     time,
 )
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
@@ -71,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
     )
     add_seed(parser, "the filters")
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -87,6 +90,12 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource
     from cardbox_tracker.recordings.track import track_recording
 
+    check_outputs(
+        (options.csv, options.video),
+        options.force,
+        inputs=(options.recording, options.model),
+        results=() if options.bag is None else (options.bag,),
+    )
     body = load_body_model(options.model)
     if body.doubt:
         print(f"{options.model}: {body.doubt}")
@@ -95,7 +104,7 @@ def run(options: argparse.Namespace) -> None:
         source = SilhouetteSource(bag, options.background)
         total_s = max(1e-9, bag.duration_s - options.start)
         with (
-            ResultBag(options.bag, source.frame_id) as results,
+            ResultBag(options.bag, source.frame_id, options.force) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(
@@ -116,6 +125,7 @@ def run(options: argparse.Namespace) -> None:
         f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
+    print_remarks(source)
     for path in (options.csv, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")

@@ -17,11 +17,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.person_figure import Figure, FigureDrawer, Mask
 from cardbox_tracker.estimation.still_things import CHANGED, SAME, THING, StillThings
 from cardbox_tracker.vision.camera import Camera

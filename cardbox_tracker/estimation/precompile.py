@@ -5,6 +5,8 @@ Installation, the tests and the tracker's node do so before their work begins.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
@@ -19,21 +21,21 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 
-def compile_all() -> None:
-    """Follow a drawn person with each preset, so that all compiled code was run once."""
+def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
+    """Follow a drawn person with each of ``presets``, so that all their code was run once."""
     background.warm_up()
     person_region.warm_up()
     body = BodyModel()
     camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
-    for make_config in PRESETS.values():
+    for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.
         for shape in (silhouette.shape, (*silhouette.shape, 3)):
             channels = shape[2] if len(shape) == 3 else 1
             looks = Appearance(
                 np.zeros((len(PARTS), bins_of(channels)), np.uint8), np.full(channels, 128.0)
             )
-            config = make_config().with_particles(2)
+            config = PRESETS[name]().with_particles(2)
             tracker = Tracker(body.with_values(appearance=looks), camera, config)
             for _ in range(2):
                 tracker.track(silhouette, np.full(shape, 128, np.uint8))

@@ -8,8 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from cardbox_tracker.compiling import njit
 
 ImageArray = NDArray[np.uint8]
 

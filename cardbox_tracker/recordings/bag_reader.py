@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.errors import BagError, cut
+from cardbox_tracker.recordings.bag_limits import check_sizes
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.encodings import (
@@ -47,10 +48,12 @@ class BagImage:
     Attributes:
         stamp_ns: the stamp in its header.
         frame_id: the frame in its header.
+        time_ns: when it was recorded.
     """
 
     stamp_ns: int
     frame_id: str
+    time_ns: int
     _decode: Callable[[bool | None], NDArray[np.uint8]]
 
     @property
@@ -90,6 +93,8 @@ class BagReader:
         path = self.path
         if not path.exists():
             raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
+        if not path.is_dir() and not path.is_file():
+            raise BagError(f"{path} is no recording but a pipe or a device; give a folder or file")
         if path.is_dir() and not (path / "metadata.yaml").exists():
             files = [f for f in sorted(path.iterdir()) if f.suffix in _FILE_ENDINGS]
             if (path / "bag" / "metadata.yaml").exists():
@@ -101,6 +106,7 @@ class BagReader:
                     f"{path} is not a rosbag2 recording (it has no metadata.yaml); give the folder "
                     "that 'ros2 bag record' or 'cardbox synthesize' made"
                 )
+        check_sizes(path)
         try:
             store = get_typestore(Stores.ROS2_JAZZY)
             self._reader = AnyReader([path], default_typestore=store)
@@ -199,7 +205,8 @@ class BagReader:
         """Return the message as an object with the fields of its type."""
         try:
             return self._open.deserialize(message.raw, message.msgtype)
-        except AnyReaderError as error:
+        except Exception as error:
+            # As on opening.
             raise self._damaged(error) from None
 
     def _damaged(self, error: Exception) -> BagError:
@@ -214,10 +221,14 @@ class BagReader:
         """Yield the images of ``topic``, or of the only image topic, in order."""
         for message in self.messages([topic or self.image_topic()]):
             image = self.deserialize(message)
-            stamp = image.header.stamp
-            yield BagImage(
-                stamp.sec * 10**9 + stamp.nanosec, image.header.frame_id, _decoder(image)
-            )
+            try:
+                header, decode = image.header, _decoder(image)
+                stamp_ns = int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
+                found = BagImage(stamp_ns, str(header.frame_id), message.time_ns, decode)
+            except (AttributeError, TypeError, ValueError) as error:
+                # Recordings bring definitions of their types along.
+                raise self._damaged(error) from None
+            yield found
 
     def calibration(self) -> Calibration:
         """Return what the recording's first CameraInfo says.
@@ -228,19 +239,27 @@ class BagReader:
         """
         topic = self.camera_info_topic()
         for message in self.messages([topic]):
-            return calibration_from_info(self.deserialize(message), self.image_topic(), topic)
+            info = self.deserialize(message)
+            try:
+                return calibration_from_info(info, self.image_topic(), topic)
+            except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
+                raise self._damaged(error) from None
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
 
 
 def _reason(error: Exception) -> str:
-    return str(error) or type(error).__name__
+    return cut(str(error)) or type(error).__name__
 
 
 def _decoder(image: Any) -> Callable[[bool | None], NDArray[np.uint8]]:
     decoders = {True: decode_grey, False: decode_bgr, None: decode_as_sent}
+    fields = ("data", "height", "width", "step", "encoding", "is_bigendian")
+    is_compressed = not hasattr(image, "encoding")
+    for name in ("data",) if is_compressed else fields:
+        getattr(image, name)
 
     def decode(grey: bool | None) -> NDArray[np.uint8]:
-        if not hasattr(image, "encoding"):
+        if is_compressed:
             return decode_compressed(image.data, grey)
         return decoders[grey](
             image.data,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,7 +23,8 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.files import claimed_name
 from cardbox_tracker.vision.camera import Camera
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
@@ -66,7 +66,7 @@ class BagWriter:
         Raises:
             BagError: the storage is unknown, or something is in the way.
         """
-        self.path = Path(path)
+        self.path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if storage not in STORAGES:
             raise BagError(f"storage '{storage}' is unknown; expected {' or '.join(STORAGES)}")
         is_free = not self.path.exists() or (self.path.is_dir() and not any(self.path.iterdir()))
@@ -86,15 +86,12 @@ class BagWriter:
         Raises:
             BagError: the target's folder cannot be written.
         """
+        self._resources = ExitStack()
         try:
-            self._folder = Path(
-                tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent)
-            )
-        except OSError as error:
-            raise BagError(
-                f"cannot write the recording {self.path}: {error.strerror}; choose a folder that "
-                "exists and is writable"
-            ) from None
+            claim = claimed_name(self.path, is_folder=True)
+            self._folder = self._resources.enter_context(claim)
+        except CardboxError as error:
+            raise BagError(str(error)) from None
         self._writer = Writer(
             self._folder / self.path.name, version=9, storage_plugin=self._storage
         )
@@ -115,14 +112,13 @@ class BagWriter:
         trace: TracebackType | None,
     ) -> None:
         """Move the recording to its place, or remove it after an error."""
-        try:
+        with self._resources:
             self._writer.close()
             if kind is None:
                 if self.path.exists():
-                    shutil.rmtree(self.path)
+                    # It is removed with what else is temporary.
+                    os.replace(self.path, self._folder / "replaced recording")
                 os.replace(self.folder, self.path)
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
 
     def type(self, name: str) -> Any:
         """Return the message class of ``name``, such as ``std_msgs/msg/String``."""

@@ -21,9 +21,14 @@ _LATCHED = ("/body_model", "/robot_description")
 class ResultBag:
     """Context that collects estimates in a bag; without a path it does nothing."""
 
-    def __init__(self, path: Path | None, frame_id: str) -> None:
-        """Set up; the file is opened on entry and appears, whole, on exit."""
-        self._writer = None if path is None else BagWriter(path, compress=True, latched=_LATCHED)
+    def __init__(self, path: Path | None, frame_id: str, overwrite: bool = False) -> None:
+        """Set up; the file is opened on entry and appears, whole, on exit.
+
+        With ``overwrite`` a recording of that name is replaced.
+        """
+        self._writer = None
+        if path is not None:
+            self._writer = BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
         self._frame_id = frame_id
         self._described: BodyModel | None = None
         self._outputs = OutputStream()

@@ -8,12 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.vision.background import BackgroundConfig, brightness_of
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
+
+# Longer than any image is on its way.
+_OTHER_CLOCK_NS = 10_000_000_000
 
 
 class TimeSpan(NamedTuple):
@@ -96,6 +99,8 @@ class SilhouetteSource:
             CameraError: the recording's camera is not calibrated.
         """
         self._bag = bag
+        self._broken: dict[int, str] = {}
+        self._clock_ns = 0
         calibration = bag.calibration()
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
@@ -110,6 +115,7 @@ class SilhouetteSource:
             raise BagError(
                 f"{count} images lie in the background span {background} s of a bag of "
                 f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
+                + "".join(f" ({remark})" for remark in self.remarks)
             )
         self._pipeline.finish_learning()
 
@@ -138,7 +144,33 @@ class SilhouetteSource:
             )
         return found
 
+    @property
+    def remarks(self) -> list[str]:
+        """What is odd about the images read so far."""
+        remarks = []
+        if self._clock_ns:
+            remarks.append(
+                f"the images' stamps are {abs(self._clock_ns) / 1e9:.0f} s "
+                f"{'behind' if self._clock_ns > 0 else 'ahead of'} the recording's clock; seconds "
+                "count from its start all the same"
+            )
+        if self._broken:
+            number, reason = next(iter(self._broken.items()))
+            remarks.append(
+                f"{len(self._broken)} images cannot be decoded and are left out, the first of them "
+                f"number {number}: {reason}"
+            )
+        return remarks
+
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
-        for image in self._bag.images():
-            prepared = self._pipeline.prepare(image.as_sent)
-            yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, prepared
+        for number, image in enumerate(self._bag.images(), 1):
+            if number == 1:
+                late_ns = image.time_ns - image.stamp_ns
+                self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0
+            try:
+                prepared = self._pipeline.prepare(image.as_sent)
+            except EncodingError as error:
+                self._broken[number] = str(error)
+                continue
+            time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
+            yield image.stamp_ns, time_ns / 1e9, prepared

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import CameraError
+from cardbox_tracker.errors import CameraError, cut, quoted
+from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_problem
 
 FloatArray = NDArray[np.float64]
+
 
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 
@@ -186,7 +186,7 @@ class Calibration:
             )
         if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
             raise CameraError(
-                f"distortion model '{self.distortion_model}' is unknown; supported are "
+                f"distortion model {quoted(self.distortion_model)} is unknown; supported are "
                 f"{', '.join(DISTORTION_MODELS)}: calibrate with one of those, or feed "
                 "rectified images with all-zero distortion"
             )
@@ -223,15 +223,16 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     """
     name = os.fspath(path)
     try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        text = read_small_text(path)
+    except SmallYamlError as error:
         raise CameraError(
-            f"cannot read the calibration {name}: {reason}; give a YAML file as "
+            f"cannot read the calibration {name}: {error}; give a YAML file as "
             "camera_calibration writes it"
         ) from None
-    except (yaml.YAMLError, ValueError) as error:  # such as of a date that no calendar has
-        raise CameraError(f"calibration {name} is not valid YAML: {error}") from None
+    try:
+        data = parse_small_yaml(text)
+    except SmallYamlError as error:
+        raise CameraError(f"calibration {name}: {error}") from None
     if not isinstance(data, dict):
         raise CameraError(f"calibration {name}: expected a mapping as camera_calibration writes it")
     try:
@@ -250,7 +251,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             "writes it"
         ) from None
     except (TypeError, ValueError, OverflowError) as error:
-        raise CameraError(f"calibration {name}: malformed value: {error}") from None
+        raise CameraError(f"calibration {name}: malformed value: {cut(str(error))}") from None
     try:
         calibration.camera(calibration.width, calibration.height)
     except CameraError as error:

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]

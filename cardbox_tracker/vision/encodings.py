@@ -14,9 +14,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.errors import EncodingError, quoted
+from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 
 ImageArray = NDArray[np.uint8]
+
+MOST_PIXELS = 2**25
+"""A little more than 8K video has; images with more are refused before memory is taken for them."""
 
 
 class _Encoding(NamedTuple):
@@ -81,28 +85,40 @@ def decode_bgr(
 
 
 def decode_as_sent(
-    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
+    data: Any,
+    height: int,
+    width: int,
+    step: int,
+    encoding: str,
+    is_bigendian: bool = False,
+    most_pixels: float = MOST_PIXELS,
 ) -> ImageArray:
     """Return (H, W, 3) bgr of an image with colours, (H, W) of one without: see the two above.
 
     Raises:
-        EncodingError: the encoding is not supported, or the bytes do not fit it.
+        EncodingError: the encoding is not supported, the bytes do not fit it, or the image has more
+            than ``most_pixels``.
     """
+    check_pixels(width, height, most_pixels)
     decode = decode_grey if encoding.startswith("mono") else decode_bgr
     return decode(data, height, width, step, encoding, is_bigendian)
 
 
-def decode_compressed(data: Any, grey: bool | None = True) -> ImageArray:
+def decode_compressed(
+    data: Any, grey: bool | None = True, most_pixels: float = MOST_PIXELS
+) -> ImageArray:
     """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
 
     Args:
         data: its bytes.
         grey: True for brightness, False for colours, None for what the image has.
+        most_pixels: larger images are refused, before memory is taken for them.
 
     Raises:
-        EncodingError: the bytes cannot be decoded as an image.
+        EncodingError: the bytes cannot be decoded as an image, or it is too large.
     """
     raw = np.frombuffer(data, np.uint8)
+    check_pixels(*compressed_size(raw.tobytes()), most_pixels)
     flag = {True: cv2.IMREAD_GRAYSCALE, False: cv2.IMREAD_COLOR, None: cv2.IMREAD_ANYCOLOR}[grey]
     try:
         image = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
@@ -128,10 +144,11 @@ def _pixels(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
 ) -> tuple[ImageArray, _Encoding]:
     """The image as an array in its own layout, and what its encoding is."""
+    check_pixels(width, height, MOST_PIXELS)
     kind = _ENCODINGS.get(encoding)
     if kind is None:
         raise EncodingError(
-            f"encoding '{encoding}' is not supported; supported are "
+            f"encoding {quoted(encoding)} is not supported; supported are "
             f"{', '.join(SUPPORTED_ENCODINGS)}: set the camera driver to one of them"
         )
     row_bytes = width * kind.bytes_per_pixel

@@ -128,7 +128,7 @@ FOREARM = "forearm_length:"
         ("\x00", "is not valid YAML"),
         ("", "expected a mapping"),
         ("- 1\n- 2\n", "expected a mapping"),
-        ("!!python/object/apply:os.getcwd []", "is not valid YAML"),
+        ("!!python/object/apply:os.getcwd []", "it has the tag 'tag:yaml.org,2002:python/"),
         ("{}", "missing key 'format'"),
     ],
 )

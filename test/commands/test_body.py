@@ -43,3 +43,15 @@ def test_impossible_numbers_are_refused(
     done = cardbox("body", *words, "--output", tmp_path / "me.yaml")
     done.assert_refused("body", text)
     assert not (tmp_path / "me.yaml").exists()
+
+
+def test_a_model_that_exists_is_kept_without_force(
+    cardbox: Callable[..., Any], tmp_path: Path
+) -> None:
+    model = tmp_path / "me.yaml"
+    words = ("body", "--stature", 1.8, "--output", model)
+    assert cardbox(*words).code == 0
+    written = model.read_bytes()
+    cardbox(*words[:2], 1.7, *words[3:]).assert_refused("body", "me.yaml exists")
+    assert model.read_bytes() == written
+    assert cardbox(*words, "--force").code == 0

@@ -26,9 +26,11 @@ SPAN = "expected T0:T1, seconds from the start of the recording"
         (("--front", "90:99"), "no image lies in the front span 90:99 s of a bag of"),
         (("--front", "0:3"), "reference 'front': nobody is in the image"),
         (("--side", "6.6:8"), "'front' and 'side' are too alike"),
+        (("--output", "FOLDER/text.txt"), "text.txt exists; choose another name, or give"),
+        (("--output", "FOLDER/session/session.mcap"), "session.mcap: it is read, as"),
         (("--output", "FOLDER/missing/new.yaml"), "No such file or directory; choose a folder"),
         (("--output", "FOLDER/text.txt/new.yaml"), "Not a directory; choose a folder"),
-        (("--output", "FOLDER/empty folder"), "cannot write the body model"),
+        (("--output", "FOLDER/empty folder"), "it is a folder; give the name of a file"),
     ],
 )
 def test_mistakes_of_initialize(

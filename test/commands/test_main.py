@@ -18,7 +18,7 @@ from cardbox_tracker.commands.main import COMMANDS, RETIRED, build_parser
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
-SHARED = {"__init__", "arguments", "command", "main"}
+SHARED = {"output_paths", "signals", "__init__", "arguments", "command", "main"}
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
@@ -140,7 +140,7 @@ def test_a_full_disk_is_told_in_words(
     ("words", "expected"),
     [
         (("synthesize", "--motion", "dance", "--output", "FOLDER/new"), "'dance' is unknown"),
-        (("synthesize", "--output", "FOLDER/session"), "is a recording already"),
+        (("synthesize", "--output", "FOLDER/session"), "session exists; choose another name"),
         (("synthesize", "--output", "FOLDER/missing/new"), "No such file or directory"),
         (("synthesize", "--output", "FOLDER/text.txt/new"), "Not a directory"),
         (("synthesize", "--storage", "tape", "--output", "FOLDER/new"), "invalid choice: 'tape'"),

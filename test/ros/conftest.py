@@ -1,24 +1,11 @@
-"""One ROS context a test, on a domain of its own."""
+"""One ROS context a test."""
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import os
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-
-with contextlib.suppress(ImportError), warnings.catch_warnings():
-    # What rclpy imports with the first message uses modules that Python has deprecated.
-    warnings.simplefilter("ignore", DeprecationWarning)
-    importlib.import_module("lark")
-
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-# Below 102: higher domains collide with ephemeral ports.
-os.environ["ROS_DOMAIN_ID"] = str(20 + os.getpid() % 80)
 
 
 @pytest.fixture

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib
 import itertools
 import os
 import signal
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,13 +22,6 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
-with contextlib.suppress(ImportError), warnings.catch_warnings():
-    # What rclpy imports with the first message uses modules that Python has deprecated.
-    warnings.simplefilter("ignore", DeprecationWarning)
-    importlib.import_module("lark")
-
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-_DOMAINS = itertools.count(os.getpid())
 # A limit for what hangs, not for what is slow.
 WAIT_S = 90.0
 STOP_S = 30.0
@@ -100,12 +90,12 @@ class Process:
 class Graph:
     """The nodes under test and one node of ours that talks to them."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, domain: int) -> None:
         import rclpy
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
 
-        self.domain = 1 + next(_DOMAINS) % 100
+        self.domain = domain
         self.folder = folder
         self.context = Context()
         rclpy.init(context=self.context, domain_id=self.domain)
@@ -200,20 +190,22 @@ class Graph:
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+def graph(tmp_path_factory: pytest.TempPathFactory, ros_domains: Iterator[int]) -> Iterator[Graph]:
     """A graph that the tests of a module share."""
-    yield from _graph(tmp_path_factory)
+    yield from _graph(tmp_path_factory, ros_domains)
 
 
 @pytest.fixture
-def own_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+def own_graph(
+    tmp_path_factory: pytest.TempPathFactory, ros_domains: Iterator[int]
+) -> Iterator[Graph]:
     """A graph of one test; what the test started is gone before the next one begins."""
-    yield from _graph(tmp_path_factory)
+    yield from _graph(tmp_path_factory, ros_domains)
 
 
-def _graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
+def _graph(tmp_path_factory: pytest.TempPathFactory, ros_domains: Iterator[int]) -> Iterator[Graph]:
     pytest.importorskip("rclpy", reason="rclpy is not installed")
-    made = Graph(tmp_path_factory.mktemp("graph"))
+    made = Graph(tmp_path_factory.mktemp("graph"), next(ros_domains))
     yield made
     made.close()
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -11,8 +9,8 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from cardbox_tracker.benchmarks import nodes as benchmark_nodes
 
 
-def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch, ros_domain: int) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "")
     monkeypatch.setattr(benchmark_nodes, "RATES_HZ", (15,))
     monkeypatch.setattr(benchmark_nodes, "STREAMS", benchmark_nodes.STREAMS[:1])

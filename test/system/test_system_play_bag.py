@@ -14,7 +14,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
-from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
+from cardbox_tracker.recordings.bag_writer import STORAGES, BagWriter  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
@@ -23,10 +23,20 @@ PERIOD_NS = 50_000_000
 COUNT = 40
 
 
-@pytest.fixture(scope="module", params=["mcap", "sqlite3"])
-def bag(request: pytest.FixtureRequest, scene: Any, tmp_path_factory: Any) -> Path:
-    path = Path(tmp_path_factory.mktemp("bags")) / f"bag_{request.param}"
-    with BagWriter(path, storage=request.param) as writer:
+@pytest.fixture(scope="module")
+def bags(scene: Any, tmp_path_factory: Any) -> dict[str, Path]:
+    """The same recording in each storage."""
+    folder = Path(tmp_path_factory.mktemp("bags"))
+    return {storage: written(folder / storage, storage, scene) for storage in STORAGES}
+
+
+@pytest.fixture(scope="module")
+def bag(bags: dict[str, Path]) -> Path:
+    return bags["mcap"]
+
+
+def written(path: Path, storage: str, scene: Any) -> Path:
+    with BagWriter(path, storage=storage) as writer:
         for number in range(COUNT):
             now_ns = START_NS + number * PERIOD_NS
             writer.write_camera_info("/camera_info", now_ns, "optical", scene.camera)
@@ -40,7 +50,11 @@ def ended(graph: Any, process: Any) -> int:
     return int(process.process.returncode)
 
 
-def test_every_message_comes_with_its_stamp_in_order(graph: Any, bag: Path) -> None:
+@pytest.mark.parametrize("storage", STORAGES)
+def test_every_message_comes_with_its_stamp_in_order(
+    graph: Any, bags: dict[str, Path], storage: str
+) -> None:
+    bag = bags[storage]
     images = graph.collect(Image, "image_raw", qos.REPLAY)
     infos = graph.collect(CameraInfo, "camera_info", qos.REPLAY)
     started = time.monotonic()

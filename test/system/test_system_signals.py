@@ -58,5 +58,6 @@ def test_a_command_that_is_starting_ends(number: int, delay_s: float, tmp_path: 
     arguments = ["synthesize", "--motion", "wave", "--output", str(tmp_path / "bag")]
     code, said = end_early("cardbox", arguments, number, delay_s)
     assert "Traceback" not in said and "Exception" not in said, said
-    assert code == 130
+    # Before the command has begun, SIGTERM ends it as any process.
+    assert code in ((130,) if number == signal.SIGINT else (143, -15))
     assert not (tmp_path / "bag").exists()

@@ -12,8 +12,8 @@ from math import acos, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
 
 # The forearm's patch: where it begins and ends, as fractions of elbow to fist (then comes the

@@ -35,9 +35,9 @@ from math import cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.vision.rasterisation import (
     CROSSING_BITS,

@@ -18,9 +18,9 @@ from math import cos, exp, log, sin
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import njit
 
 FLOOR_NATS = 8.0
 """About what a posture costs that was nowhere in the motion capture; none is impossible, so an arm

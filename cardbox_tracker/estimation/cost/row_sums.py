@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from cardbox_tracker.compiling import njit
 
 RowSums = NDArray[np.signedinteger[Any]]
 """Shape (rows, W + 1), of 16 bits where the image is narrow enough, else of 32."""

@@ -23,8 +23,8 @@ from math import acos, asin, atan2, cos, exp, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import (
     Floats,
     Place,

@@ -6,7 +6,8 @@ from math import exp, sqrt
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from cardbox_tracker.compiling import njit
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 

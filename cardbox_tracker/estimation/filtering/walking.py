@@ -18,12 +18,16 @@ _ASIDE_RAD = radians(80.0)
 
 
 class Walk:
-    """The way across the image that somebody made lately, towards positive ``torso_y``, metres."""
+    """Follows somebody across the image.
+
+    Attributes:
+        way_m: the way made lately, towards positive ``torso_y``, metres.
+    """
 
     def __init__(self) -> None:
         """Begin with somebody of whom nothing is known."""
         self._sight: float | None = None
-        self._way_m = 0.0
+        self.way_m = 0.0
 
     def see(self, silhouette: Silhouette, sight: float, ahead_m: float) -> float:
         """Take the next silhouette (H, W), whose middle is at ``sight``, aside over ahead.
@@ -41,16 +45,16 @@ class Walk:
         if self._sight is None:
             step_m = 0.0
             left, right = (bool(silhouette[:, edge].any()) for edge in (0, -1))
-            self._way_m = _WAY_M * (left - right)
+            self.way_m = _WAY_M * (left - right)
         else:
             step_m = (sight - self._sight) * ahead_m
-            way_m = (1.0 - _FORGOTTEN) * self._way_m + step_m
-            self._way_m = min(max(way_m, -_WAY_M), _WAY_M)
+            way_m = (1.0 - _FORGOTTEN) * self.way_m + step_m
+            self.way_m = min(max(way_m, -_WAY_M), _WAY_M)
         self._sight = sight
         return step_m
 
     @property
     def yaw_rad(self) -> float:
         """Yaw of the torso that the way suggests: 0 unless somebody walks."""
-        walking = max(0.0, 2.0 * abs(self._way_m) / _WAY_M - 1.0)
-        return copysign(_ASIDE_RAD * walking, self._way_m)
+        walking = max(0.0, 2.0 * abs(self.way_m) / _WAY_M - 1.0)
+        return copysign(_ASIDE_RAD * walking, self.way_m)

@@ -151,7 +151,7 @@ class WholeBodyConfig:
         0.5, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
     )
     lost_from: float = setting(
-        0.9,
+        0.95,
         "chance of loss above which a frame counts for lost_frames; 1: never",
         limits=(0.0, 1.0),
         restarts=True,

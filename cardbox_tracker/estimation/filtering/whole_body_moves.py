@@ -12,9 +12,9 @@ from math import cos, exp, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats, Place, PlaceTuple, View, ViewTuple
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.cost.whole_body_kernels import (

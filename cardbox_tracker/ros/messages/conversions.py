@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from cardbox_tracker.errors import CameraError, EncodingError
+from cardbox_tracker.errors import CameraError, EncodingError, quoted
 from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.camera_checks import matrix_problem
-from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed
+from cardbox_tracker.vision.encodings import MOST_PIXELS, decode_as_sent, decode_compressed
 
 ImageArray = NDArray[np.uint8]
+
+# As much as the parameters of the background node allow.
+_MOST_WORKING_PIXELS = 4096 * 4096
 
 
 def stamp_ns(stamp: Time) -> int:
@@ -28,14 +31,15 @@ def stamp_ns(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def image_of(message: Image | CompressedImage) -> ImageArray:
+def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS) -> ImageArray:
     """Return an image message as (H, W, 3) bgr, or as (H, W) if it has no colours.
 
     Raises:
-        EncodingError: the encoding is not supported or the bytes do not match it.
+        EncodingError: the encoding is not supported, the bytes do not match it, or the image has
+            more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, grey=None)
+        return decode_compressed(message.data, None, most_pixels)
     return decode_as_sent(
         message.data,
         message.height,
@@ -43,7 +47,16 @@ def image_of(message: Image | CompressedImage) -> ImageArray:
         message.step,
         message.encoding,
         bool(message.is_bigendian),
+        most_pixels,
     )
+
+
+def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:
+    """Return how many pixels an image of that camera may have.
+
+    A camera may deliver more than it was calibrated at, but not sixteen times as much.
+    """
+    return min(1e6 * most_megapixels, 16.0 * calibration.width * calibration.height)
 
 
 def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:
@@ -74,8 +87,8 @@ def silhouette_of(message: Image) -> ImageArray:
     """
     if message.encoding not in ("mono8", "8UC1"):
         raise EncodingError(
-            f"the silhouette has encoding '{message.encoding}'; expected mono8 with 0 for the "
-            "background and 255 for the person, as the background node publishes it"
+            f"the silhouette has encoding {quoted(message.encoding)}; expected mono8 with 0 for "
+            "the background and 255 for the person, as the background node publishes it"
         )
     data = np.frombuffer(message.data, dtype=np.uint8)
     height, width, step = message.height, message.width, message.step
@@ -168,7 +181,13 @@ def camera_of(message: CameraInfo) -> Camera:
         CameraError: it has no size, no camera has such a matrix, or the image is distorted.
     """
     k = message.k
-    if not (message.width and message.height):
+    pixels = message.width * message.height
+    if pixels > _MOST_WORKING_PIXELS:
+        raise CameraError(
+            f"the silhouette's CameraInfo is for {message.width}x{message.height} px; expected a "
+            "working size of at most 4096x4096: set width and height of the background node"
+        )
+    if pixels == 0:
         problem = f"is for an image of {message.width}x{message.height}"
     else:
         problem = matrix_problem(np.array(k).reshape(3, 3), message.width, message.height)

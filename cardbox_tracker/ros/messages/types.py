@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import re
 from typing import Any
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.errors import BagError, cut, quoted
+
+_TYPE = re.compile(r"([a-z][a-z0-9_]{0,99})/msg/([A-Z][A-Za-z0-9]{0,99})")
 
 
 def message_class(topic: str, kind: str) -> Any:
@@ -14,7 +17,13 @@ def message_class(topic: str, kind: str) -> Any:
     Raises:
         BagError: it is not installed; the text names ``topic``.
     """
-    package, _, name = kind.split("/")
+    parts = _TYPE.fullmatch(kind)
+    if parts is None:
+        raise BagError(
+            f"topic {cut(topic)} has the type {quoted(kind)}; expected one such as "
+            "sensor_msgs/msg/Image: play other topics with --topics"
+        )
+    package, name = parts.groups()
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError):

@@ -112,8 +112,9 @@ class BackgroundNode(CardboxNode):
                     f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
                 )
             return
-        full = conversions.image_of(message)
-        conversions.check_shape(full, pipeline.calibration, self._image_topic, self._info_topic)
+        calibration, most = pipeline.calibration, self.parameters.value.max_megapixels
+        full = conversions.image_of(message, conversions.most_pixels_of(calibration, most))
+        conversions.check_shape(full, calibration, self._image_topic, self._info_topic)
         self._image = image = pipeline.prepare(full)
         if not pipeline.is_ready:
             self._prepare(message.header, pipeline, image)

@@ -10,14 +10,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
+from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.input_parameters import CameraParameters
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 from cardbox_tracker.vision.camera_device import (
@@ -47,7 +47,9 @@ class CameraNode(CardboxNode):
         self._capture = open_video(settings.file) if settings.file else self._open_device()
         self._period_s = self._period(settings.rate_hz)
         self._calibration = (
-            load_calibration(settings.calibration_file) if settings.calibration_file else None
+            load_calibration(user_path(settings.calibration_file))
+            if settings.calibration_file
+            else None
         )
         self._locked = bool(settings.file) or not settings.lock_exposure
         self._stop = threading.Event()
@@ -154,7 +156,7 @@ def main(args: list[str] | None = None) -> int:
         epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
     )
     parser.add_argument("--list", action="store_true", help="list devices and modes, and exit")
-    if parser.parse_args(remove_ros_args(command_line)[1:]).list:
+    if parser.parse_args(own_arguments(command_line)).list:
         print(describe_devices())
         return 0
     return run_node(CameraNode, command_line)

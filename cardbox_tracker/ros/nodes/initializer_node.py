@@ -6,7 +6,6 @@ import os
 import sys
 import threading
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -17,7 +16,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.model_file import dumps_body_model, load_body_model, save_body_model
+from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
@@ -30,6 +29,7 @@ from cardbox_tracker.ros.messages.measurement import measured_message, refused_m
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
+from cardbox_tracker.ros.nodes.saved_model import SavedModel
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
@@ -70,14 +70,12 @@ class InitializerNode(CardboxNode):
         self.diagnostics.wait_for(
             f"silhouettes on {self._topic} (is the background node running, and has it learned?)"
         )
-        path = self._path()
-        if path is not None and path.exists():
-            self._publish(load_body_model(path))
-            self.get_logger().info(f"body model read from {path}")
-
-    def _path(self) -> Path | None:
-        name = self.parameters.value.model_file
-        return Path(name).expanduser() if name else None
+        self._saved = SavedModel(self.parameters.value.model_file)
+        if self._saved.warning:
+            self.diagnostics.warn(self._saved.warning)
+        if self._saved.body is not None:
+            self._publish(self._saved.body)
+            self.get_logger().info(f"body model read from {self.parameters.value.model_file}")
 
     def _on_info(self, message: CameraInfo, _: int) -> None:
         self._camera = conversions.camera_of(message)
@@ -139,14 +137,11 @@ class InitializerNode(CardboxNode):
             # Those captured by service stay, to be replaced one by one.
             references.captured, references.images = before
             raise
-        references.captured, references.images = {}, {}
         answer = _answer(result)
         self._result.publish(measured_message(result, answer))
         self._publish(result.body)
-        path = self._path()
-        if path is not None:
-            save_body_model(result.body, path)
-            answer += f"; saved to {path}"
+        answer += self._saved.save(result.body)
+        references.captured, references.images = {}, {}
         return answer
 
     def _wait(self, duration_s: float) -> None:

@@ -17,6 +17,7 @@ from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.encodings import MOST_PIXELS
 from cardbox_tracker.vision.learning import WAYS
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
@@ -54,6 +55,12 @@ class BackgroundParameters(NodeParameters):
         "moves",
         choices=tuple(WAYS),
         effect=_NEXT_LEARNING,
+    )
+    max_megapixels: float = parameter(
+        round(MOST_PIXELS / 1e6, 1),
+        "images with more million pixels are refused before they are decoded, as are those with "
+        "sixteen times the pixels of their CameraInfo; a few bytes can stand for gigabytes",
+        limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
     )
     learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
     threshold: float = shared(BackgroundConfig, "threshold")

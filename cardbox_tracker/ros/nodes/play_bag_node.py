@@ -19,7 +19,6 @@ from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
-from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
 from cardbox_tracker.errors import BagError
@@ -28,7 +27,7 @@ from cardbox_tracker.ros.messages.types import message_class
 from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
 from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.node import CardboxNode, run
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
@@ -191,7 +190,7 @@ class PlayBagNode(CardboxNode):
 def main(args: list[str] | None = None) -> int:
     """Play a bag; the exit code is 0 at its end, 1 for a bag that cannot be played."""
     command_line = list(sys.argv) if args is None else ["play_bag", *args]
-    overrides = overrides_from(remove_ros_args(command_line)[1:])
+    overrides = overrides_from(own_arguments(command_line))
     return run(partial(PlayBagNode, parameter_overrides=overrides), command_line, PlayBagNode.play)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from rclpy.executors import ExternalShutdownException
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import try_shutdown
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
@@ -28,7 +28,7 @@ from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess
-from cardbox_tracker.ros.runtime.node import CardboxNode, run
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _STOP_S = 5.0
@@ -115,7 +115,7 @@ def source_from(arguments: Sequence[str]) -> str | None:
 def main(args: list[str] | None = None) -> int:
     """Run the nodes; the exit code is 0 unless one could not start."""
     command_line = list(sys.argv) if args is None else ["cardbox_nodes", *args]
-    source = source_from(remove_ros_args(command_line)[1:])
+    source = source_from(own_arguments(command_line))
     return run(partial(AllNodes, source), command_line, AllNodes.work)
 
 

@@ -14,6 +14,7 @@ from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
@@ -57,7 +58,7 @@ class TrackerNode(CardboxNode):
         self.diagnostics.source = f"silhouettes on {self._silhouette_topic}"
         self._report = TrackerReport(self)
         if self.parameters.value.model_file:
-            self._use(load_body_model(self.parameters.value.model_file))
+            self._use(load_body_model(user_path(self.parameters.value.model_file)))
         self._wait()
 
     def _wait(self) -> None:

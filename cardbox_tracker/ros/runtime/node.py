@@ -16,11 +16,11 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
 from cardbox_tracker import interrupts
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
@@ -58,8 +58,19 @@ class CardboxNode(Node):
         self.diagnostics = NodeDiagnostics(self)
 
     def resolve(self, topic: str) -> str:
-        """Return the full name of ``topic`` after namespace and remapping."""
-        return self.resolve_topic_name(topic)
+        """Return the full name of ``topic`` after namespace and remapping.
+
+        Raises:
+            CardboxError: ``topic``, which may be a recording's, is no name that ROS allows.
+        """
+        try:
+            return self.resolve_topic_name(topic)
+        except Exception as error:
+            # Another class in each release of rclpy.
+            raise CardboxError(
+                f"ROS does not allow a topic named {quoted(topic)}: {cut(str(error))}; give it "
+                "another name, or play others of the recording with --topics"
+            ) from None
 
     def advertise(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher:
         """Create a publisher whose QoS can be overridden and whose mismatches are reported."""
@@ -149,6 +160,20 @@ def spin(node: CardboxNode) -> None:
     executor = make_executor(node.context)
     executor.add_node(node)
     executor.spin()
+
+
+def own_arguments(command_line: list[str]) -> list[str]:
+    """Return a command line without the program and what ``--ros-args`` says.
+
+    Raises:
+        SystemExit: ROS does not understand it (code 2); it was told in words.
+    """
+    try:
+        return remove_ros_args(command_line)[1:]
+    except Exception as error:
+        # Another class in each release of rclpy.
+        print(f"cannot start: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
 
 
 def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:

@@ -6,6 +6,7 @@ validated instance: a wrong value is refused with the reason and the old one sta
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Generic, TypeVar, get_args
@@ -172,7 +173,8 @@ def _as_type(type_: Any, value: Any) -> Any:
     """Return whole numbers as floats where a float is asked for; all else as it is."""
     if type_ is float and _is_integer(value):
         return float(value)
-    if type_ == list[float] and value and all(map(_is_integer, value)):
+    is_list = isinstance(value, list | tuple | array)
+    if type_ == list[float] and is_list and len(value) and all(map(_is_integer, value)):
         return [float(one) for one in value]
     return value
 

@@ -6,9 +6,14 @@ import gc
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros.runtime.node import run
+from rclpy.context import Context  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run  # noqa: E402
 
 
 class Nothing:
@@ -26,3 +31,30 @@ def test_a_running_node_is_not_searched_for_garbage() -> None:
     finally:
         gc.unfreeze()
     assert frozen[0] > 1000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("-p",), ("-p", "bag:=[1"), ("-r",), ("-r", "x"), ("--log-level", "nonsense")],
+)
+def test_ros_arguments_that_are_none_are_told_in_words(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        own_arguments(["camera", "--list", "--ros-args", *arguments])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.startswith("cannot start: ")
+    assert own_arguments(["camera", "--list", "--ros-args", "-p", "a:=1"]) == ["--list"]
+
+
+@pytest.mark.parametrize("topic", ["/1image", "/image raw", "//image", "/image-raw", ""])
+def test_a_topic_that_ros_does_not_allow_is_told(topic: str, ros_domain: int) -> None:
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    node = CardboxNode("tested", context=context, enable_rosout=False)
+    try:
+        with pytest.raises(CardboxError, match="ROS does not allow a topic named"):
+            node.advertise(String, topic, qos.RESULT)
+    finally:
+        node.destroy_node()
+        context.try_shutdown()

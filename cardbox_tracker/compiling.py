@@ -1,0 +1,122 @@
+"""numba's ``njit`` with a cache on disk that may be missing or damaged, but never ends a program.
+
+numba keeps compiled code beside the sources, or below the home folder; ``NUMBA_CACHE_DIR`` names
+another place. Where it can write to none of them it fails when a module is imported, and where a
+file of the cache was cut off, whenever the function is called. Here a folder of our own below the
+folder for temporary files is tried next, then there is no cache; what is damaged is compiled again.
+
+Whoever can write to the folder of the cache can have any code run. So ours belongs to the user and
+nobody else may write to it; a folder that somebody else has made under its name is not used.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import stat
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core.caching import FunctionCache
+
+_LOG = logging.getLogger(__name__)
+_said: set[str] = set()
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
+    """Return a decorator that compiles a function, as numba's of that name with ``options``.
+
+    Args:
+        cache: keep the compiled code on disk where that is possible.
+        options: those of ``numba.njit``.
+    """
+
+    def decorate(function: F) -> F:
+        dispatcher: Any = numba.njit(**options)(function)
+        made = _cache_of(function) if cache else None
+        if made is not None:
+            dispatcher._cache = made
+        compiled: F = dispatcher
+        return compiled
+
+    return decorate
+
+
+def own_folder() -> Path | None:
+    """Return a folder for the cache that only this user can write to; None if there can be none."""
+    folder = Path(tempfile.gettempdir()) / f"cardbox_tracker-{os.geteuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return None
+    is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid()
+    return folder if is_ours and not found.st_mode & 0o077 else None
+
+
+def _cache_of(function: Callable[..., Any]) -> _Cache | None:
+    """The cache of a function, where numba would have it or else in our own folder."""
+    try:
+        return _Cache(function)
+    except (RuntimeError, OSError):
+        folder = own_folder()
+    if folder is not None:
+        config: Any = numba.config
+        before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+        try:
+            return _Cache(function)
+        except (RuntimeError, OSError):
+            pass
+        finally:
+            config.CACHE_DIR = before
+    _say(
+        "compiled code cannot be kept, so that each start compiles for a minute; set "
+        "NUMBA_CACHE_DIR to a folder that only you can write to"
+    )
+    return None
+
+
+class _Cache(FunctionCache):
+    """numba's cache of one function, whose errors mean that there is nothing in it."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled code; None if it is not there or damaged."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:
+            _say(f"compiled code in {self.cache_path} is damaged ({error!r}); it is made again")
+            self._empties()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled code, if that is possible."""
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:
+            # An index that was cut off cannot be added to.
+            if self._empties():
+                with contextlib.suppress(Exception):
+                    super().save_overload(sig, data)
+                    return
+            _say(f"compiled code cannot be kept in {self.cache_path}: {error!r}")
+
+    def _empties(self) -> bool:
+        try:
+            self.flush()
+        except OSError:
+            self._enabled = False
+            return False
+        return True
+
+
+def _say(text: str) -> None:
+    """Warn, once in a process."""
+    if text not in _said:
+        _said.add(text)
+        _LOG.warning(text)

@@ -1,0 +1,39 @@
+"""The types of a recording's topics, which anybody may have written."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sensor_msgs.msg import Image
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.ros.messages.types import message_class
+
+
+def test_an_installed_type_is_found() -> None:
+    assert message_class("/image_raw", "sensor_msgs/msg/Image") is Image
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("sensor_msgs/msg/Nothing", "is not installed; install the package 'sensor_msgs'"),
+        ("no_such_msgs/msg/Image", "is not installed"),
+        ("Image", "expected one such as sensor_msgs/msg/Image"),
+        ("sensor_msgs/Image", "expected one such as"),
+        ("os.path/msg/Image", "expected one such as"),
+        ("sensor_msgs/msg/__doc__", "expected one such as"),
+        ("x" * 100_000, "expected one such as"),
+    ],
+)
+def test_a_type_that_is_none_is_refused(kind: str, words: str) -> None:
+    with pytest.raises(BagError, match=words) as refused:
+        message_class("/image_raw", kind)
+    assert len(str(refused.value)) < 400
+
+
+@given(st.text(max_size=30), st.text(max_size=30))
+def test_any_type_is_refused_in_words(topic: str, kind: str) -> None:
+    with pytest.raises(BagError):
+        message_class(topic, kind)

@@ -1,0 +1,100 @@
+"""What is promised, how often it was tried, and that it held: ``docs/reliability.md``.
+
+``python -m tools.reliability`` (``make reliability``) runs every test that has the marker
+``promise`` and writes the table between the marks of that page. A test of examples (hypothesis)
+tries as many as ``--examples`` says; any other is tried once for each of its cases.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import atomic_path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = "docs/reliability.md"
+BEGIN, END = "<!-- begin of the table -->", "<!-- end of the table -->"
+EXAMPLES = 100_000
+
+
+@dataclass
+class Row:
+    """A promise and the tests of one function for it."""
+
+    promise: str
+    test: str
+    tried: int = 0
+    failed: int = 0
+
+    def line(self) -> str:
+        """Return the row of the table."""
+        survived = "all" if self.failed == 0 else f"**no: {self.failed} failed**"
+        return f"| {self.promise} | `{self.test}` | {self.tried:,} | {survived} |"
+
+
+def run_tests(report: Path, examples: int, paths: list[str]) -> int:
+    """Run the tests of promises; return pytest's exit code, 0 if all of them passed."""
+    environment = {**os.environ, "RELIABILITY_EXAMPLES": str(examples)}
+    command = [sys.executable, "-m", "pytest", "-m", "promise", "--timeout", "0"]
+    command += [f"--junit-xml={report}", *paths]
+    return subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
+
+
+def rows_of(report: Path) -> list[Row]:
+    """Return what a report of pytest says of promises, in its order; skipped tests are left out."""
+    rows: dict[tuple[str, str], Row] = {}
+    for case in ElementTree.parse(report).getroot().iter("testcase"):
+        found = {entry.get("name"): entry.get("value", "") for entry in case.iter("property")}
+        if "promise" not in found or case.find("skipped") is not None:
+            continue
+        file = "/".join(case.get("classname", "").split(".")) + ".py"
+        test = f"{file}::{case.get('name', '').partition('[')[0]}"
+        row = rows.setdefault((found["promise"], test), Row(found["promise"], test))
+        row.tried += int(found["tried"])
+        row.failed += case.find("failure") is not None or case.find("error") is not None
+    return list(rows.values())
+
+
+def with_table(page: str, rows: list[Row]) -> str:
+    """Return the page with the table of ``rows`` between its marks.
+
+    Raises:
+        CardboxError: the page has no such marks.
+    """
+    head, begin, rest = page.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not (begin and end):
+        raise CardboxError(f"{PAGE} has no '{BEGIN}' and '{END}'; put them where the table goes")
+    lines = ["| promise | test | tried | survived |", "|---|---|---|---|"]
+    lines += [row.line() for row in sorted(rows, key=lambda row: row.test)]
+    return "\n".join([head + begin, "", *lines, "", end + tail])
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the tests, write the page; the exit code is 0 if every promise was kept."""
+    parser = argparse.ArgumentParser(prog="reliability", description=__doc__)
+    parser.add_argument("--examples", type=int, default=EXAMPLES, metavar="N", help="of each test")
+    parser.add_argument("paths", nargs="*", help="tests to run; without them, all")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        code = run_tests(report, options.examples, options.paths)
+        rows = rows_of(report)
+    path = ROOT / PAGE
+    page = with_table(path.read_text(encoding="utf-8"), rows)
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    print(f"{sum(row.tried for row in rows):,} inputs; written: {PAGE}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
