@@ -424,6 +424,7 @@ class _Infected:
         return replace(fit, **{self._part: ruined}) if self._frames > 1 else fit
 
 
+@pytest.mark.promise("No number that is not finite leaves a node")
 @pytest.mark.parametrize("part", ["posture", "posture_stddev", "keypoints_m", "offset_m"])
 def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> None:
     _Infected.made = 0

@@ -44,6 +44,7 @@ def end_early(name: str, arguments: list[str], number: int, delay_s: float) -> t
     return process.returncode, said
 
 
+@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("delay_s", DELAYS_S)
 def test_a_node_that_is_starting_ends(number: int, delay_s: float) -> None:
@@ -52,6 +53,7 @@ def test_a_node_that_is_starting_ends(number: int, delay_s: float) -> None:
     assert code == 0
 
 
+@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("delay_s", [0.0, 0.5])
 def test_a_command_that_is_starting_ends(number: int, delay_s: float, tmp_path: Path) -> None:

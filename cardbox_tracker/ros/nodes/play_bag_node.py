@@ -54,7 +54,7 @@ class PlayBagNode(CardboxNode):
         self._position_s = settings.start_s
         self._paused = False
         self._anchor = (0.0, 0.0)
-        self._executor = make_executor()
+        self._executor = make_executor(self.context)
         self._executor.add_node(self)
         self._status = self.advertise(String, "~/status", qos.LATCHED)
         self.offer("~/pause", self._pause)

@@ -134,6 +134,7 @@ def test_distorted_silhouette_is_refused() -> None:
         conversions.camera_of(info(d=[0.1, 0.0, 0.0, 0.0, 0.0]))
 
 
+@pytest.mark.promise("No number that is not finite leaves a node")
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("entry", [0, 2, 4, 5])
 def test_a_matrix_that_is_not_finite_is_refused_in_its_own_words(entry: int, value: float) -> None:
@@ -160,6 +161,7 @@ def test_what_is_not_used_of_a_camera_info_may_be_anything() -> None:
     assert calibration_from_info(odd, "a", "b").camera(320, 240) == CAMERA
 
 
+@pytest.mark.promise("No number that is not finite leaves a node")
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize(
     "make",

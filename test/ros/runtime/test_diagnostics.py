@@ -134,6 +134,7 @@ class Logged:
         self.info = self.warning = self.error = self.lines.append
 
 
+@pytest.mark.promise("A node whose input has ceased says so")
 def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

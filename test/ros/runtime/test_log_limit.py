@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
 
 
@@ -13,6 +15,7 @@ class Clock:
         return self.now_s
 
 
+@pytest.mark.promise("No input fills the log")
 def test_ever_different_texts_of_one_kind_are_soon_quiet() -> None:
     clock = Clock()
     limit = LogLimit(clock)
