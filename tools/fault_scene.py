@@ -192,9 +192,12 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
 """Faults of the stream of images, by what happens."""
 
 
-def run_of(fault: Fault, seed: int = 0) -> tuple[list[Sent], list[Sent], list[Sent]]:
-    """Return what is sent before, during and after a fault."""
-    begin, end = BEFORE_S, BEFORE_S + FAULT_S
+def run_of(
+    fault: Fault, seed: int = 0, from_s: float = 0.0
+) -> tuple[list[Sent], list[Sent], list[Sent]]:
+    """Return what is sent before, during and after a fault; the first image is of ``from_s``."""
+    begin = from_s + BEFORE_S
+    end = begin + FAULT_S
     during = fault(even(begin, end), np.random.default_rng(seed))
     away_s = max((sent.wait_s for sent in during), default=0.0)
     if away_s > 1.0:
@@ -204,7 +207,7 @@ def run_of(fault: Fault, seed: int = 0) -> tuple[list[Sent], list[Sent], list[Se
     after = even(end, end + AFTER_S)
     if not during:
         after[0] = replace(after[0], wait_s=away_s)
-    return even(0.0, begin), during, after
+    return even(from_s, begin), during, after
 
 
 @dataclass(frozen=True)
