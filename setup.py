@@ -58,15 +58,17 @@ setup(
         (f"{SHARE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     python_requires=">=3.11",
+    # Bounded by the next version that may break what we use of it: a major one, or before 1.0 a
+    # minor one of rosbags, whose interface still changes.
     install_requires=[
-        "lz4>=4.3",
-        "matplotlib>=3.8",
-        "numba>=0.60",
-        "numpy>=1.26",
-        "opencv-python-headless>=4.9",
-        "PyYAML>=6.0",
-        "rosbags>=0.10",
-        "tqdm>=4.66",
+        "lz4>=4.3,<5",
+        "matplotlib>=3.8,<4",
+        "numba>=0.60,<1",
+        "numpy>=1.26,<3",
+        "opencv-python-headless>=4.9,<6",
+        "PyYAML>=6.0,<7",
+        "rosbags>=0.10,<0.12",
+        "tqdm>=4.66,<5",
     ],
     extras_require={
         "ros": ROS,
@@ -76,13 +78,13 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            f"cardbox = {NAME}.commands.main:main",
-            f"background = {NAME}.ros.nodes.background_node:main",
-            f"initializer = {NAME}.ros.nodes.initializer_node:main",
-            f"tracker = {NAME}.ros.nodes.tracker_node:main",
-            f"camera = {NAME}.ros.nodes.camera_node:main",
-            f"play_bag = {NAME}.ros.nodes.play_bag_node:main",
-            f"cardbox_nodes = {NAME}.ros.nodes.single_process:main",
+            f"cardbox = {NAME}.start:cardbox",
+            f"background = {NAME}.start:background",
+            f"initializer = {NAME}.start:initializer",
+            f"tracker = {NAME}.start:tracker",
+            f"camera = {NAME}.start:camera",
+            f"play_bag = {NAME}.start:play_bag",
+            f"cardbox_nodes = {NAME}.start:cardbox_nodes",
         ],
     },
 )

@@ -7,6 +7,7 @@ CardboxError
     InitializationError  the reference silhouettes cannot give a body
     BackgroundFileError  a file with a learned background
     BagError             a recording that cannot be read or written
+    NotFiniteError       a result with values that are not finite numbers
     RosMissingError      ROS 2 is not installed
 """
 
@@ -39,6 +40,10 @@ class InitializationError(CardboxError):
 
 class BagError(CardboxError):
     """A recording cannot be read or written."""
+
+
+class NotFiniteError(CardboxError):
+    """A result has values that are not finite numbers."""
 
 
 class RosMissingError(CardboxError):

@@ -16,7 +16,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # From the bottom to the top: a module imports from its own folder and from the layers before.
 # Folders named together do not import each other.
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("compiling", "errors", "files", "progress", "settings", "small_yaml"),
+    ("compiling", "errors", "files", "interrupts", "progress", "settings", "small_yaml"),
     ("body",),
     ("vision", "description"),
     ("estimation",),
@@ -29,6 +29,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("demo",),
     ("benchmarks",),
     ("commands",),
+    ("start",),
 )
 # The layers inside a folder; what is not named may use all of them.
 INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {

@@ -22,6 +22,7 @@ from cardbox_tracker.commands import (
 from cardbox_tracker.commands.command import Command
 from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.interrupts import INTERRUPTED, were_received
 
 # In the order of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
@@ -61,32 +62,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
         SystemExit: the arguments are wrong (code 2), or they ask for help or the version (code 0).
     """
     words = sys.argv[1:] if arguments is None else list(arguments)
-    parser = build_parser(words)
-    if words and words[0] in RETIRED:
-        parser.error(f"{words[0]!r} is no longer a subcommand; use {RETIRED[words[0]]!r}")
-    options = parser.parse_args(words)
+    name = words[0] if words else ""
     try:
         with ended_by_signals():
+            parser = build_parser(words)
+            if name in RETIRED:
+                parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
+            options = parser.parse_args(words)
             options.run(options)
             sys.stdout.flush()
     except CardboxError as error:
-        print(f"cardbox {options.command}: {error}", file=sys.stderr)
+        print(f"cardbox {name}: {error}", file=sys.stderr)
         return 1
     except Terminated as end:
-        print(f"cardbox {options.command}: terminated", file=sys.stderr)
+        print(f"cardbox {name}: terminated", file=sys.stderr)
         return 128 + end.signal
     except KeyboardInterrupt:
-        print(f"cardbox {options.command}: interrupted", file=sys.stderr)
-        return 130
+        return _interrupted(name)
     except BrokenPipeError:
         # As in 'cardbox urdf MODEL.yaml | head': the reader has closed the pipe, which is no error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
+    except Exception as error:
+        if were_received():
+            # What a signal interrupts may fail in its own way: ROS, an import.
+            return _interrupted(name)
+        if not isinstance(error, OSError):
+            raise
         # Such as a full disk. Files are written under another name first: none is left half done.
         where = f"{error.filename}: " if error.filename else ""
-        print(f"cardbox {options.command}: {where}{error.strerror or error}", file=sys.stderr)
+        print(f"cardbox {name}: {where}{error.strerror or error}", file=sys.stderr)
         return 1
     return 0
+
+
+def _interrupted(name: str) -> int:
+    print(f"cardbox {name}: interrupted", file=sys.stderr)
+    return INTERRUPTED
 
 
 def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:

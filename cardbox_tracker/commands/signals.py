@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from cardbox_tracker import interrupts
+
 # Of 'kill', a time limit or a shutdown; and of a terminal that is closed.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
@@ -43,4 +45,5 @@ def ended_by_signals() -> Iterator[None]:
 
 
 def _terminate(number: int, _: FrameType | None) -> None:
+    interrupts.note()
     raise Terminated(number)

@@ -10,7 +10,6 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import Image
@@ -24,6 +23,7 @@ from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
+from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _TOPICS = {
     "body_model": (String, qos.LATCHED),
@@ -64,7 +64,7 @@ class Client:
         self._stamp_ns = 0
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
-        self._executor = SingleThreadedExecutor()
+        self._executor = make_executor()
         self._executor.add_node(self._node)
         for topic, (kind, profile) in _TOPICS.items():
             self._node.create_subscription(

@@ -184,6 +184,10 @@ class Tracker:
             # A lamp goes on, a door opens: soon the person is where they were.
             return Estimate(LOST)
         fit = self._filter.follow(self._terms)
+        if not fit.is_finite:
+            # Particles that are not numbers would stay so for ever.
+            self.reset()
+            return Estimate(LOST)
         offset = () if fit.offset_m is None else fit.offset_m
         self._before = np.concatenate([fit.posture, offset])
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CameraError, cut, quoted
 from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_problem
 
 FloatArray = NDArray[np.float64]
 
-# Far beyond any lens; what follows from it still is a number.
-_LARGEST_OF_K = 1e9
 
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 
@@ -111,8 +110,8 @@ class Calibration:
 
     @property
     def is_calibrated(self) -> bool:
-        """False for the all-zero matrix with which drivers announce an uncalibrated camera."""
-        return bool(np.all(np.isfinite(self.k)) and self.k[0, 0] > 0 and self.k[1, 1] > 0)
+        """False for the all-zero matrix of an uncalibrated camera, and where K is no matrix."""
+        return not matrix_problem(self.k, self.width, self.height)
 
     @property
     def is_distorted(self) -> bool:
@@ -173,20 +172,17 @@ class Calibration:
                 f"the calibration is for an image of {self.width}x{self.height}; expected the "
                 "camera's size in pixels: calibrate the camera, or fill in width and height"
             )
-        if not self.is_calibrated:
+        problem = matrix_problem(self.k, self.width, self.height)
+        if problem:
             raise CameraError(
-                "the camera is not calibrated (its matrix K is all zero); calibrate it with "
+                f"the camera is not calibrated (its matrix K {problem}); calibrate it with "
                 "camera_calibration, or give its driver a calibration file"
             )
-        if not np.all(np.isfinite(self.distortion)):
+        problem = distortion_problem(self.distortion)
+        if problem:
             raise CameraError(
-                "the distortion coefficients have values that are no numbers; calibrate the camera "
-                "anew, or feed rectified images with all-zero distortion"
-            )
-        if np.max(np.abs(self.k)) > _LARGEST_OF_K:
-            raise CameraError(
-                "the camera's matrix K has values that no lens gives; expected some hundreds or "
-                "thousands of pixels: calibrate it with camera_calibration"
+                f"the distortion coefficients D {problem}; calibrate the camera anew, or feed "
+                "rectified images with all-zero distortion"
             )
         if self.is_distorted and self.distortion_model not in DISTORTION_MODELS:
             raise CameraError(

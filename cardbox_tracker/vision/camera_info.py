@@ -8,6 +8,7 @@ import numpy as np
 
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.camera_checks import matrix_problem
 
 
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
@@ -16,16 +17,19 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
     A region of interest and binning are taken into the matrix.
 
     Raises:
-        CameraError: the camera is not calibrated; the text names both topics.
+        CameraError: the camera is not calibrated, or K has values that no camera has; the text
+            names both topics. R and P are not used.
     """
     k = np.array(message.k, dtype=np.float64).reshape(3, 3)
-    if not (k[0, 0] > 0 and k[1, 1] > 0):
+    width, height = int(message.width), int(message.height)
+    # Without a size, that is what has to be said.
+    problem = matrix_problem(k, width, height) if width > 0 < height else ""
+    if problem:
         raise CameraError(
             f"the camera that publishes {image_topic} is not calibrated: the matrix K in "
-            f"{info_topic} is all zero. Calibrate it with camera_calibration, or give its driver "
+            f"{info_topic} {problem}. Calibrate it with camera_calibration, or give its driver "
             "the calibration file, so that the CameraInfo has its focal length"
         )
-    width, height = int(message.width), int(message.height)
     roi = message.roi
     if roi.width and roi.height and (roi.width, roi.height) != (width, height):
         k[0, 2] -= roi.x_offset

@@ -152,7 +152,12 @@ def _pixels(
             f"{', '.join(SUPPORTED_ENCODINGS)}: set the camera driver to one of them"
         )
     row_bytes = width * kind.bytes_per_pixel
-    if height <= 0 or width <= 0 or step < row_bytes:
+    if height <= 0 or width <= 0:
+        raise EncodingError(
+            f"a {encoding} image has the size {width}x{height}; expected one pixel or more: the "
+            "message is empty"
+        )
+    if step < row_bytes:
         raise EncodingError(
             f"a {encoding} image of {width}x{height} has rows of {step} bytes; expected "
             f"{row_bytes} or more"

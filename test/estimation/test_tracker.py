@@ -27,6 +27,7 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS
 from cardbox_tracker.estimation.tracker import (
+    FILTERS,
     LOST,
     NO_PERSON,
     TRACKING,
@@ -400,6 +401,38 @@ def test_the_tracker_takes_another_filter() -> None:
         ("iterate", 1.0),
         ("iterate", 0.5),
     ]
+
+
+class _Infected:
+    """A filter whose numbers are ruined, and stay so, from its second frame on."""
+
+    made = 0
+
+    def __init__(self, config: Any, silhouette: Any, rng: Any, part: str = "posture") -> None:
+        type(self).made += 1
+        self._inner = FILTERS[config.filter](config, silhouette, rng)
+        self._frames, self._part = 0, part
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+    def follow(self, terms: Any) -> Any:
+        fit = self._inner.follow(terms)
+        self._frames += 1
+        ruined = np.array(getattr(fit, self._part), dtype=float)
+        ruined.flat[0] = np.nan
+        return replace(fit, **{self._part: ruined}) if self._frames > 1 else fit
+
+
+@pytest.mark.promise("No number that is not finite leaves a node")
+@pytest.mark.parametrize("part", ["posture", "posture_stddev", "keypoints_m", "offset_m"])
+def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> None:
+    _Infected.made = 0
+    tracker = make(default_preset(), make_filter=partial(_Infected, part=part))
+    states = [tracker.track(silhouette) for silhouette in waving(4)]
+    assert [estimate.state for estimate in states] == [TRACKING, LOST, TRACKING, LOST]
+    assert states[1].posture is None and states[1].keypoints_m is None
+    assert _Infected.made == 3  # a new one after each ruin
 
 
 def test_an_image_of_another_size_is_refused() -> None:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.ros.runtime.processes import EXECUTABLES
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
@@ -64,7 +63,7 @@ class Process:
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
         with log.open("w") as output:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", EXECUTABLES[name], *arguments],
+                [sys.executable, "-m", "cardbox_tracker.start", name, *arguments],
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env=environment,

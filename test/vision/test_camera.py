@@ -106,6 +106,38 @@ def test_an_uncalibrated_camera_is_refused() -> None:
     assert calibration().is_calibrated
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("entry", range(9))
+def test_every_entry_of_k_has_to_be_finite(entry: int, value: float) -> None:
+    k = K.copy()
+    k.flat[entry] = value
+    with pytest.raises(CameraError, match=f"K has values that are not finite numbers.*{value:g}"):
+        calibration(k=k).camera(320, 240)
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "words"),
+    [
+        (0, -600.0, "fx = -600 px; expected 12.8 to 640000 px"),
+        (4, 0.0, "fy = 0 px; expected 9.6 to"),
+        (4, 1e300, "fy = 1e"),
+        (2, 1e200, "principal point"),
+        (5, -1e9, "principal point"),
+    ],
+)
+def test_a_matrix_that_no_camera_has_is_refused(entry: int, value: float, words: str) -> None:
+    k = K.copy()
+    k.flat[entry] = value
+    with pytest.raises(CameraError, match=words):
+        calibration(k=k).camera(320, 240)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_coefficients_that_are_not_finite_are_refused(value: float) -> None:
+    with pytest.raises(CameraError, match="D have values that are not finite numbers"):
+        calibration(distortion=np.array([0.0, 0.0, value, 0.0, 0.0])).camera(320, 240)
+
+
 @pytest.mark.parametrize(("width", "height"), [(0, 480), (640, 0), (0, 0)])
 def test_a_calibration_without_a_size_is_refused(width: int, height: int) -> None:
     with pytest.raises(CameraError, match=f"{width}x{height}"):

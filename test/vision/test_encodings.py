@@ -227,3 +227,9 @@ def test_an_image_cut_short_is_refused(extension: str) -> None:
 def test_zeros_behind_a_jpeg_do_no_harm() -> None:
     data = cv2.imencode(".jpg", np.full((16, 16), 77, np.uint8))[1].tobytes()
     np.testing.assert_allclose(decode_compressed(data + bytes(100)), 77, atol=2)
+
+
+@pytest.mark.parametrize(("height", "width"), [(0, 0), (0, 4), (4, 0)])
+def test_an_image_without_pixels_is_told_as_such(height: int, width: int) -> None:
+    with pytest.raises(EncodingError, match=f"size {width}x{height}; expected one pixel or more"):
+        decode_grey(b"", height, width, 0, "mono8")

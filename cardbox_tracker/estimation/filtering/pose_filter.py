@@ -50,6 +50,15 @@ class Fit:
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
 
+    @property
+    def is_finite(self) -> bool:
+        """False if any of the values is not a finite number."""
+        values = (self.posture, self.posture_stddev, self.keypoints_m, self.iou)
+        return all(
+            value is None or bool(np.isfinite(value).all())
+            for value in (*values, self.offset_m, self.offset_stddev_m)
+        )
+
 
 class PoseFilter(Protocol):
     """Follows one person from frame to frame."""

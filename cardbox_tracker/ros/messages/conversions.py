@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError, EncodingError, quoted
 from cardbox_tracker.vision.camera import Calibration, Camera
+from cardbox_tracker.vision.camera_checks import matrix_problem
 from cardbox_tracker.vision.encodings import MOST_PIXELS, decode_as_sent, decode_compressed
 
 ImageArray = NDArray[np.uint8]
@@ -177,18 +178,24 @@ def camera_of(message: CameraInfo) -> Camera:
     """Return the pinhole camera of a ``silhouette/camera_info``.
 
     Raises:
-        CameraError: the matrix is all zero or the image is distorted.
+        CameraError: it has no size, no camera has such a matrix, or the image is distorted.
     """
     k = message.k
-    if message.width * message.height > _MOST_WORKING_PIXELS:
+    pixels = message.width * message.height
+    if pixels > _MOST_WORKING_PIXELS:
         raise CameraError(
             f"the silhouette's CameraInfo is for {message.width}x{message.height} px; expected a "
             "working size of at most 4096x4096: set width and height of the background node"
         )
-    if not (k[0] > 0 and k[4] > 0):
+    if pixels == 0:
+        problem = f"is for an image of {message.width}x{message.height}"
+    else:
+        problem = matrix_problem(np.array(k).reshape(3, 3), message.width, message.height)
+        problem = problem and f"is not calibrated: its matrix K {problem}"
+    if problem:
         raise CameraError(
-            "the silhouette's CameraInfo is not calibrated (K all zero); take the silhouette and "
-            "its camera_info from the background node"
+            f"the silhouette's CameraInfo {problem}; take the silhouette and its camera_info from "
+            "the background node"
         )
     if any(message.d):
         raise CameraError(

@@ -15,15 +15,20 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
+from cardbox_tracker.errors import NotFiniteError
 from cardbox_tracker.outputs import JointValues, Markers, Points, Text, Value
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
-    """Return joint values, rad and metres (or their deviations), as positions."""
+    """Return joint values, rad and metres (or their deviations), as positions.
+
+    Raises:
+        NotFiniteError: one is not a finite number.
+    """
     return JointState(
         header=header,
         name=list(joints.names),
-        position=array.array("d", joints.values.tolist()),
+        position=array.array("d", _finite(joints.values, "joint states").tolist()),
     )
 
 
@@ -33,7 +38,11 @@ def joint_values_of(message: JointState) -> JointValues:
 
 
 def points_message(header: Header, points: Points) -> PoseArray:
-    """Return points, metres in the frame of ``header``, as poses without rotation."""
+    """Return points, metres in the frame of ``header``, as poses without rotation.
+
+    Raises:
+        NotFiniteError: a coordinate is not a finite number.
+    """
     upright = Quaternion(w=1.0)
     return PoseArray(
         header=header,
@@ -47,7 +56,11 @@ def points_of(message: PoseArray) -> Points:
 
 
 def markers_message(header: Header, markers: Markers) -> MarkerArray:
-    """Return the shapes, in the frame of ``header``; without any, what removes those before."""
+    """Return the shapes, in the frame of ``header``; without any, what removes those before.
+
+    Raises:
+        NotFiniteError: a coordinate is not a finite number.
+    """
     if not markers.shapes:
         return MarkerArray(markers=[Marker(header=header, action=Marker.DELETEALL)])
     return MarkerArray(markers=[_marker(header, shape) for shape in markers.shapes])
@@ -86,7 +99,17 @@ def _marker(header: Header, shape: MarkerShape) -> Marker:
 
 
 def _points(points_m: FloatArray) -> list[Point]:
-    return [Point(x=x, y=y, z=z) for x, y, z in points_m.tolist()]
+    return [Point(x=x, y=y, z=z) for x, y, z in _finite(points_m, "points").tolist()]
+
+
+def _finite(values: FloatArray, what: str) -> FloatArray:
+    """Return ``values``; the last guard before they leave the node, whatever went wrong before."""
+    if not np.isfinite(values).all():
+        raise NotFiniteError(
+            f"the {what} of an image have values that are not finite numbers, so they are not "
+            "published; please report it, with the body model and the CameraInfo"
+        )
+    return values
 
 
 @lru_cache(maxsize=16)  # a handful of colours, ninety corners an image

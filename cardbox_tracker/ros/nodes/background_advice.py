@@ -34,11 +34,11 @@ class Findings:
     covered: float
 
 
-def advice(findings: Findings) -> list[str]:
-    """Return what a user should do about the images, one text for each."""
-    texts = []
+def advice(findings: Findings) -> dict[str, str]:
+    """Return what a user should do about the images, a text for each kind of trouble."""
+    texts = {}
     if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
-        texts.append(
+        texts["loss"] = (
             f"{100 * findings.loss:.0f} % of the images on {findings.topic} "
             f"({findings.image_bytes // 1000} kB each) are lost on the way: start all nodes "
             "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
@@ -46,7 +46,7 @@ def advice(findings: Findings) -> list[str]:
         )
     drifted = not findings.follows and abs(findings.drift) > _DRIFT_TO_WARN_GREY_LEVELS
     if drifted or findings.covered > _COVERAGE_TO_WARN:
-        texts.append(
+        texts["brightness"] = (
             "the whole scene changed its brightness: switch the camera's automatic exposure "
             "and white balance off (v4l2-ctl -c auto_exposure=1,white_balance_automatic=0), "
             "then call background/learn with nobody in view"

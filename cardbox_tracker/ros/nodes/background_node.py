@@ -57,6 +57,7 @@ class BackgroundNode(CardboxNode):
         self.subscribe(kind, topic, self._on_image, qos.SENSOR_DATA)
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
+        self.diagnostics.source = f"images on {self._image_topic}"
         self.diagnostics.advice = self._advice
         self.diagnostics.wait_for(
             f"images on {self._image_topic} and their CameraInfo on {self._info_topic}"
@@ -101,7 +102,8 @@ class BackgroundNode(CardboxNode):
         self.diagnostics.wait_for(f"images on {self._image_topic}")
 
     def _on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
-        self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
+            return
         self._image_bytes = len(message.data)
         pipeline = self._pipeline
         if pipeline is None:
@@ -171,7 +173,7 @@ class BackgroundNode(CardboxNode):
             return 0.0
         return self._pipeline.drift(self._image)
 
-    def _advice(self) -> list[str]:
+    def _advice(self) -> dict[str, str]:
         settings, remark = self.parameters.value, self._watch.remark
         findings = Findings(
             self._image_topic,
@@ -181,7 +183,7 @@ class BackgroundNode(CardboxNode):
             settings.follow and settings.clean_up,
             self._covered,
         )
-        return [*advice(findings), *self._single.remarks(), *([remark] if remark else [])]
+        return advice(findings) | self._single.remarks() | ({"": remark} if remark else {})
 
 
 def main(args: list[str] | None = None) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.ros.messages.conversions import stamp_ns
+from cardbox_tracker.ros.runtime.recent import RecentImages
 
 Deliver = Callable[[Image, Image | None, int], None]
 """Takes a silhouette, its image if there is one, and when the silhouette left its sender, ns."""
@@ -31,7 +31,7 @@ class ImagePairing:
         """Hand on to ``deliver``."""
         self.waits = True
         self._deliver = deliver
-        self._images: deque[Image] = deque(maxlen=_KEPT)
+        self._images = RecentImages(_KEPT)
         self._waiting: tuple[Image, int] | None = None
         # None is expected before the first one: perhaps nobody sends any.
         self._patience = 0
@@ -50,16 +50,22 @@ class ImagePairing:
                 self._patience -= 1
                 self._hand_on(None)
         finally:
-            stamp = _stamp(silhouette)
             self._waiting = silhouette, sent_ns
-            image = next((image for image in self._images if _stamp(image) == stamp), None)
+            image = self._image_of(_stamp(silhouette))
             if image is not None or not self.waits or self._patience <= 0:
                 self._hand_on(image)
+
+    def _image_of(self, stamp: int) -> Image | None:
+        """Return the latest image of that stamp: where stamps repeat, those before are used."""
+        return next((image for image in reversed(self._images) if _stamp(image) == stamp), None)
 
     def _hand_on(self, image: Image | None) -> None:
         if self._waiting is not None:
             silhouette, sent_ns = self._waiting
             self._waiting = None
+            if image is not None:
+                while len(self._images) and self._images.popleft() is not image:
+                    pass
             self._deliver(silhouette, image, sent_ns)
 
 

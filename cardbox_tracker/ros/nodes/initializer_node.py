@@ -35,8 +35,6 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Camera
 
-_NICENESS = 5
-
 
 class InitializerNode(CardboxNode):
     """Captures reference silhouettes and measures the person in them."""
@@ -68,6 +66,7 @@ class InitializerNode(CardboxNode):
             Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
         )
         self.diagnostics.extra = self._values
+        self.diagnostics.source = f"silhouettes on {self._topic}"
         self.diagnostics.wait_for(
             f"silhouettes on {self._topic} (is the background node running, and has it learned?)"
         )
@@ -82,7 +81,8 @@ class InitializerNode(CardboxNode):
         self._camera = conversions.camera_of(message)
 
     def _on_silhouette(self, message: Image, sent_ns: int) -> None:
-        self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
+            return
         self._references.add(message)
         self._guide.draw(message, self._camera, self.parameters.value)
         self.diagnostics.working(sent_ns)
@@ -149,6 +149,7 @@ class InitializerNode(CardboxNode):
             raise InitializationError("the initializer was stopped")
 
     def _progress(self, fraction: float) -> None:
+        self._wait(0.0)
         self._guide.show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
@@ -185,7 +186,7 @@ def _answer(result: InitializationResult) -> str:
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
     # The tracker, which gets the same silhouettes, has priority.
-    os.nice(_NICENESS)
+    os.nice(5)
     return run_node(InitializerNode, args)
 
 

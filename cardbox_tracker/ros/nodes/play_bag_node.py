@@ -18,7 +18,6 @@ from functools import partial
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
@@ -30,6 +29,7 @@ from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _PROGRESS_S = 5.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -54,7 +54,7 @@ class PlayBagNode(CardboxNode):
         self._position_s = settings.start_s
         self._paused = False
         self._anchor = (0.0, 0.0)
-        self._executor = SingleThreadedExecutor()
+        self._executor = make_executor(self.context)
         self._executor.add_node(self)
         self._status = self.advertise(String, "~/status", qos.LATCHED)
         self.offer("~/pause", self._pause)

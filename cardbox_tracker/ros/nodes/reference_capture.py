@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 
 from sensor_msgs.msg import Image
 
@@ -22,6 +21,7 @@ from cardbox_tracker.ros.messages.conversions import (
     silhouette_of,
     stamp_ns,
 )
+from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Camera
 
 # As many as the parameter capture_frames allows.
@@ -44,12 +44,17 @@ class ReferenceCapture:
         self.captured: dict[str, Silhouette] = {}
         self.images: dict[str, list[ImageArray]] = {}
         self._topic = topic
-        self._recent: deque[Image] = deque(maxlen=_KEPT)
-        self._recent_images: deque[Image] = deque(maxlen=_KEPT)
+        self._recent = RecentImages(_KEPT)
+        self._recent_images = RecentImages(_KEPT)
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
-        """Keep a silhouette as the latest one."""
+        """Keep a silhouette as the latest one.
+
+        Raises:
+            EncodingError: it is none.
+        """
+        silhouette_of(message)
         self._recent.append(message)
         self._received_s = time.monotonic()
 
@@ -103,7 +108,8 @@ class ReferenceCapture:
         stamps = {stamp_ns(message.header.stamp) for message in alike}
         images = [m for m in self._recent_images if stamp_ns(m.header.stamp) in stamps]
         self.captured[name] = silhouette
-        self.images[name] = [image_of(message) for message in images]
+        # Not more than silhouettes, where stamps repeat.
+        self.images[name] = [image_of(message) for message in images[-len(alike) :]]
         text = f"captured '{name}' from {len(silhouettes)} silhouettes{warning}"
         age_s = time.monotonic() - self._received_s
         if age_s > _OLD_S:

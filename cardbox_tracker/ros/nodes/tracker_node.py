@@ -23,6 +23,7 @@ from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.stream import Step
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
@@ -54,6 +55,7 @@ class TrackerNode(CardboxNode):
         add_silhouette = self._pairing.add_silhouette
         self.subscribe(Image, "silhouette", add_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
+        self.diagnostics.source = f"silhouettes on {self._silhouette_topic}"
         self._report = TrackerReport(self)
         if self.parameters.value.model_file:
             self._use(load_body_model(user_path(self.parameters.value.model_file)))
@@ -110,7 +112,7 @@ class TrackerNode(CardboxNode):
         rng = np.random.default_rng(settings.seed)
         self._tracker = Tracker(self._body, self._camera, settings.config(), rng)
         self._report.start()
-        self.get_logger().info(f"{reason}: tracking starts from the front reference posture")
+        self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
         if self._tracker is None:
@@ -123,7 +125,10 @@ class TrackerNode(CardboxNode):
 
     def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
         header = message.header
-        if not self.diagnostics.input.add(conversions.stamp_ns(header.stamp)) and self._tracker:
+        step = self.diagnostics.input.add(conversions.stamp_ns(header.stamp))
+        if not step.is_usable:
+            return
+        if step is Step.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
         if self._tracker is None or self._body is None or self._camera is None:
             self._wait()

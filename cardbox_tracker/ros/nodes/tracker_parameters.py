@@ -18,16 +18,27 @@ from cardbox_tracker.settings import settings_of
 
 _NEXT_START = "next start of tracking"
 
+MOST_MOVES = 20_000
+"""Particles of a filter times cycles: an image then takes about 0.2 s at 320x240 and 0.3 s at
+1280x960 on one core (docs/benchmarks.md has the time of fewer). Until an image is done a node hears
+of no other image, service or signal; ``cardbox track`` has no such limit."""
 
-def _of_preset(kind: type[FilterConfig] | type[TrackerConfig], name: str, part: str = "") -> Any:
+
+def _of_preset(
+    kind: type[FilterConfig] | type[TrackerConfig],
+    name: str,
+    part: str = "",
+    most: float | None = None,
+    more: str = "",
+) -> Any:
     """Return a parameter for a setting of which 0 means that the preset decides."""
     core = settings_of(kind)[name]
     return shared(
         kind,
         name,
         default=type(getattr(kind, name))(0),
-        description=f"{part}{core.description}; 0: preset",
-        limits=(0, core.maximum),
+        description=f"{part}{core.description}{more}; 0: preset",
+        limits=(0, core.maximum if most is None else most),
     )
 
 
@@ -49,9 +60,15 @@ class TrackerParameters(NodeParameters):
     strategy: str = shared(
         TrackerConfig, "strategy", default="preset", choices=("preset", *STRATEGIES)
     )
-    particles: int = _of_preset(FilterConfig, "particles")
+    particles: int = _of_preset(
+        FilterConfig,
+        "particles",
+        most=MOST_MOVES,
+        more="; an image takes about 10 us for each of them and cycle, and particles x cycles is "
+        f"at most {MOST_MOVES}",
+    )
     cycles: int = _of_preset(TrackerConfig, "cycles")
-    average: int = _of_preset(TrackerConfig, "average")
+    average: int = _of_preset(TrackerConfig, "average", most=MOST_MOVES)
     torso_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "torso: ")
     arm_survival_rate: float = _of_preset(FilterConfig, "survival_rate", "arms: ")
     torso_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "torso: ")
@@ -121,7 +138,14 @@ class TrackerParameters(NodeParameters):
 
     def check(self) -> None:
         """Raise ValueError where values do not go together."""
-        self.config()
+        config = self.config()
+        most = max(config.torso.particles, config.arm.particles)
+        if most * config.cycles > MOST_MOVES:
+            raise ValueError(
+                f"{most} particles x {config.cycles} cycles are {most * config.cycles}; expected "
+                f"{MOST_MOVES} at most, which take about 0.2 s an image at 320x240: the node is "
+                "deaf that long. For more, track a recording with 'cardbox track'"
+            )
         if self.rep155_id and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.rep155_id):
             raise ValueError(
                 f"rep155_id is '{self.rep155_id}'; expected a letter, then letters, digits and "

@@ -20,7 +20,6 @@ _REASONS = {
         "look at the overlay, and let a robot wait until tracking_state is tracking again"
     ),
 }
-_REPEAT_S = 10.0
 
 
 class TrackerReport:
@@ -52,16 +51,16 @@ class TrackerReport:
         if state == UNCERTAIN:
             # It may come and go with every other image.
             text = f"tracking, but {reason}"
-            self._node.get_logger().info(text, throttle_duration_sec=_REPEAT_S)
+            self._node.diagnostics.say("state", text)
         elif before != UNCERTAIN or reason:
-            self._node.get_logger().info(f"not tracking: {reason}" if reason else "tracking")
+            self._node.diagnostics.say("state", f"not tracking: {reason}" if reason else "tracking")
 
-    def warnings(self) -> list[str]:
-        """Return what is wrong now, if anything is."""
+    def warnings(self) -> dict[str, str]:
+        """Return what is wrong now, if anything is; it is logged already."""
         reason = _REASONS.get(self._state)
         if reason is None:
-            return []
-        return [reason if self._state == UNCERTAIN else f"no joint states: {reason}"]
+            return {}
+        return {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
 
     def values(self) -> dict[str, str]:
         """Return the state, how often each occurred, and the figures of the last posture."""

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
@@ -17,6 +16,7 @@ from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _FIND_S = 10.0
 _GONE_S = 5.0
@@ -37,7 +37,7 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
     rclpy.init(args=[])
     try:
         node = rclpy.create_node("cardbox_call", enable_rosout=False)
-        executor = SingleThreadedExecutor()
+        executor = make_executor()
         executor.add_node(node)
         client = node.create_client(Trigger, service)
         end_s = time.monotonic() + _FIND_S

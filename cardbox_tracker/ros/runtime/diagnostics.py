@@ -1,13 +1,13 @@
 """The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
-A node that publishes nothing yet reports what it waits for. Lost images are counted by the spacing
-of their stamps, since the middleware does not report them.
+A node that publishes nothing yet reports what it waits for, and one whose input has ceased says so.
+Lost images are counted by the spacing of their stamps, since the middleware does not report them.
+Nothing that arrives can fill the log: :mod:`.log_limit`.
 """
 
 from __future__ import annotations
 
 import time
-from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Callable
 
@@ -18,69 +18,22 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from cardbox_tracker.ros.runtime.log_limit import LogLimit
+from cardbox_tracker.ros.runtime.stream import WINDOW, StreamStatistics
+
 PERIOD_S = 1.0
-_REPEAT_S = 10.0
-_WINDOW = 120
-_PAUSE_NS = 2_000_000_000
+# Without input for so long, and for so many periods, it has ceased.
+_SILENT_S = 3.0
+_SILENT_PERIODS = 5.0
+# Results whose latency says something.
+_ENOUGH = 30
+
+_CEASED = "is the camera running and connected, and every node between it and this one?"
 
 STATUS = "status"
 """Key of the value that says whether a node is ``waiting``, ``working`` or has an ``error``."""
 
 WAITING, WORKING, ERROR = "waiting", "working", "error"
-
-
-class StreamStatistics:
-    """Counts the messages of one stream, and by their stamps those that never arrived."""
-
-    def __init__(self) -> None:
-        """Start with nothing received."""
-        self.received = 0
-        self.dropped = 0
-        self.out_of_order = 0
-        self._last_ns: int | None = None
-        self._spacings_ns: deque[int] = deque()
-        # The same, sorted: the period is needed with every image.
-        self._ordered_ns: list[int] = []
-
-    def add(self, stamp_ns: int) -> bool:
-        """Count a message of that stamp; return False if it is not later than the one before."""
-        self.received += 1
-        last_ns, self._last_ns = self._last_ns, stamp_ns
-        if last_ns is None:
-            return True
-        spacing_ns = stamp_ns - last_ns
-        if spacing_ns <= 0:
-            self.out_of_order += 1
-            self._spacings_ns.clear()
-            self._ordered_ns.clear()
-            return False
-        if spacing_ns < _PAUSE_NS:
-            self._note(spacing_ns)
-            if len(self._spacings_ns) >= 5:
-                self.dropped += max(round(spacing_ns / self.period_ns) - 1, 0)
-        return True
-
-    def _note(self, spacing_ns: int) -> None:
-        if len(self._spacings_ns) == _WINDOW:
-            del self._ordered_ns[bisect_left(self._ordered_ns, self._spacings_ns.popleft())]
-        self._spacings_ns.append(spacing_ns)
-        insort(self._ordered_ns, spacing_ns)
-
-    @property
-    def period_ns(self) -> int:
-        """Spacing of the stamps without losses, ns.
-
-        A low percentile: where most images are lost, the median is a multiple of the period.
-        """
-        return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
-
-    @property
-    def loss(self) -> float:
-        """Fraction of the latest messages that never arrived, judged by their stamps."""
-        if len(self._spacings_ns) < 5:
-            return 0.0
-        expected = max(round(sum(self._spacings_ns) / self.period_ns), 1)
-        return max(1.0 - len(self._spacings_ns) / expected, 0.0)
 
 
 class NodeDiagnostics:
@@ -89,21 +42,28 @@ class NodeDiagnostics:
     Attributes:
         input: the images or silhouettes that drive the node.
         extra: called once a second for further values, name to text.
-        advice: called once a second for warnings that come and go, such as lost images.
+        source: what drives the node and where it comes from, such as "images on /image_raw"; said
+            when it ceases.
+        advice: called once a second for warnings that come and go, such as lost images: kind to
+            text. The kind "" is for what the node logs itself.
     """
 
     def __init__(self, node: Node) -> None:
         """Publish for ``node`` from now on."""
         self.input = StreamStatistics()
         self.extra: Callable[[], dict[str, str]] = dict
-        self.advice: Callable[[], list[str]] = list
+        self.advice: Callable[[], dict[str, str]] = dict
+        self.source = ""
         self._node = node
         self._waiting = ""
         self._problem = ""
-        self._said: dict[str, float] = {}
+        self._kind = ""
+        self._log = LogLimit()
+        self._silence = ""
+        self._arrived = (0, time.monotonic())
         self._warnings: list[str] = []
         self._published = self._late = 0
-        self._latencies_ms: deque[float] = deque(maxlen=_WINDOW)
+        self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
         self._before = (time.monotonic(), 0, 0)
         self._publisher = node.create_publisher(
             DiagnosticArray, "/diagnostics", QoSProfile(depth=10)
@@ -114,20 +74,28 @@ class NodeDiagnostics:
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""
         self._waiting, self._problem = text, ""
-        if self._is_news(text):
+        if self._log.allows(WAITING, text):
             self._node.get_logger().info(f"waiting for {text}")
 
-    def problem(self, text: str) -> None:
-        """Report an error; it is shown until :meth:`working`."""
-        self._problem = text
-        if self._is_news(text):
+    def problem(self, text: str, kind: str = ERROR) -> None:
+        """Report an error, shown until :meth:`working`; those of one ``kind`` share a log limit."""
+        self._problem, self._kind = text, kind
+        if self._log.allows(kind, text):
             self._node.get_logger().error(text)
+
+    def say(self, kind: str, text: str, *, warning: bool = False) -> None:
+        """Log what anybody can cause as often as they like."""
+        if self._log.allows(kind, text):
+            # rclpy refuses another level from the same line.
+            if warning:
+                self._node.get_logger().warning(text)
+            else:
+                self._node.get_logger().info(text)
 
     def working(self, sent_ns: int = 0) -> None:
         """Count an output; ``sent_ns`` is when its input left the sender, ns since the epoch."""
         if self._waiting or self._problem:
             self._waiting = self._problem = ""
-            self._said.clear()
         self._published += 1
         if sent_ns > 0:
             latency_ns = time.time_ns() - sent_ns
@@ -141,18 +109,51 @@ class NodeDiagnostics:
             self._warnings.append(text)
             self._node.get_logger().warning(text)
 
-    def _is_news(self, text: str) -> bool:
-        """True if ``text`` was not logged for a while; takes note of it."""
-        now = time.monotonic()
-        if now - self._said.get(text, -_REPEAT_S) < _REPEAT_S:
-            return False
-        self._said[text] = now
-        return True
+    def _look_for_silence(self) -> None:
+        """Notice that the input has ceased, or that it is back."""
+        received, since_s = self._arrived
+        now_s = time.monotonic()
+        if self.input.received != received:
+            self._arrived = self.input.received, now_s
+            if self._silence:
+                self._silence = ""
+                self._node.get_logger().info(f"{self.source} arrive again")
+            return
+        silent_s = now_s - since_s
+        if not (received and self.source) or silent_s < max(
+            _SILENT_S, _SILENT_PERIODS * self.input.period_ns / 1e9
+        ):
+            return
+        if not self._silence:
+            self._node.get_logger().warning(f"{self.source} have ceased: {_CEASED}")
+        self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {_CEASED}"
+
+    def _slowness(self) -> dict[str, str]:
+        """Return what to say where results need longer than images have time."""
+        if len(self._latencies_ms) < _ENOUGH:
+            return {}
+        latency_ms, period_ms = np.median(self._latencies_ms), self.input.period_ns / 1e6
+        if not 0 < period_ms < latency_ms:
+            return {}
+        return {
+            "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
+            f"{period_ms:.0f} ms, so that images wait or are left out; take fewer particles or "
+            "cycles, a smaller working resolution, or fewer images a second"
+        }
+
+    def _remarks(self) -> list[str]:
+        """Return all warnings of now; each kind that is new is logged."""
+        found = self.input.remarks() | self._slowness() | self.advice()
+        for kind, text in found.items():
+            if kind and self._log.allows(kind, kind):
+                self._node.get_logger().warning(text)
+        return [*self._warnings, *found.values()]
 
     def _tick(self) -> None:
-        if self._problem:
-            self.problem(self._problem)
-        elif self._waiting:
+        self._look_for_silence()
+        if self._problem and not self._silence:
+            self.problem(self._problem, self._kind)
+        elif self._waiting and not self._silence:
             self.wait_for(self._waiting)
         status = self._status()
         message = DiagnosticArray(status=[status])
@@ -164,8 +165,10 @@ class NodeDiagnostics:
         before, received_before, published_before = self._before
         self._before = (now, received, published)
         span_s = max(now - before, 1e-3)
-        warnings = self._warnings + self.advice()
-        if self._problem:
+        warnings = self._remarks()
+        if self._silence:
+            state, level, text = WAITING, DiagnosticStatus.ERROR, f"waiting for {self._silence}"
+        elif self._problem:
             state, level, text = ERROR, DiagnosticStatus.ERROR, self._problem
         elif self._waiting:
             state, level, text = WAITING, DiagnosticStatus.WARN, f"waiting for {self._waiting}"

@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
+from cardbox_tracker import interrupts
 from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
@@ -100,7 +101,8 @@ class CardboxNode(Node):
             try:
                 callback(message, int(info["source_timestamp"]))
             except CardboxError as error:
-                self.diagnostics.problem(str(error))
+                kind = f"{type(error).__name__} in {topic}"
+                self.diagnostics.problem(str(error), kind)
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
@@ -134,12 +136,12 @@ class CardboxNode(Node):
         try:
             text = action()
         except CardboxError as error:
-            self.get_logger().warning(f"{name}: {error}")
+            self.diagnostics.say(f"{name} refused", f"{name}: {error}", warning=True)
             return False, str(error)
         except Exception as error:
             self._unexpected(f"service {name}", error)
             return False, f"unexpected error, see the log of {self.get_name()}: {error!r}"
-        self.get_logger().info(f"{name}: {text}")
+        self.diagnostics.say(name, f"{name}: {text}")
         return True, text
 
     def close(self) -> None:
@@ -148,7 +150,8 @@ class CardboxNode(Node):
     def _unexpected(self, where: str, error: Exception) -> None:
         if not self.context.ok():
             return  # a signal is ending the node
-        self.diagnostics.problem(f"unexpected error in {where}: {error!r}; please report it")
+        text = f"unexpected error in {where}: {error!r}; please report it"
+        self.diagnostics.problem(text, f"unexpected error in {where}")
         self.get_logger().debug(traceback.format_exc())
 
 
@@ -180,9 +183,16 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     """Create what works until it is told to stop; return the process's exit code."""
+    with interrupts.only_noted():
+        return _run(create, args, work)
+
+
+def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
     try:
         rclpy.init(args=args)
     except Exception as error:
+        if interrupts.were_received():
+            return 0
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
     node: N | None = None
@@ -194,13 +204,14 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
         gc.freeze()
         work(node)
     except CardboxError as error:
-        get_logger("cardbox_tracker").fatal(str(error))
-        return 1
+        if ok():
+            get_logger("cardbox_tracker").fatal(str(error))
+            return 1
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         pass
     except Exception:
         # A signal shuts ROS down at any point; exceptions that follow from it are expected.
-        if ok():
+        if ok() and not interrupts.were_received():
             raise
     finally:
         if node is not None:

@@ -16,16 +16,6 @@ from cardbox_tracker.errors import CardboxError
 
 _STOP_S = 10.0
 
-EXECUTABLES: dict[str, str] = {
-    "background": "cardbox_tracker.ros.nodes.background_node",
-    "initializer": "cardbox_tracker.ros.nodes.initializer_node",
-    "tracker": "cardbox_tracker.ros.nodes.tracker_node",
-    "camera": "cardbox_tracker.ros.nodes.camera_node",
-    "play_bag": "cardbox_tracker.ros.nodes.play_bag_node",
-    "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
-}
-"""Module of each executable that ``ros2 run cardbox_tracker`` knows."""
-
 
 def isolate() -> None:
     """Keep this process and its children off other people's graphs; let large images through.
@@ -57,11 +47,11 @@ class Nodes:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, *arguments: str) -> None:
-        """Start the executable ``name`` of this package, see ``EXECUTABLES``."""
+        """Start the executable ``name`` of this package, see ``start.NODES``."""
         # -P: in a checkout, too, the installed package is run, whose kernels are compiled already.
         with (self._logs / f"{name}.log").open("wb") as log:
             self._processes[name] = subprocess.Popen(
-                [sys.executable, "-P", "-m", EXECUTABLES[name], *arguments],
+                [sys.executable, "-P", "-m", "cardbox_tracker.start", name, *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )

@@ -12,23 +12,18 @@ class SinglePublisher:
         """Watch the resolved names ``topics`` as ``node`` sees them."""
         self._node = node
         self._topics = topics
-        self._said: set[str] = set()
 
-    def remarks(self) -> list[str]:
-        """Return a text for each topic that has several publishers now; log what is new."""
-        found = []
+    def remarks(self) -> dict[str, str]:
+        """Return a text for each topic that has several publishers now, by its kind."""
+        found = {}
         for topic in self._topics:
             ends = self._node.get_publishers_info_by_topic(topic)
             if len(ends) < 2:
                 continue
             names = sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in ends)
-            text = (
+            found[f"publishers of {topic}"] = (
                 f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one camera. "
                 "Stop all but one, or give each camera a namespace of its own (docs/cameras.md); "
                 "one that was killed is listed for some seconds more"
             )
-            found.append(text)
-            if text not in self._said:
-                self._said.add(text)
-                self._node.get_logger().warning(text)
         return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,8 +15,8 @@ from visualization_msgs.msg import Marker
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from cardbox_tracker.drawing.markers import marker_shapes
-from cardbox_tracker.errors import CameraError, EncodingError
+from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
+from cardbox_tracker.errors import CameraError, EncodingError, NotFiniteError
 from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points, Text
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.vision.camera import Calibration, Camera
@@ -131,6 +132,53 @@ def test_a_calibration_of_another_shape_is_refused() -> None:
 def test_distorted_silhouette_is_refused() -> None:
     with pytest.raises(CameraError, match="distortion"):
         conversions.camera_of(info(d=[0.1, 0.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.promise("No number that is not finite leaves a node")
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("entry", [0, 2, 4, 5])
+def test_a_matrix_that_is_not_finite_is_refused_in_its_own_words(entry: int, value: float) -> None:
+    k = list(info().k)
+    k[entry] = value
+    for read in (
+        conversions.camera_of,
+        lambda message: calibration_from_info(message, "/image_raw", "/camera_info"),
+    ):
+        with pytest.raises(CameraError, match=f"K.* not finite numbers .*{value:g}"):
+            read(info(k=k))
+
+
+def test_a_silhouettes_camera_without_size_or_with_a_lens_of_nan_is_refused() -> None:
+    with pytest.raises(CameraError, match="0x240"):
+        conversions.camera_of(info(width=0))
+    with pytest.raises(CameraError, match="distortion"):
+        conversions.camera_of(info(d=[np.nan, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_what_is_not_used_of_a_camera_info_may_be_anything() -> None:
+    odd = info(p=np.full(12, np.nan), r=np.full(9, np.inf))
+    assert conversions.camera_of(odd) == CAMERA
+    assert calibration_from_info(odd, "a", "b").camera(320, 240) == CAMERA
+
+
+@pytest.mark.promise("No number that is not finite leaves a node")
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda values: JointValues(JOINT_NAMES, values[:12]),
+        lambda values: Points(values.reshape(6, 3)),
+        lambda values: Markers(
+            (MarkerShape("patches", 5, 1.0, values.reshape(6, 3), (0, 0, 0, 1)),)
+        ),
+    ],
+)
+def test_what_is_not_finite_becomes_no_message(make: Any, value: float) -> None:
+    values = np.zeros(18)
+    assert results.message_of(HEADER, make(values)) is not None
+    values[7] = value
+    with pytest.raises(NotFiniteError, match="not published"):
+        results.message_of(HEADER, make(values))
 
 
 def test_joint_state_has_names_positions_and_header() -> None:

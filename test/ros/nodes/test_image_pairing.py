@@ -24,6 +24,9 @@ from cardbox_tracker.body.model import BodyModel  # noqa: E402
 from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.body.posture import reference_posture  # noqa: E402
 from cardbox_tracker.errors import CameraError  # noqa: E402
+from cardbox_tracker.estimation.initialization.config import (  # noqa: E402
+    InitializationConfig,
+)
 from cardbox_tracker.estimation.tracker import Estimate, Tracker  # noqa: E402
 from cardbox_tracker.ros.messages import conversions  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
@@ -148,7 +151,7 @@ def test_captures_keep_the_images_of_their_silhouettes() -> None:
             image = np.full((240, 320, 3), number, np.uint8)
             references.add_image(conversions.image_message(header, image), 0)
         references.add(conversions.image_message(header, silhouette))
-    references.capture("front", 3)
+    references.capture("front", 3, None, InitializationConfig())
     assert [int(image[0, 0, 0]) for image in references.images["front"]] == [3, 5]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -14,8 +15,8 @@ from cardbox_tracker.ros.runtime.diagnostics import (
     WAITING,
     WORKING,
     NodeDiagnostics,
-    StreamStatistics,
 )
+from cardbox_tracker.ros.runtime.stream import Step, StreamStatistics
 
 PERIOD_NS = 66_666_667
 
@@ -62,10 +63,10 @@ def test_the_period_is_that_of_the_latest_stamps() -> None:
 
 
 def test_stamps_that_go_back_are_noticed() -> None:
-    statistics = fed(list(range(20)))
-    assert not statistics.add(0)
+    statistics = fed(list(range(40)))
+    assert statistics.add(1_000_000_000) is Step.RESTART
     assert statistics.out_of_order == 1
-    assert statistics.add(PERIOD_NS)
+    assert statistics.add(1_000_000_000 + PERIOD_NS) is Step.NEXT
 
 
 def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callable) -> None:
@@ -122,3 +123,101 @@ def test_a_result_that_takes_longer_than_a_period_is_late(make_node: Callable) -
     diagnostics.working(sent_ns=time.time_ns() + 60 * PERIOD_NS)
     values = {value.key: value.value for value in diagnostics._status().values}
     assert (values["late"], values["published"], values["received"]) == ("1", "2", "10")
+
+
+class Logged:
+    """What a node logs, in place of its logger."""
+
+    def __init__(self, node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.lines: list[str] = []
+        monkeypatch.setattr(node, "get_logger", lambda: self)
+        self.info = self.warning = self.error = self.lines.append
+
+
+@pytest.mark.promise("A node whose input has ceased says so")
+def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    now = [time.monotonic()]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    diagnostics.source = "images on /image_raw"
+
+    def second() -> tuple[str, str]:
+        now[0] += 1.0
+        diagnostics._tick()
+        status = diagnostics._status()
+        return status.message, {v.key: v.value for v in status.values}[STATUS]
+
+    for _ in range(10):
+        second()
+    assert not logged.lines, "before the first image it waits, and that is said elsewhere"
+    for frame in range(30):
+        diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
+        diagnostics.working()
+    assert second() == second() == ("working", WORKING)
+    silent = [second() for _ in range(20)]
+    assert silent[-1][1] == WAITING and silent[-1][0].startswith(
+        "waiting for images on /image_raw, which have ceased"
+    )
+    assert [line[:36] for line in logged.lines] == ["images on /image_raw have ceased: is"]
+    diagnostics.input.add(10**12)
+    diagnostics.working()
+    assert second() == ("working", WORKING)
+    assert logged.lines[1:] == ["images on /image_raw arrive again"]
+
+
+def test_a_slow_camera_is_not_silent(make_node: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    diagnostics.source = "images"
+    now = [time.monotonic()]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    for frame in range(10):
+        diagnostics.input.add(1 + frame * 1_500_000_000)
+    diagnostics._tick()
+    now[0] += 7.0
+    diagnostics._tick()
+    assert not diagnostics._silence
+    now[0] += 1.0
+    diagnostics._tick()
+    assert diagnostics._silence
+
+
+def test_what_only_the_diagnostics_said_is_logged_once(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    loss = [11]
+    diagnostics.advice = lambda: {"loss": f"{loss[0]} % are lost", "": "logged by the node"}
+    for loss[0] in range(11, 30):
+        status = diagnostics._status()
+    assert logged.lines == ["11 % are lost"]
+    assert status.message == "logged by the node"
+    assert "29 % are lost" in [value.value for value in status.values]
+
+
+def test_good_images_between_do_not_open_the_log(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    for number in range(200):
+        diagnostics.problem(f"encoding '{number}'", "EncodingError in image_raw")
+        diagnostics.working()
+    assert len(logged.lines) == 3
+
+
+@pytest.mark.parametrize(("periods", "slow"), [(0.5, False), (3.0, True)])
+def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
+    make_node: Callable, periods: float, slow: bool
+) -> None:
+    diagnostics = NodeDiagnostics(make_node())
+    for frame in range(40):
+        diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
+        diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
+    assert ("fewer particles" in diagnostics._status().message) is slow

@@ -28,7 +28,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.settings import settings_of
+from cardbox_tracker.settings import check, settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
 from tools import parameter_docs
 
@@ -316,3 +316,27 @@ def test_yaml_floats_stay_floats(value: float) -> None:
 
     assert yaml.safe_load(parameter_docs.yaml_value(value)) == pytest.approx(value)
     assert isinstance(yaml.safe_load(parameter_docs.yaml_value(value)), float)
+
+
+@pytest.mark.promise("No parameter makes the tracker deaf")
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"particles": 200_000, "cycles": 20}, "particles is 200000; expected 0 to 20000"),
+        (
+            {"particles": 20_000, "cycles": 2},
+            "20000 particles x 2 cycles are 40000; expected 20000",
+        ),
+        ({"preset": "paper", "particles": 1000, "cycles": 100}, "cardbox track"),
+    ],
+)
+def test_what_would_make_the_tracker_deaf_is_refused(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check(TrackerParameters(**values))
+        TrackerParameters(**values).check()
+
+
+@pytest.mark.parametrize("values", [{"particles": 20_000}, {"particles": 200, "cycles": 100}])
+def test_all_that_the_frame_rate_bears_is_allowed(values: dict[str, Any]) -> None:
+    check(TrackerParameters(**values))
+    TrackerParameters(**values).check()

@@ -1,0 +1,53 @@
+"""What can be wrong with the matrix and the distortion of a calibration, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A focal length of a fiftieth of the image's width would see 177 degrees, one of a thousand widths
+# a twentieth of a degree.
+_SHORTEST, _LONGEST = 0.02, 1000.0
+# The principal point lies outside of the image where a driver cuts a region out of it.
+_FARTHEST = 100.0
+
+
+def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
+    """Say what is wrong with a matrix K (3, 3) for images of a size in px, if anything.
+
+    The text goes behind the name of the matrix: "is all zero", "has values that are ...".
+    """
+    values = np.asarray(k, dtype=np.float64)
+    if not values.any():
+        return "is all zero"
+    if not np.isfinite(values).all():
+        return f"has values that are not finite numbers ({_shown(values)})"
+    size = np.array([width, height])
+    focal, center = np.array([values[0, 0], values[1, 1]]), np.array([values[0, 2], values[1, 2]])
+    names = ("fx", "fy")
+    for name, length, pixels in zip(names, focal.tolist(), size.tolist(), strict=True):
+        if not _SHORTEST * pixels <= length <= _LONGEST * pixels:
+            return (
+                f"has the focal length {name} = {length:g} px; expected {_SHORTEST * pixels:g} to "
+                f"{_LONGEST * pixels:g} px for images of {width}x{height}"
+            )
+    if (np.abs(center) > _FARTHEST * size).any():
+        return (
+            f"has its principal point at ({center[0]:g}, {center[1]:g}) px; expected it near the "
+            f"image of {width}x{height}"
+        )
+    return ""
+
+
+def distortion_problem(distortion: NDArray[Any]) -> str:
+    """Say what is wrong with the values of distortion coefficients (n,), if anything."""
+    values = np.asarray(distortion, dtype=np.float64)
+    if np.isfinite(values).all():
+        return ""
+    return f"have values that are not finite numbers ({_shown(values)})"
+
+
+def _shown(values: NDArray[np.float64]) -> str:
+    return ", ".join(f"{value:g}" for value in values.ravel().tolist())

@@ -1,0 +1,65 @@
+"""Ctrl-C and SIGTERM in the first seconds end every program without a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+_LIMIT_S = 60.0
+# From the imports to the start of ROS; the long run of 'make reliability' has all programs.
+DELAYS_S = (0.0, 0.15, 0.4, 0.7, 1.0, 1.4)
+
+
+def takes_signals(pid: int) -> bool:
+    """Whether a process has a handler for SIGTERM, which Python itself has not."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    caught = next(line for line in lines if line.startswith("SigCgt"))
+    return bool(int(caught.split()[1], 16) & (1 << (signal.SIGTERM - 1)))
+
+
+def end_early(name: str, arguments: list[str], number: int, delay_s: float) -> tuple[int, str]:
+    """Start a program, send it a signal; return its exit code and what it said."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cardbox_tracker.start", name, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "ROS_DOMAIN_ID": str(1 + os.getpid() % 100)},
+    )
+    end = time.monotonic() + _LIMIT_S
+    while not takes_signals(process.pid) and process.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    time.sleep(delay_s)
+    process.send_signal(number)
+    said, _ = process.communicate(timeout=_LIMIT_S)
+    return process.returncode, said
+
+
+@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("delay_s", DELAYS_S)
+def test_a_node_that_is_starting_ends(number: int, delay_s: float) -> None:
+    code, said = end_early("tracker", [], number, delay_s)
+    assert "Traceback" not in said and "Exception" not in said, said
+    assert code == 0
+
+
+@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("delay_s", [0.0, 0.5])
+def test_a_command_that_is_starting_ends(number: int, delay_s: float, tmp_path: Path) -> None:
+    arguments = ["synthesize", "--motion", "wave", "--output", str(tmp_path / "bag")]
+    code, said = end_early("cardbox", arguments, number, delay_s)
+    assert "Traceback" not in said and "Exception" not in said, said
+    # Before the command has begun, SIGTERM ends it as any process.
+    assert code in ((130,) if number == signal.SIGINT else (143, -15))
+    assert not (tmp_path / "bag").exists()
