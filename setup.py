@@ -76,13 +76,16 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            f"cardbox = {NAME}.commands.main:main",
-            f"background = {NAME}.ros.nodes.background_node:main",
-            f"initializer = {NAME}.ros.nodes.initializer_node:main",
-            f"tracker = {NAME}.ros.nodes.tracker_node:main",
-            f"camera = {NAME}.ros.nodes.camera_node:main",
-            f"play_bag = {NAME}.ros.nodes.play_bag_node:main",
-            f"cardbox_nodes = {NAME}.ros.nodes.single_process:main",
+            f"{name} = {NAME}.commands.executables:{name}"
+            for name in (
+                "cardbox",
+                "background",
+                "initializer",
+                "tracker",
+                "camera",
+                "play_bag",
+                "cardbox_nodes",
+            )
         ],
     },
 )
