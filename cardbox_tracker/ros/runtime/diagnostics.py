@@ -90,6 +90,7 @@ class NodeDiagnostics:
         input: the images or silhouettes that drive the node.
         extra: called once a second for further values, name to text.
         advice: called once a second for warnings that come and go, such as lost images.
+        remarks: the same of what every node watches, such as the types of its topics.
     """
 
     def __init__(self, node: Node) -> None:
@@ -97,6 +98,7 @@ class NodeDiagnostics:
         self.input = StreamStatistics()
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], list[str]] = list
+        self.remarks: Callable[[], list[str]] = list
         self._node = node
         self._waiting = ""
         self._problem = ""
@@ -164,7 +166,7 @@ class NodeDiagnostics:
         before, received_before, published_before = self._before
         self._before = (now, received, published)
         span_s = max(now - before, 1e-3)
-        warnings = self._warnings + self.advice()
+        warnings = self._warnings + self.remarks() + self.advice()
         if self._problem:
             state, level, text = ERROR, DiagnosticStatus.ERROR, self._problem
         elif self._waiting:
