@@ -11,11 +11,11 @@ import yaml
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from rclpy.serialization import serialize_message  # noqa: E402
+from rclpy.serialization import serialize_message
 
-from cardbox_tracker.demo.client import TOPICS, Client  # noqa: E402
-from cardbox_tracker.outputs import JOINT_STATE_NAMES, OUTPUTS  # noqa: E402
-from cardbox_tracker.recordings.result_bag import result_writer  # noqa: E402
+from cardbox_tracker.demo.client import TOPICS, Client
+from cardbox_tracker.outputs import JOINT_STATE_NAMES, OUTPUTS
+from cardbox_tracker.recordings.result_bag import result_writer
 
 NAMES = ("body_model", "robot_description", "silhouette", "silhouette/camera_info", "overlay")
 

@@ -23,7 +23,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 
 
 class Rep155Outputs:
-    """What other programs know of the body ``rep155_id``: its joints, its URDF, that it is there."""
+    """What other programs know of the body ``rep155_id``: joints, URDF, and that it is there."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         """Advertise the topics of the body ``settings.rep155_id``."""

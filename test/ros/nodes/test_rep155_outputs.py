@@ -11,13 +11,13 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from rclpy.qos import DurabilityPolicy  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
+from rclpy.qos import DurabilityPolicy
+from std_msgs.msg import Header
 
-from cardbox_tracker.body.model import BodyModel  # noqa: E402
-from cardbox_tracker.body.posture import reference_posture  # noqa: E402
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate  # noqa: E402
-from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs  # noqa: E402
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate
+from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
 
 PLACE = "/humans/bodies/p1"
 
