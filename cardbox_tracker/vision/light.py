@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
 from cardbox_tracker.vision.chroma import bgr_of
 from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, sum_cells
 
