@@ -31,7 +31,7 @@ _TIMES_NOISE = 4.0
 _BLOCK = 15
 # A region is still if no larger share of it with what is near, and of its outline, has changed
 # in so many images. In 300 of them, of things 0.5 % changes, and up to 9 % where hands pass by; of
-# people of eleven sessions, who sway by 3 mm, 54 % or more, of one who stands for a minute 38 %, and
+# people of eleven sessions, who sway by 3 mm, 54 % or more, of one who stands for a minute 38 %,
 # of one who sways by 1 mm in strong noise 25 % (docs/evaluation/silhouettes.md).
 STILL = 0.08
 _NEAR_PX = 8
