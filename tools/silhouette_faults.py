@@ -262,7 +262,8 @@ def still_cell(session: Session) -> str:
         if found is None or number - session.empty[-1] < after:
             continue
         for region, share in regions.regions():
-            if np.count_nonzero(region & session.masks[number]) > 0.2 * np.count_nonzero(region):
+            mask = session.masks[number][::2, ::2]
+            if np.count_nonzero(region & mask) > 0.2 * np.count_nonzero(region):
                 least.append(share)
     return f"{100 * min(least):.0f}" if least else "-"
 

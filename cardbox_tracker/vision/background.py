@@ -104,11 +104,11 @@ class SilhouetteExtractor:
         if self._light is not None:
             self._light.replace(model.mean, None if model.chroma is None else model.chroma.mean)
 
-    def _absorb(self, image: ImageArray, silhouette: ImageArray) -> None:
+    def _absorb(self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray) -> None:
         """Let what was moved and stays become background."""
         if self._absorber is None:
             return
-        absorbed = self._absorber.add(image, silhouette, self.gain)
+        absorbed = self._absorber.add(image, brightness, silhouette, self.gain)
         if absorbed is not None:
             pixels, now = absorbed
             if self._chroma is not None and now.chroma is not None:
@@ -175,7 +175,7 @@ class SilhouetteExtractor:
         self._last = window_of(silhouette)
         if self._light is not None:
             self._light.exclude(silhouette)
-        self._absorb(image, silhouette)
+        self._absorb(image, brightness, silhouette)
         return silhouette
 
     def _colored_window(

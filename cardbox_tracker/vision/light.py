@@ -115,6 +115,7 @@ class LightFollower:
         self._settling, self._is_lit = 0, False
         # What the silhouette is since the step, but for what only light makes.
         self._passing: ImageArray | None = None
+        self._lit = np.zeros(self._size[::-1], np.bool_)
         self._brightness = np.zeros(self._mean.shape, np.uint8)
         self._started = False
         self._images = 0
@@ -209,16 +210,18 @@ class LightFollower:
             self._settling = _SETTLING - 1
             return
         person = np.ascontiguousarray(silhouette[_GRID])
-        smooth, brighter = self._smooth_from_background(person)
-        lit = smooth & brighter
-        self._is_lit = bool(np.count_nonzero(lit) > _LIT * lit.size)
+        # Looked for as often as the field is estimated, before it.
+        if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
+            smooth, brighter = self._smooth_from_background(person)
+            # What is darker may be the person's shadow, and goes where the person goes.
+            self._lit = smooth & brighter
+            self._is_lit = bool(np.count_nonzero(self._lit) > _LIT * smooth.size)
         if self._settling > 0:
             self._settling -= 1
             person[smooth] = 0
             self._passing = person
             return
-        # What is darker may be the person's shadow, and goes where the person goes.
-        person[lit] = 0
+        person[self._lit] = 0
         self._passing = None
         self._person = cv2.dilate(person, _KERNEL).reshape(person.shape)
 

@@ -53,7 +53,7 @@ class SceneMotion:
 
     def add(self, brightness: ImageArray) -> float:
         """Look at an image (H, W); return the share of the pixels that have moved so far."""
-        self._latest.append(small_image(brightness))
+        self._latest.append(_small(brightness))
         self._count += 1
         if self._count == self._of:
             self._first = self._mean()
@@ -66,8 +66,7 @@ class SceneMotion:
         return np.asarray(sum(self._latest) / np.float32(len(self._latest)), np.float32)
 
 
-def small_image(brightness: ImageArray | FloatImage) -> FloatImage:
-    """Return an image (H, W) at half the resolution, smoothed, for :func:`changed_pixels`."""
+def _small(brightness: ImageArray) -> FloatImage:
     height, width = brightness.shape
     size = (max(width // _SCALE, 1), max(height // _SCALE, 1))
     small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA).astype(np.float32)

@@ -122,15 +122,15 @@ def test_restarted_it_does_not_remember(room: Any) -> None:
 
 @pytest.mark.parametrize(("moved", "is_thing"), [(0.5 * STILL, True), (2.0 * STILL, False)])
 def test_the_share_that_may_move_by_hand(moved: float, is_thing: bool) -> None:
-    silhouette = np.zeros((100, 200), np.uint8)
-    silhouette[:, 60:140] = 255
+    silhouette = np.zeros((100, 800), np.uint8)
+    silhouette[:, 100:700] = 255
     # What is near reaches 8 px farther at both sides.
-    columns = round(moved * 96)
+    columns = round(moved * 616)
     regions = StillRegions(AFTER)
     found = []
     for number in range(AFTER + 15):
-        image = np.full((100, 200), 100, np.uint8)
-        image[:, 100 : 100 + 2 * (columns // 2)] = 160 if number // 15 % 2 else 100
+        image = np.full((100, 800), 100, np.uint8)
+        image[:, 300 : 300 + 2 * (columns // 2)] = 160 if number // 15 % 2 else 100
         found.append(regions.add(image, silhouette, 1.0))
     assert all((mask is None) == (number % 15 != 14) for number, mask in enumerate(found))
     assert found[-1] is not None
