@@ -26,7 +26,7 @@ RESUME_S = 1.0
 """After a fault the posture is that of the person within this time, by the stamps."""
 
 # An error or an overlap as after any start; what follows somebody else is far beyond.
-LARGEST_ERROR_M, LEAST_IOU = 0.15, 0.7
+LARGEST_ERROR_M, LEAST_IOU = 0.20, 0.7
 
 PERSON, EMPTY, GARBAGE = "person", "empty", "garbage"
 

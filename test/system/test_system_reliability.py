@@ -155,9 +155,14 @@ class Live:
         self.now_s = APART_S * (1 + self.now_s // APART_S)
         return self.now_s
 
+    def forget(self) -> None:
+        """Forget what was found so far, also what is still on its way."""
+        self.graph.spin(0.5)
+        self.joint_states.clear()
+
     def undisturbed(self) -> None:
         """Check that the person is tracked as ever."""
-        self.joint_states.clear()
+        self.forget()
         sent = run_of(lambda images, _: images, from_s=self.next_run())
         for part in sent:
             self.send_all(part)
@@ -191,7 +196,7 @@ def live(own_graph: Any, request: pytest.FixtureRequest) -> Iterator[Live]:
 
 
 def judged(live: Live, name: str, fault: Callable[..., list[Sent]], during: Any = None) -> Any:
-    live.joint_states.clear()
+    live.forget()
     before, meanwhile, after = run_of(fault, from_s=live.next_run())
     live.send_all(before)
     if during is not None:

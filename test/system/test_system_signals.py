@@ -13,7 +13,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from cardbox_tracker.start import NODES
+
 _LIMIT_S = 60.0
+PROGRAMS = tuple(NODES) if "RELIABILITY_EXAMPLES" in os.environ else ("tracker",)
 # From the imports to the start of ROS; the long run of 'make reliability' has all programs.
 DELAYS_S = (0.0, 0.15, 0.4, 0.7, 1.0, 1.4)
 
@@ -47,10 +50,12 @@ def end_early(name: str, arguments: list[str], number: int, delay_s: float) -> t
 @pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("delay_s", DELAYS_S)
-def test_a_node_that_is_starting_ends(number: int, delay_s: float) -> None:
-    code, said = end_early("tracker", [], number, delay_s)
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_node_that_is_starting_ends(name: str, number: int, delay_s: float) -> None:
+    code, said = end_early(name, [], number, delay_s)
     assert "Traceback" not in said and "Exception" not in said, said
-    assert code == 0
+    # Without a device or a bag two of them end themselves, and say why.
+    assert code == 0 or (name in ("camera", "play_bag") and code == 1)
 
 
 @pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
