@@ -29,8 +29,8 @@ SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # The node's parameters of the same names.
 ARGUMENTS = {
     "device": Argument("/dev/video0", "V4L2 device"),
-    "file": Argument("", "video file to play instead of a device"),
-    "calibration_file": Argument("", "YAML file of camera_calibration"),
+    "file": Argument("", "video file to play instead of a device", Path),
+    "calibration_file": Argument("", "YAML file of camera_calibration", Path),
     "horizontal_fov_deg": Argument(
         *("0.0", "field of view to assume without a calibration file, such as 60", float),
         limits=(0.0, 170.0),

@@ -61,7 +61,9 @@ ARGUMENTS = {
     "preset": Argument(
         "default", "tracker settings: paper or default", choices=("paper", "default")
     ),
-    "rep155_id": Argument("", "also publish /humans/bodies/ID/... after REP-155, for this ID"),
+    "rep155_id": Argument(
+        "", "also publish /humans/bodies/ID/... after REP-155, for this ID", name=True
+    ),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),

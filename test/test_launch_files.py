@@ -201,6 +201,9 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
         ("live", "single_process", "1", "true or false"),
         ("live", "preset", "papers", "paper or default"),
         ("live", "config_dir", "/nowhere", "a folder"),
+        ("live", "file", "/nowhere.mp4", "a file that exists"),
+        ("live", "calibration_file", "/nowhere.yaml", "a file that exists"),
+        ("nodes", "rep155_id", "1st", "a letter, then"),
         ("nodes", "person_distance_m", "-1", "a number from 0.3 to 20"),
         ("nodes", "image_transport", "jpeg", "raw or compressed"),
         ("replay", "pause_at", "[1, x]", "a list of numbers"),
@@ -235,7 +238,8 @@ def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
             specs, types = PARAMETERS[node].specs(), PARAMETERS[node].types()
             for argument in arguments:
                 mine, spec = loaded.ARGUMENTS[argument], specs[argument]
-                assert mine.kind is (getattr(types[argument], "__origin__", types[argument]))
+                kind = getattr(types[argument], "__origin__", types[argument])
+                assert mine.kind is kind or (mine.kind, kind) == (Path, str), argument
                 assert set(mine.choices) == set(spec.choices), argument
                 if spec.minimum is not None:
                     limits = pytest.approx((spec.minimum, spec.maximum))

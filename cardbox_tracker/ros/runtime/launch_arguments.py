@@ -7,8 +7,10 @@ nodes run in. Hence only the standard library is imported here.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError, quoted
 
@@ -19,6 +21,7 @@ _EXPECTED = {
     int: "a whole number",
     float: "a number",
     list: "a list of numbers such as [6.5, 9.5]",
+    Path: "a file that exists, or nothing",
 }
 
 
@@ -29,9 +32,10 @@ class Argument:
     Attributes:
         default: as text; None if it must be given.
         meaning: one line for ``--show-args``.
-        kind: type of its value; ``list`` is a list of numbers.
+        kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
         choices: the texts that are allowed; empty: any.
         limits: lowest and highest number that is allowed.
+        name: True if its value must be a letter, then letters, digits and underscores, or empty.
     """
 
     default: str | None
@@ -39,6 +43,7 @@ class Argument:
     kind: type = str
     choices: tuple[str, ...] = ()
     limits: tuple[float, float] | None = None
+    name: bool = False
 
     def value(self, text: str) -> Value:
         """Return the value that ``text`` stands for.
@@ -50,10 +55,13 @@ class Argument:
         lowest, highest = self.limits or (-math.inf, math.inf)
         if self.limits is not None:
             expected += f" from {lowest:g} to {highest:g}"
+        if self.name:
+            expected = "a letter, then letters, digits and underscores, or nothing"
         found = _parsed(self.kind, text.strip())
         if (
             found is None
             or (self.choices and found not in self.choices)
+            or (self.name and not re.fullmatch(r"([A-Za-z]\w*)?", text, re.ASCII))
             or (isinstance(found, int | float) and not lowest <= found <= highest)
         ):
             raise ValueError(expected)
@@ -86,6 +94,8 @@ def _parsed(kind: type, text: str) -> Value | None:
         words = text.removeprefix("[").removesuffix("]").split(",")
         numbers = [_number(word) for word in words if word.strip()]
         return None if None in numbers else [one for one in numbers if one is not None]
+    if kind is Path:
+        return text if not text or Path(text).expanduser().is_file() else None
     if kind is float:
         return _number(text)
     if kind is int:
