@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from cardbox_tracker.compiling import njit
 
 # A channel as bright as this may be cut off: the pixel is as bright as it seems, or brighter.
 CUT_OFF = 250.0
