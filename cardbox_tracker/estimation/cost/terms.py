@@ -57,6 +57,7 @@ class Frame:
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
         posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
             metres; None where tracking starts.
+        others: what further cameras see at that time, each a frame of its own.
     """
 
     silhouette: Silhouette
@@ -64,6 +65,7 @@ class Frame:
     foreground_px: int
     image: Image | None = None
     posture: FloatArray | None = None
+    others: tuple[Frame, ...] = ()
 
 
 class TermObservation(Protocol):
