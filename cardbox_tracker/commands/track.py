@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
+    add_cameras,
     add_preset,
     add_recording,
     add_seed,
@@ -28,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
     add_recording(parser)
+    add_cameras(parser)
     parser.add_argument(
         "--model",
         type=Path,
@@ -82,20 +84,22 @@ def run(options: argparse.Namespace) -> None:
     """
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.cameras import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
-    from cardbox_tracker.recordings.silhouettes import SilhouetteSource
     from cardbox_tracker.recordings.track import track_recording
 
     body = load_body_model(options.model)
     if body.doubt:
         print(f"{options.model}: {body.doubt}")
     config = _config(options)
-    with BagReader(options.recording) as bag:
-        source = SilhouetteSource(bag, options.background)
-        total_s = max(1e-9, bag.duration_s - options.start)
+    if len(options.cameras) > 1 and config.filter != "whole_body":
+        raise CardboxError("several cameras need --preset default; paper is of one camera")
+    with open_recording(
+        options.recording, options.background, options.cameras, options.extrinsics
+    ) as source:
+        total_s = max(1e-9, source.first.duration_s - options.start)
         with (
-            ResultBag(options.bag, source.frame_id) as results,
+            ResultBag(options.bag, source.first.frame_id) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(

@@ -77,5 +77,3 @@ class FurtherCamera:
             silhouette = self._region.select(silhouette, posture, is_sure, image)
         foreground_px = int(np.count_nonzero(silhouette))
         return Frame(silhouette, view.camera.height, foreground_px, image, posture)
-
-

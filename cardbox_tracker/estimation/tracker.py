@@ -196,11 +196,12 @@ class Tracker:
         Raises:
             ValueError: a silhouette or an image has not its camera's size.
         """
-        is_sure = self._poor_frames == 0
-        given = [*silhouettes[1:], *[None] * len(self._further)], [*images[1:], *[None] * len(self._further)]
+        is_sure, missing = self._poor_frames == 0, [None] * len(self._further)
         self._others_now = tuple(
-            further.frame(seen, image, self._before, is_sure)
-            for further, seen, image in zip(self._further, *given, strict=False)
+            further.frame(seen, picture, self._before, is_sure)
+            for further, seen, picture in zip(
+                self._further, [*silhouettes[1:], *missing], [*images[1:], *missing], strict=False
+            )
         )
         silhouette, image = silhouettes[0], images[0]
         if silhouette is None:

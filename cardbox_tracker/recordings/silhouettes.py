@@ -82,6 +82,7 @@ class SilhouetteSource:
         background: TimeSpan,
         config: BackgroundConfig | None = None,
         size: tuple[int, int] = WORKING_SIZE,
+        camera: str | None = None,
     ) -> None:
         """Learn the empty scene from the images of the span ``background``.
 
@@ -90,13 +91,15 @@ class SilhouetteSource:
             background: when nobody is in the image.
             config: settings of the background model.
             size: working resolution (width, height), px.
+            camera: namespace of the camera; without it, the recording has only one.
 
         Raises:
             BagError: the span has too few images.
             CameraError: the recording's camera is not calibrated.
         """
         self._bag = bag
-        calibration = bag.calibration()
+        self._topic = bag.image_topic(camera)
+        calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
@@ -112,6 +115,16 @@ class SilhouetteSource:
                 f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
             )
         self._pipeline.finish_learning()
+
+    @property
+    def first(self) -> SilhouetteSource:
+        """Itself: of one camera it is the first."""
+        return self
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last message of the recording."""
+        return self._bag.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
@@ -139,6 +152,6 @@ class SilhouetteSource:
         return found
 
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
-        for image in self._bag.images():
+        for image in self._bag.images(self._topic):
             prepared = self._pipeline.prepare(image.as_sent)
             yield image.stamp_ns, (image.stamp_ns - self._bag.start_ns) / 1e9, prepared

@@ -20,7 +20,7 @@ _ROTATION_TOLERANCE = 1e-2
 class Extrinsics:
     """How points of the first camera's optical frame are seen by another camera.
 
-    A point p of the first camera's optical frame is ``rotation @ p + translation_m`` in the other's.
+    A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
 
     Attributes:
         rotation: (3, 3).

@@ -47,6 +47,9 @@ class MultiViewFilter(WholeBodyFilter):
     A frame's ``others`` are those of ``cameras``; one without foreground says nothing.
     """
 
+    _seeing: list[int]
+    """Cameras that see the person in this frame, by their number."""
+
     def __init__(
         self,
         cameras: Sequence[SeenBy],
@@ -158,4 +161,4 @@ class MultiViewFilter(WholeBodyFilter):
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
         super().forget()
-        self._seeing: list[int] = []
+        self._seeing = []
