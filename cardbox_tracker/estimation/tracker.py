@@ -19,7 +19,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
@@ -183,7 +183,10 @@ class Tracker:
         return self.track_views([silhouette], [image])
 
     def track_views(
-        self, silhouettes: Sequence[Silhouette | None], images: Sequence[Image | None]
+        self,
+        silhouettes: Sequence[Silhouette | None],
+        images: Sequence[Image | None],
+        depth_m: DepthImage | None = None,
     ) -> Estimate:
         """Estimate the posture behind what all cameras see at one time.
 
@@ -192,6 +195,8 @@ class Tracker:
                 of a camera that has none for this time. It is left out, and so is one that sees
                 nobody. Without any for the last cameras they may be missing.
             images: of the same cameras.
+            depth_m: (H, W) of the first camera, metres along its optical axis, for the term
+                ``Depth``; not finite or 0 where it is not known.
 
         Raises:
             ValueError: a silhouette or an image has not its camera's size.
@@ -203,6 +208,7 @@ class Tracker:
                 self._further, [*silhouettes[1:], *missing], [*images[1:], *missing], strict=False
             )
         )
+        self._depth_m = depth_m
         silhouette, image = silhouettes[0], images[0]
         if silhouette is None:
             silhouette, image = np.zeros((self.camera.height, self.camera.width), np.uint8), None
@@ -224,8 +230,8 @@ class Tracker:
 
     def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
         frame = self._silhouette.frame(silhouette, image, self._before)
-        if self._others_now:
-            frame = replace(frame, others=self._others_now)
+        if self._others_now or self._depth_m is not None:
+            frame = replace(frame, others=self._others_now, depth_m=self._depth_m)
         sight = self._filter.look(frame)
         if sight is Sight.NOBODY:
             self._before = None

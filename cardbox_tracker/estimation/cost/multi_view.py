@@ -2,9 +2,10 @@
 
 Each camera's silhouette counts by its own area, so a camera that is nearer has no more to say:
 
-    rating = sum over cameras of (pixels that differ) / (pixels of the silhouette) + priors
+    n rating = sum over n cameras of (pixels that differ) / (pixels of the silhouette) + priors
 
-A camera that sees nobody in a frame is left out of the sum; priors count once, whoever sees.
+so a rating stays a share of the silhouette, and priors weigh less where more cameras see. A camera
+that sees nobody in a frame is left out; priors count once, whoever sees.
 """
 
 from __future__ import annotations
@@ -105,6 +106,7 @@ class MultiViewCost:
                 ratings += more[0]
                 costs_px += more[1]
                 areas_px += more[2]
+        ratings /= len(self.seeing)
         return ratings, costs_px, areas_px
 
     def keypoints(self, state: FloatArray) -> FloatArray:
@@ -116,4 +118,5 @@ class MultiViewCost:
         for number in self.seeing:
             if number:
                 ratings += rate(self.costs[number], self.to_views[number])
+        ratings /= len(self.seeing)
         return ratings

@@ -128,6 +128,8 @@ class WholeBodyCost:
             self._rules,
             ratings,
         )
+        for term in self.terms:
+            ratings += self._scale * term.torsos_beside(None)(states[:, _TORSO_OF_TERMS])
         return ratings
 
     def fix_torso(self, torso: FloatArray) -> None:

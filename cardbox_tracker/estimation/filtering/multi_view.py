@@ -8,6 +8,7 @@ somebody who stands upright is looked for where the lines of sight meet.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +24,8 @@ from cardbox_tracker.estimation.filtering.arm_proposals import STATE_LIMITS, pro
 from cardbox_tracker.estimation.filtering.pose_filter import Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
+# Of the states of a round of all joints, the fraction that moves by differences.
+_DIFFERING = 0.7
 # Deviation of where lines of sight meet: medians of outlines are not one point of a body.
 _CROSSING_M = 0.1
 # Lines of sight that are less apart, as the sine of the angle between them, do not measure x.
@@ -58,7 +61,7 @@ class MultiViewFilter(WholeBodyFilter):
         rng: np.random.Generator,
     ) -> None:
         """Prepare; see ``MakeFilter``, and ``cameras`` are those beside the first one."""
-        super().__init__(config, silhouette, rng)
+        super().__init__(_with_more_evidence(config), silhouette, rng)
         self._cameras = cameras
         views = [camera.view for camera in cameras]
         self._views = MultiViewCost(
@@ -162,3 +165,21 @@ class MultiViewFilter(WholeBodyFilter):
         """See :class:`~.pose_filter.PoseFilter`."""
         super().forget()
         self._seeing = []
+
+
+def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
+    """Return settings for several cameras: the fit is less flat, so the search goes further.
+
+    What was tried is in ``docs/two-cameras.md``.
+    """
+    whole = config.whole_body
+    whole = replace(
+        whole,
+        smoothing=whole.smoothing / 3,
+        rounds=whole.rounds + 1,
+        together=2 * whole.together,
+        differing=max(whole.differing, _DIFFERING),
+        # As a share of each silhouette; a rating is their mean.
+        spread=whole.spread / 2,
+    )
+    return replace(config, whole_body=whole)
