@@ -31,6 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_recording(parser)
     add_cameras(parser)
     parser.add_argument(
+        "--depth",
+        default=None,
+        metavar="TOPIC",
+        help="depth images (16UC1 or 32FC1) that cover the same view as the first of --cameras; "
+        "'stereo' measures depth in the first two of them, a rectified pair, left first",
+    )
+    parser.add_argument(
         "--model",
         type=Path,
         required=True,
@@ -92,10 +99,15 @@ def run(options: argparse.Namespace) -> None:
     if body.doubt:
         print(f"{options.model}: {body.doubt}")
     config = _config(options)
-    if len(options.cameras) > 1 and config.filter != "whole_body":
-        raise CardboxError("several cameras need --preset default; paper is of one camera")
+    is_more = len(options.cameras) > 1 or options.depth is not None
+    if is_more and config.filter != "whole_body":
+        raise CardboxError("several cameras and depth need --preset default; paper has one outline")
     with open_recording(
-        options.recording, options.background, options.cameras, options.extrinsics
+        options.recording,
+        options.background,
+        options.cameras,
+        options.extrinsics,
+        options.depth,
     ) as source:
         total_s = max(1e-9, source.first.duration_s - options.start)
         with (
@@ -128,8 +140,11 @@ def run(options: argparse.Namespace) -> None:
 def _config(options: argparse.Namespace) -> TrackerConfig:
     """Return the preset with what the options change in it."""
     from cardbox_tracker.estimation.config import PRESETS
+    from cardbox_tracker.estimation.cost.depth import Depth
 
     config = replace(PRESETS[options.preset](), strategy=options.strategy)
+    if options.depth is not None:
+        config = replace(config, terms=(*config.terms, Depth()))
     if options.particles is None:
         return config
     try:

@@ -11,11 +11,13 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.depth_image import DepthImage, at_size, decode_depth
 from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 from cardbox_tracker.vision.extrinsics_sources import (
@@ -25,10 +27,13 @@ from cardbox_tracker.vision.extrinsics_sources import (
     of_transforms,
     transforms_of,
 )
+from cardbox_tracker.vision.stereo import StereoDepth
 
 T = TypeVar("T")
 
 MOST_CAMERAS = 4
+STEREO = "stereo"
+"""In place of a topic: the depth is measured in the rectified pair of the first two cameras."""
 _STATIC_TOPIC = "/tf_static"
 # Images of the first camera of which the period is taken.
 _PERIOD_IMAGES = 60
@@ -41,11 +46,13 @@ class FrameSet(NamedTuple):
         stamp_ns: of the first camera's image; of the earliest one if that is missing.
         time_s: the same in seconds from the bag's start.
         frames: of each camera, the first camera's first; None of one that has none for this time.
+        depth_m: (H, W) of the first camera, metres; None without one for this time.
     """
 
     stamp_ns: int
     time_s: float
     frames: tuple[Frame | None, ...]
+    depth_m: DepthImage | None = None
 
 
 class CameraSources:
@@ -63,6 +70,7 @@ class CameraSources:
         cameras: Sequence[str],
         background: TimeSpan,
         extrinsics: Path | None = None,
+        depth: str | None = None,
         config: BackgroundConfig | None = None,
     ) -> None:
         """Name the recording; it is opened on entry.
@@ -72,6 +80,8 @@ class CameraSources:
             cameras: namespaces, the first camera first.
             background: when nobody is in any image.
             extrinsics: a file, see :func:`load_extrinsics`.
+            depth: topic of depth images of the first camera's optical frame and proportions, or
+                ``stereo``: from the first two cameras, a rectified pair.
             config: settings of the background models.
 
         Raises:
@@ -83,7 +93,7 @@ class CameraSources:
                 f"the cameras are {', '.join(self.cameras)}; expected one to {MOST_CAMERAS} "
                 "different namespaces"
             )
-        self._path, self._file = path, extrinsics
+        self._path, self._file, self._depth = path, extrinsics, depth
         self._background, self._config = background, config
         self._stack = ExitStack()
         self.sources: list[SilhouetteSource] = []
@@ -111,6 +121,9 @@ class CameraSources:
             OtherCamera(source.camera, extrinsics)
             for source, extrinsics in zip(self.sources[1:], found, strict=True)
         ]
+        self._stereo = None
+        if self._depth == STEREO:
+            self._stereo = stereo_of(self.first.camera, self.others)
         return self
 
     def __exit__(
@@ -132,10 +145,42 @@ class CameraSources:
         # A set at the start is not to lose an image that is a little earlier.
         early_s = max(0.0, start_s - self.tolerance_ns / 1e9)
         streams = [source.frames(early_s) for source in self.sources]
+        depths = self._depths()
+        depth = next(depths, None)
         for frames in side_by_side(streams, lambda frame: frame.stamp_ns, self.tolerance_ns):
             lead = next(frame for frame in frames if frame is not None)
-            if lead.time_s >= start_s:
-                yield FrameSet(lead.stamp_ns, lead.time_s, frames)
+            while depth is not None and depth[0] < lead.stamp_ns - self.tolerance_ns:
+                depth = next(depths, None)
+            if lead.time_s < start_s:
+                continue
+            there = None
+            if depth is not None and depth[0] <= lead.stamp_ns + self.tolerance_ns:
+                there = depth[1]
+            elif self._stereo is not None and None not in frames[:2]:
+                there = self._stereo(*(f.image for f in frames[:2] if f and f.image is not None))
+            yield FrameSet(lead.stamp_ns, lead.time_s, frames, there)
+
+    def _depths(self) -> Iterator[tuple[int, DepthImage]]:
+        """Yield stamp and depth of each depth image, at the size of the first camera."""
+        if self._depth is None or self._depth == STEREO:
+            return
+        camera = self.first.camera
+        with BagReader(self._path) as bag:
+            for message in bag.messages([self._depth]):
+                image = bag.deserialize(message)
+                stamp = image.header.stamp
+                depth_m = decode_depth(
+                    image.data,
+                    image.height,
+                    image.width,
+                    image.step,
+                    image.encoding,
+                    bool(image.is_bigendian),
+                )
+                yield (
+                    stamp.sec * 10**9 + stamp.nanosec,
+                    at_size(depth_m, camera.width, camera.height),
+                )
 
     def _period_ns(self) -> int:
         """Median distance of the first camera's stamps."""
@@ -155,14 +200,17 @@ def open_recording(
     background: TimeSpan,
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
+    depth: str | None = None,
 ) -> Iterator[SilhouetteSource | CameraSources]:
     """Open a recording and learn its background: of its only camera, of one, or of several.
 
     Raises:
         CardboxError: as :class:`CameraSources` and :class:`SilhouetteSource`.
     """
-    if len(cameras) > 1:
-        with CameraSources(path, cameras, background, extrinsics) as sources:
+    if depth is not None and not cameras:
+        raise CardboxError("--depth needs --cameras: the camera whose depth it is, first")
+    if len(cameras) > 1 or depth is not None:
+        with CameraSources(path, cameras, background, extrinsics, depth) as sources:
             yield sources
     else:
         with BagReader(path) as bag:
@@ -187,6 +235,27 @@ def side_by_side(
         for number, item in enumerate(taken):
             if item is not None:
                 heads[number] = next(streams[number], None)
+
+
+def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
+    """Return what measures depth in the rectified pair of ``left`` and the first of ``others``.
+
+    Raises:
+        CameraError: they are no rectified pair with the left camera first.
+    """
+    if not others:
+        raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
+    right, where = others[0].camera, others[0].extrinsics
+    x, *rest = where.translation_m.tolist()
+    same = np.allclose((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy), atol=0.5)
+    if not (
+        same and np.allclose(where.rotation, np.eye(3), atol=1e-3) and max(map(abs, rest)) < 0.01
+    ):
+        raise CameraError(
+            f"the first two cameras are no rectified pair: {where}; expected equal focal lengths "
+            "and rows, and cameras beside each other. Rectify them with stereo_image_proc"
+        )
+    return StereoDepth(left.fx, -x)
 
 
 def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> list[Extrinsics]:

@@ -124,10 +124,11 @@ def _estimates(
             yield frame, tracker.track(frame.silhouette, frame.image)
         return
     nothing = np.zeros((tracker.camera.height, tracker.camera.width), np.uint8)
-    for stamp_ns, time_s, frames in source.frames(start_s):
+    for stamp_ns, time_s, frames, depth_m in source.frames(start_s):
         estimate = tracker.track_views(
             [frame and frame.silhouette for frame in frames],
             [frame and frame.image for frame in frames],
+            depth_m,
         )
         yield frames[0] or Frame(stamp_ns, time_s, nothing, nothing), estimate
 

@@ -26,6 +26,7 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 ImageArray = NDArray[np.uint8]
 
 _Y, _YAW, _X, _Z = 0, 3, N_JOINTS, N_JOINTS + 1
+_NO_FRACTIONS = np.empty(0, np.uint16)
 # Turned by less, an image stays as it is: a fifth of a pixel at the border of 320.
 _UPRIGHT_RAD = 0.001
 
@@ -52,8 +53,8 @@ class View:
         camera: that camera, turned upright.
         yaw_rad: how its level frame is turned about the vertical.
         offset_m: from the first level frame into its own, after that turn, (3,).
-        turn: what turns pixels of the upright image into those of the camera's, (2, 3); None if it
-            stands upright.
+        turn: the pixel of the camera's image for each of the upright one, (H, W, 2) int16; None if
+            it stands upright.
         first_place_m: distance and height of the hips before the first camera.
     """
 
@@ -61,7 +62,7 @@ class View:
     camera: Camera
     yaw_rad: float
     offset_m: FloatArray
-    turn: FloatArray | None
+    turn: NDArray[np.int16] | None
     first_place_m: tuple[float, float]
 
     @classmethod
@@ -120,15 +121,9 @@ class View:
         """Return an image (H, W) or (H, W, 3) of the camera turned upright."""
         if self.turn is None:
             return image
-        how = cv2.INTER_NEAREST if is_mask else cv2.INTER_LINEAR
         border = cv2.BORDER_CONSTANT if is_mask else cv2.BORDER_REPLICATE
-        turned = cv2.warpAffine(
-            image,
-            self.turn,
-            (self.camera.width, self.camera.height),
-            flags=how | cv2.WARP_INVERSE_MAP,
-            borderMode=border,
-        )
+        # The nearest pixel does for colours, too, which are averaged over 3x3 anyway.
+        turned = cv2.remap(image, self.turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
         return np.asarray(turned, np.uint8)
 
     def line_of_sight(self, sight: float) -> tuple[FloatArray, FloatArray]:
@@ -148,7 +143,7 @@ def _about_vertical(yaw_rad: float) -> FloatArray:
     return np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
 
 
-def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, FloatArray | None]:
+def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, NDArray[np.int16] | None]:
     """Return the camera turned back by ``roll_rad`` about its axis, and the turn of its pixels."""
     if abs(roll_rad) < _UPRIGHT_RAD:
         return camera, None
@@ -168,4 +163,6 @@ def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, FloatArray | None
     principal = np.array([camera.cx, camera.cy])
     cx, cy = (middle_upright + np.linalg.solve(linear, principal - middle)).tolist()
     shift = middle - linear @ middle_upright
-    return replace(upright, cx=cx, cy=cy), np.column_stack([linear, shift])
+    grid = np.stack(np.meshgrid(np.arange(upright.width), np.arange(upright.height)), -1)
+    turn = np.rint(grid @ linear.T + shift).astype(np.int16)
+    return replace(upright, cx=cx, cy=cy), turn
