@@ -247,13 +247,12 @@ def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
         raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
     right, where = others[0].camera, others[0].extrinsics
     x, *rest = where.translation_m.tolist()
-    same = np.allclose((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy), atol=0.5)
-    if not (
-        same and np.allclose(where.rotation, np.eye(3), atol=1e-3) and max(map(abs, rest)) < 0.01
-    ):
+    one, other = ((c.fx, c.fy, c.cx, c.cy) for c in (left, right))
+    is_parallel = np.allclose(where.rotation, np.eye(3), atol=1e-3) and max(map(abs, rest)) < 0.01
+    if not (is_parallel and np.allclose(one, other, atol=0.5)):
         raise CameraError(
             f"the first two cameras are no rectified pair: {where}; expected equal focal lengths "
-            "and rows, and cameras beside each other. Rectify them with stereo_image_proc"
+            "and principal points, cameras beside each other. Rectify them with stereo_image_proc"
         )
     return StereoDepth(left.fx, -x)
 

@@ -3,8 +3,8 @@
 An outline says little of how far away a part is. A depth image (of a depth camera, or of a
 rectified pair, :mod:`cardbox_tracker.vision.stereo`) says it wherever the surface was measured. The
 term compares both at points of trunk, head and limbs, inside the silhouette, see
-:mod:`cardbox_tracker.estimation.cost.depth_kernels`. A difference far beyond ``unit_m`` costs no more
-than an even larger one. Without a depth image the term says nothing.
+:mod:`cardbox_tracker.estimation.cost.depth_kernels`. A difference far beyond ``unit_m`` costs no
+more than an even larger one. Without a depth image the term says nothing.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ a point's pixel has a measured depth, the difference
 
     e = measured - expected surface, m
 
-costs e^2 / (e^2 + unit^2) - expected of the area for which the point stands; half of the first where
-the measured surface is nearer, since something else may be in front; nothing where nothing was
-measured.
+costs e^2 / (e^2 + unit^2) - expected of the area for which the point stands; half of the first
+where the measured surface is nearer, since something else may be in front; nothing where nothing
+was measured.
 
 Who changes ``whole_body_kernels.py`` has to delete the cache of this file's compiled code.
 """

@@ -55,7 +55,8 @@ class View:
         offset_m: from the first level frame into its own, after that turn, (3,).
         turn: the pixel of the camera's image for each of the upright one, (H, W, 2) int16; None if
             it stands upright.
-        first_place_m: distance and height of the hips before the first camera.
+        turned: states (N, 14) of the first camera times this, (14, 14), plus
+        moved: this, (14,), are those that this camera has.
     """
 
     body: BodyModel
@@ -63,7 +64,8 @@ class View:
     yaw_rad: float
     offset_m: FloatArray
     turn: NDArray[np.int16] | None
-    first_place_m: tuple[float, float]
+    turned: FloatArray
+    moved: FloatArray
 
     @classmethod
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:
@@ -89,32 +91,31 @@ class View:
         upright, turn = _upright(upright, roll_rad)
         offset_m = level @ (axes.T @ other.extrinsics.translation_m)
         place = body.placement
-        first_place_m = place.distance_m, place.hip_height_m
         hips = np.array([-place.distance_m, place.lateral_m, place.hip_height_m])
-        x, y, z = (level @ hips + offset_m).tolist()
+        x_m, y_m, z_m = (level @ hips + offset_m).tolist()
         try:
             there = body.with_values(
-                distance_m=-x, lateral_m=y, hip_height_m=z, camera_pitch_rad=pitch_rad
+                distance_m=-x_m, lateral_m=y_m, hip_height_m=z_m, camera_pitch_rad=pitch_rad
             )
         except BodyModelError as error:
             raise CameraError(
                 f"a camera with the extrinsics {other.extrinsics} does not have the person in "
                 f"front of it: {error}; check extrinsics and the order of the cameras"
             ) from None
-        return cls(there, upright, yaw_rad, offset_m, turn, first_place_m)
+        # The hips are at x - distance, y, z + height; only x, y and the yaw change with the turn.
+        c, s = cos(yaw_rad), sin(yaw_rad)
+        turned = np.eye(N_JOINTS + 2)
+        turned[_X, _X], turned[_Y, _X], turned[_X, _Y], turned[_Y, _Y] = c, s, -s, c
+        moved = np.zeros(N_JOINTS + 2)
+        moved[_X] = offset_m[0] + there.placement.distance_m - c * place.distance_m
+        moved[_Y] = offset_m[1] + s * place.distance_m
+        moved[_Z] = offset_m[2] + place.hip_height_m - there.placement.hip_height_m
+        moved[_YAW] = -yaw_rad
+        return cls(there, upright, yaw_rad, offset_m, turn, turned, moved)
 
     def states(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) or (14,) of the first camera as this one has them."""
-        moved = np.array(states, dtype=np.float64)
-        distance_m, height_m = self.first_place_m
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
-        x, y = states[..., _X] - distance_m, states[..., _Y]
-        dx, dy, dz = self.offset_m.tolist()
-        place = self.body.placement
-        moved[..., _X] = c * x + s * y + (dx + place.distance_m)
-        moved[..., _Y] = -s * x + c * y + dy
-        moved[..., _Z] += height_m + (dz - place.hip_height_m)
-        moved[..., _YAW] -= self.yaw_rad
+        moved: FloatArray = states @ self.turned + self.moved
         return moved
 
     def upright(self, image: ImageArray, is_mask: bool = False) -> ImageArray:

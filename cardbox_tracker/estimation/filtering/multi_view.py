@@ -24,9 +24,9 @@ from cardbox_tracker.estimation.filtering.arm_proposals import STATE_LIMITS, pro
 from cardbox_tracker.estimation.filtering.pose_filter import Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
-# Of the states of a round of all joints, the fraction that moves by differences; and how the noise
-# shrinks from one round to the next.
-_DIFFERING, _ROUND_DECAY = 0.7, 0.8
+# Rounds of all joints, times those of one camera; of their states, the fraction that moves by
+# differences; and how the noise shrinks from one round to the next.
+_ROUNDS, _TOGETHER, _DIFFERING, _ROUND_DECAY = 3, 4, 0.8, 0.8
 # Deviation of where lines of sight meet: medians of outlines are not one point of a body.
 _CROSSING_M = 0.1
 # Lines of sight that are less apart, as the sine of the angle between them, do not measure x.
@@ -177,8 +177,8 @@ def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
     whole = replace(
         whole,
         smoothing=whole.smoothing / 3,
-        rounds=whole.rounds + 3,
-        together=2 * whole.together,
+        rounds=_ROUNDS * whole.rounds,
+        together=_TOGETHER * whole.together // 3,
         round_decay=max(whole.round_decay, _ROUND_DECAY),
         differing=max(whole.differing, _DIFFERING),
     )
