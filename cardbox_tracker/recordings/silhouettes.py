@@ -122,6 +122,11 @@ class SilhouetteSource:
         return self
 
     @property
+    def start_ns(self) -> int:
+        """When the recording begins."""
+        return self._bag.start_ns
+
+    @property
     def duration_s(self) -> float:
         """Seconds from the first to the last message of the recording."""
         return self._bag.duration_s
