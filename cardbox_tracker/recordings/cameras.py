@@ -116,14 +116,14 @@ class CameraSources:
                 for bag, camera in zip(bags, self.cameras, strict=True)
             ]
             self.tolerance_ns = self._period_ns() // 2
+            self.others = [
+                OtherCamera(source.camera, extrinsics)
+                for source, extrinsics in zip(self.sources[1:], found, strict=True)
+            ]
+            self._stereo = None
+            if self._depth == STEREO:
+                self._stereo = stereo_of(self.first.camera, self.others)
             self._stack = stack.pop_all()
-        self.others = [
-            OtherCamera(source.camera, extrinsics)
-            for source, extrinsics in zip(self.sources[1:], found, strict=True)
-        ]
-        self._stereo = None
-        if self._depth == STEREO:
-            self._stereo = stereo_of(self.first.camera, self.others)
         return self
 
     def __exit__(
