@@ -30,6 +30,26 @@ def print_remarks(source: SilhouetteSource) -> None:
         print(f"cardbox: {remark}", file=sys.stderr)
 
 
+def add_cameras(parser: argparse.ArgumentParser) -> None:
+    """Add ``--cameras`` and ``--extrinsics``."""
+    parser.add_argument(
+        "--cameras",
+        nargs="+",
+        default=[],
+        metavar="NAMESPACE",
+        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
+        "person faced first; with one name, that camera alone; not needed if there is only one",
+    )
+    parser.add_argument(
+        "--extrinsics",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help="where further cameras stand, from Kalibr (YAML) or aniposelib (TOML); not needed "
+        "for a rectified pair or with /tf_static in the recording",
+    )
+
+
 def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
     """Add ``--preset``, a name of ``estimation.config.PRESETS``."""
     from cardbox_tracker.estimation.config import PRESETS

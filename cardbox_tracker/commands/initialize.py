@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
     add_camera_pitch,
+    add_cameras,
     add_recording,
     add_seed,
     print_remarks,
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.body.posture import SIDE_TURNS
 
     add_recording(parser)
+    add_cameras(parser)
     for name, posture in _REFERENCES.items():
         parser.add_argument(
             f"--{name}",
@@ -71,9 +73,8 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.cameras import open_recording
     from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
-    from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
     pitch_rad = math.radians(options.camera_pitch_deg)
     # An impossible distance or pitch is refused by its own name, before anything follows from it.
@@ -86,11 +87,14 @@ def run(options: argparse.Namespace) -> None:
     )
     check_outputs((options.output,), options.force, inputs=(options.recording,))
     spans = {name: getattr(options, name) for name in _REFERENCES}
-    with BagReader(options.recording) as bag:
-        source = SilhouetteSource(bag, options.background)
-        with progress_bar("initialize") as show:
-            result = initialize_from_recording(source, spans, config, show)
-    print_remarks(source)
+    with (
+        open_recording(
+            options.recording, options.background, options.cameras, options.extrinsics
+        ) as source,
+        progress_bar("initialize") as show,
+    ):
+        result = initialize_from_recording(source.first, spans, config, show)
+    print_remarks(source.first)
     save_body_model(result.body, options.output)
     print(describe(result))
     print(f"wrote {options.output}")

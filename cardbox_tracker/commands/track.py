@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
+    add_cameras,
     add_preset,
     add_recording,
     add_seed,
@@ -30,6 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
     add_recording(parser)
+    add_cameras(parser)
+    parser.add_argument(
+        "--depth",
+        default=None,
+        metavar="TOPIC",
+        help="depth images (16UC1 or 32FC1) that cover the same view as the first of --cameras; "
+        "'stereo' measures depth in the first two of them, a rectified pair, left first",
+    )
     parser.add_argument(
         "--model",
         type=Path,
@@ -85,9 +94,8 @@ def run(options: argparse.Namespace) -> None:
     """
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.cameras import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
-    from cardbox_tracker.recordings.silhouettes import SilhouetteSource
     from cardbox_tracker.recordings.track import track_recording
 
     check_outputs(
@@ -100,11 +108,19 @@ def run(options: argparse.Namespace) -> None:
     if body.doubt:
         print(f"{options.model}: {body.doubt}")
     config = _config(options)
-    with BagReader(options.recording) as bag:
-        source = SilhouetteSource(bag, options.background)
-        total_s = max(1e-9, bag.duration_s - options.start)
+    is_more = len(options.cameras) > 1 or options.depth is not None
+    if is_more and config.filter != "whole_body":
+        raise CardboxError("several cameras and depth need --preset default; paper has one outline")
+    with open_recording(
+        options.recording,
+        options.background,
+        options.cameras,
+        options.extrinsics,
+        options.depth,
+    ) as source:
+        total_s = max(1e-9, source.first.duration_s - options.start)
         with (
-            ResultBag(options.bag, source.frame_id, options.force) as results,
+            ResultBag(options.bag, source.first.frame_id, options.force) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(
@@ -125,7 +141,7 @@ def run(options: argparse.Namespace) -> None:
         f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
-    print_remarks(source)
+    print_remarks(source.first)
     for path in (options.csv, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")
@@ -134,8 +150,11 @@ def run(options: argparse.Namespace) -> None:
 def _config(options: argparse.Namespace) -> TrackerConfig:
     """Return the preset with what the options change in it."""
     from cardbox_tracker.estimation.config import PRESETS
+    from cardbox_tracker.estimation.cost.depth import Depth
 
     config = replace(PRESETS[options.preset](), strategy=options.strategy)
+    if options.depth is not None:
+        config = replace(config, terms=(*config.terms, Depth()))
     if options.particles is None:
         return config
     try:

@@ -7,7 +7,9 @@ Only ``tracking`` and ``uncertain`` have a posture.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -17,11 +19,14 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.filtering.cycles import Cycles
+from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
+from cardbox_tracker.estimation.further_camera import FurtherCamera
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
@@ -83,6 +88,7 @@ class Tracker:
         rng: np.random.Generator | None = None,
         silhouette: SilhouetteTerm | None = None,
         make_filter: MakeFilter | None = None,
+        others: Sequence[OtherCamera] = (),
     ) -> None:
         """Set up for ``body``; the camera is pitched as the body model says.
 
@@ -94,11 +100,19 @@ class Tracker:
             rng: source of all noise; seeded with 0 by default.
             silhouette: another implementation of the silhouette's term, for comparison.
             make_filter: another filter than that of the settings.
+            others: further cameras, for :meth:`track_views`; they need the filter ``whole_body``.
+
+        Raises:
+            CameraError: the person was not measured in front of one of ``others``.
+            ValueError: there are ``others``, and another filter.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
         self._make_filter = make_filter
+        self._others = tuple(others)
+        if others and (make_filter or self.config.filter != "whole_body"):
+            raise ValueError("several cameras need the filter whole_body: the preset default")
         self._fitting = None
         if body.unknown:
             fits = self._rng.spawn(1)[0]
@@ -109,6 +123,9 @@ class Tracker:
         """Track ``body`` from the next silhouette on."""
         self.body, self._silhouette = body, silhouette
         self._terms = self._built(self.config)
+        self._further = [
+            FurtherCamera(body, self.camera, other, self.config) for other in self._others
+        ]
         self.reset()
 
     def _built(self, config: TrackerConfig) -> list[Term]:
@@ -117,6 +134,10 @@ class Tracker:
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
+        if self._further:
+            make_filter = partial(MultiViewFilter, self._further)
+        for further in self._further:
+            further.reset(self.config)
         self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
         self._region = PersonRegion(self.body, self.camera) if self.config.select_person else None
         self._poor_frames = 0
@@ -133,6 +154,8 @@ class Tracker:
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
             self._terms = self._built(config)
+            for further in self._further:
+                further.configure(config)
         self.config = config
         if is_new_start:
             self.reset()
@@ -157,7 +180,40 @@ class Tracker:
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        silhouette = self._person_in(silhouette, image)
+        return self.track_views([silhouette], [image])
+
+    def track_views(
+        self,
+        silhouettes: Sequence[Silhouette | None],
+        images: Sequence[Image | None],
+        depth_m: DepthImage | None = None,
+    ) -> Estimate:
+        """Estimate the posture behind what all cameras see at one time.
+
+        Args:
+            silhouettes: of the first camera, then of ``others``, each as for :meth:`track`; None
+                of a camera that has none for this time. It is left out, and so is one that sees
+                nobody. Without any for the last cameras they may be missing.
+            images: of the same cameras.
+            depth_m: (H, W) of the first camera, metres along its optical axis, for the term
+                ``Depth``; not finite or 0 where it is not known.
+
+        Raises:
+            ValueError: a silhouette or an image has not its camera's size.
+        """
+        is_sure, missing = self._poor_frames == 0, [None] * len(self._further)
+        self._others_now = tuple(
+            further.frame(seen, picture, self._before, is_sure)
+            for further, seen, picture in zip(
+                self._further, [*silhouettes[1:], *missing], [*images[1:], *missing], strict=False
+            )
+        )
+        self._depth_m = depth_m
+        silhouette, image = silhouettes[0], images[0]
+        if silhouette is None:
+            silhouette, image = np.zeros((self.camera.height, self.camera.width), np.uint8), None
+        else:
+            silhouette = self._person_in(silhouette, image)
         if self._fitting is None:
             return self._track(silhouette, image)
         fitted = self._fitting.before(silhouette, image)
@@ -173,7 +229,10 @@ class Tracker:
         return estimate
 
     def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
-        sight = self._filter.look(self._silhouette.frame(silhouette, image, self._before))
+        frame = self._silhouette.frame(silhouette, image, self._before)
+        if self._others_now or self._depth_m is not None:
+            frame = replace(frame, others=self._others_now, depth_m=self._depth_m)
+        sight = self._filter.look(frame)
         if sight is Sight.NOBODY:
             self._before = None
             if self.config.relocalize:

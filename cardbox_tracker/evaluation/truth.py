@@ -50,6 +50,7 @@ class GroundTruth:
         distance_m: level distance to the person.
         pitch_deg: how far the camera looks down.
         side_turn: the way the person turned for the side reference.
+        cameras: namespaces of several cameras, the first camera's first; empty with one.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -58,6 +59,7 @@ class GroundTruth:
     distance_m: float
     pitch_deg: float
     side_turn: str
+    cameras: tuple[str, ...] = ()
 
 
 def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
@@ -92,6 +94,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             float(data["person"]["distance_m"]),
             float(data["camera"]["pitch_down_deg"]),
             str(data["side_posture_turns_to"]),
+            tuple(str(camera["name"]) for camera in data.get("cameras", ())),
         )
     except OSError as error:
         raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None

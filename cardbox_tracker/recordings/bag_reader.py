@@ -163,22 +163,33 @@ class BagReader:
             c.msgcount for c in self._open.connections if topics is None or c.topic in topics
         )
 
-    def image_topic(self) -> str:
-        """Return the one topic of images."""
-        return self._only(IMAGE_TYPES, "image")
+    def image_topic(self, camera: str | None = None) -> str:
+        """Return the one topic of images: of a camera's namespace, or of the recording."""
+        return self._only(IMAGE_TYPES, "image", camera)
 
-    def camera_info_topic(self) -> str:
+    def camera_info_topic(self, camera: str | None = None) -> str:
         """Return the camera_info topic that belongs to the images."""
         found = [name for name, kind in self.topics.items() if kind == CAMERA_INFO_TYPE]
-        folder = self.image_topic().removesuffix("/compressed").rpartition("/")[0]
+        folder = self.image_topic(camera).removesuffix("/compressed").rpartition("/")[0]
         beside = [name for name in found if name.rpartition("/")[0] == folder]
-        return beside[0] if len(beside) == 1 else self._only((CAMERA_INFO_TYPE,), "CameraInfo")
+        if len(beside) == 1:
+            return beside[0]
+        return self._only((CAMERA_INFO_TYPE,), "CameraInfo", camera)
 
-    def _only(self, types: tuple[str, ...], what: str) -> str:
-        found = sorted(name for name, kind in self.topics.items() if kind in types)
+    def _only(self, types: tuple[str, ...], what: str, camera: str | None = None) -> str:
+        folder = "" if camera is None else f"/{camera.strip('/')}/"
+        found = sorted(
+            name for name, kind in self.topics.items() if kind in types and name.startswith(folder)
+        )
+        if len(found) > 1 and camera is not None:
+            # Depth and the other pictures of one camera may be beside them.
+            found = [name for name in found if name in _image_names(folder)][:1] or found
         if len(found) != 1:
+            where = f" below {folder}" if folder else ""
+            advice = "" if folder or not found else "; choose one with --cameras NAMESPACE"
             raise BagError(
-                f"{self.path} has {len(found)} {what} topics; expected one. It has {self._list()}"
+                f"{self.path} has {len(found)} {what} topics{where}; expected one{advice}. It has "
+                f"{self._list()}"
             )
         return found[0]
 
@@ -230,21 +241,36 @@ class BagReader:
                 raise self._damaged(error) from None
             yield found
 
-    def calibration(self) -> Calibration:
-        """Return what the recording's first CameraInfo says.
+    def camera_info(self, camera: str | None = None) -> Any:
+        """Return the recording's first CameraInfo, of a camera's namespace or the only one.
+
+        Raises:
+            BagError: there is none.
+        """
+        topic = self.camera_info_topic(camera)
+        for message in self.messages([topic]):
+            return self.deserialize(message)
+        raise BagError(f"{self.path} has no message on {topic}; record it with the images")
+
+    def calibration(self, camera: str | None = None) -> Calibration:
+        """Return what the recording's first CameraInfo says, as :meth:`camera_info` finds it.
 
         Raises:
             BagError: there is none.
             CameraError: the camera was not calibrated; the text names both topics.
         """
-        topic = self.camera_info_topic()
-        for message in self.messages([topic]):
-            info = self.deserialize(message)
-            try:
-                return calibration_from_info(info, self.image_topic(), topic)
-            except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
-                raise self._damaged(error) from None
-        raise BagError(f"{self.path} has no message on {topic}; record it with the images")
+        topics = self.image_topic(camera), self.camera_info_topic(camera)
+        info = self.camera_info(camera)
+        try:
+            return calibration_from_info(info, *topics)
+        except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
+            raise self._damaged(error) from None
+
+
+def _image_names(folder: str) -> tuple[str, ...]:
+    """Topics of images in a camera's namespace, the best first."""
+    raw = ("image_raw", "image_raw/compressed", "image_rect", "image_rect_color", "image")
+    return tuple(folder + name for name in raw)
 
 
 def _reason(error: Exception) -> str:

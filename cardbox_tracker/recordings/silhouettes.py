@@ -85,6 +85,7 @@ class SilhouetteSource:
         background: TimeSpan,
         config: BackgroundConfig | None = None,
         size: tuple[int, int] = WORKING_SIZE,
+        camera: str | None = None,
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
@@ -96,6 +97,7 @@ class SilhouetteSource:
             background: when nobody is in the image.
             config: settings of the background model.
             size: working resolution (width, height), px.
+            camera: namespace of the camera; without it, the recording has only one.
 
         Raises:
             BagError: the span has too few images.
@@ -104,7 +106,8 @@ class SilhouetteSource:
         self._bag = bag
         self._broken: dict[int, str] = {}
         self._clock_ns = 0
-        calibration = bag.calibration()
+        self._topic = bag.image_topic(camera)
+        calibration = bag.calibration(camera)
         self._pipeline = SilhouettePipeline(calibration, size, config)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
@@ -121,6 +124,21 @@ class SilhouetteSource:
                 + "".join(f" ({remark})" for remark in self.remarks)
             )
         self._pipeline.finish_learning()
+
+    @property
+    def first(self) -> SilhouetteSource:
+        """Itself: of one camera it is the first."""
+        return self
+
+    @property
+    def start_ns(self) -> int:
+        """When the recording begins."""
+        return self._bag.start_ns
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last message of the recording."""
+        return self._bag.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
@@ -166,7 +184,7 @@ class SilhouetteSource:
         return remarks
 
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
-        for number, image in enumerate(self._bag.images(), 1):
+        for number, image in enumerate(self._bag.images(self._topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
                 self._clock_ns = late_ns if abs(late_ns) > _OTHER_CLOCK_NS else 0

@@ -20,6 +20,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import UNCERTAIN, Estimate, Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
+from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
 
 # Scripts read the columns by their place: further joints follow the last of them.
@@ -50,7 +51,7 @@ class TrackSummary:
 
 
 def track_recording(
-    source: SilhouetteSource,
+    source: SilhouetteSource | CameraSources,
     body: BodyModel,
     config: TrackerConfig,
     seed: int,
@@ -63,7 +64,7 @@ def track_recording(
     """Track every image from ``start_s`` on and write one CSV row for each.
 
     Args:
-        source: the recording.
+        source: the recording, or several cameras of it.
         body: the measured person.
         config: settings of the tracker.
         seed: the same recording and seed give the same bytes.
@@ -76,7 +77,9 @@ def track_recording(
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
     """
-    tracker = Tracker(body, source.camera, config, np.random.default_rng(seed))
+    others = source.others if isinstance(source, CameraSources) else ()
+    rng = np.random.default_rng(seed)
+    tracker = Tracker(body, source.first.camera, config, rng, others=others)
     costs: list[int] = []
     ious: list[float] = []
     frames = frames_uncertain = 0
@@ -114,10 +117,20 @@ def track_recording(
 
 
 def _estimates(
-    source: SilhouetteSource, tracker: Tracker, start_s: float
+    source: SilhouetteSource | CameraSources, tracker: Tracker, start_s: float
 ) -> Iterator[tuple[Frame, Estimate]]:
-    for frame in source.frames(start_s):
-        yield frame, tracker.track(frame.silhouette, frame.image)
+    if isinstance(source, SilhouetteSource):
+        for frame in source.frames(start_s):
+            yield frame, tracker.track(frame.silhouette, frame.image)
+        return
+    nothing = np.zeros((tracker.camera.height, tracker.camera.width), np.uint8)
+    for stamp_ns, time_s, frames, depth_m in source.frames(start_s):
+        estimate = tracker.track_views(
+            [frame and frame.silhouette for frame in frames],
+            [frame and frame.image for frame in frames],
+            depth_m,
+        )
+        yield frames[0] or Frame(stamp_ns, time_s, nothing, nothing), estimate
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:

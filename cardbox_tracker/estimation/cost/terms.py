@@ -35,6 +35,7 @@ from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
 Image = NDArray[np.uint8]
+DepthImage = NDArray[np.float32]
 
 ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
 """Joints of each arm."""
@@ -57,6 +58,9 @@ class Frame:
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
         posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
             metres; None where tracking starts.
+        others: what further cameras see at that time, each a frame of its own.
+        depth_m: (H, W), metres along the optical axis, not finite or 0 where it is not known; None
+            without a depth image.
     """
 
     silhouette: Silhouette
@@ -64,6 +68,8 @@ class Frame:
     foreground_px: int
     image: Image | None = None
     posture: FloatArray | None = None
+    others: tuple[Frame, ...] = ()
+    depth_m: DepthImage | None = None
 
 
 class TermObservation(Protocol):

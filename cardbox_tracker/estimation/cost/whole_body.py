@@ -101,6 +101,12 @@ class WholeBodyCost:
             self.silhouette_px -= kernels.leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
 
+    def see_nothing(self) -> None:
+        """Let this frame's silhouette and terms say nothing: ratings are the priors alone."""
+        self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
+        self._seen[:] = 0
+        self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
+
     def sight(self) -> float:
         """Direction of the silhouette's median column, aside over ahead."""
         column = kernels.median_column(self._seen)
@@ -122,6 +128,8 @@ class WholeBodyCost:
             self._rules,
             ratings,
         )
+        for term in self.terms:
+            ratings += self._scale * term.torsos_beside(None)(states[:, _TORSO_OF_TERMS])
         return ratings
 
     def fix_torso(self, torso: FloatArray) -> None:

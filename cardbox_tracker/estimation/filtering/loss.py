@@ -68,6 +68,45 @@ _FLOORS = np.array(
 )
 
 
+def evidence_of(
+    silhouette_px: int,
+    frontal_px: int,
+    cost_px: float,
+    area_px: float,
+    rating: float,
+    arm_m: float,
+    stddev: FloatArray,
+    mean: FloatArray,
+    age: int,
+) -> Evidence:
+    """Return the evidence that the pixels of silhouette and mean give, and the best ``rating``.
+
+    Args:
+        silhouette_px: pixels of the silhouette.
+        frontal_px: those of the model in the front posture.
+        cost_px: those in which the mean and the silhouette differ.
+        area_px: those of the mean.
+        rating: of the best state.
+        arm_m: see :class:`Evidence`, as for the rest.
+        stddev: deviations, (14,).
+        mean: mean state, (14,).
+        age: frames.
+    """
+    common = 0.5 * (silhouette_px + area_px - cost_px)
+    residual = cost_px / silhouette_px
+    return Evidence(
+        residual=residual,
+        left_over=(silhouette_px - common) / silhouette_px,
+        outside=(area_px - common) / silhouette_px,
+        area=silhouette_px / frontal_px,
+        prior=rating - residual,
+        arm_m=arm_m,
+        stddev=stddev,
+        mean=mean,
+        age=age,
+    )
+
+
 def chance_of_loss(evidence: Evidence) -> float:
     """Return the chance, 0 to 1, that the keypoints are wrong by more than 30 cm on average."""
     log_area = log(min(max(evidence.area, _AREA_LIMITS[0]), _AREA_LIMITS[1]))

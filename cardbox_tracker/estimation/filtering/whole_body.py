@@ -13,9 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_JOINTS, PLACE_LIMITS, TURNING_LIMITS, reference_posture
+from cardbox_tracker.body.posture import N_JOINTS, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -27,20 +28,21 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     TORSO_Z,
 )
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
-from cardbox_tracker.estimation.filtering.arm_bank import bank_of_arms
+from cardbox_tracker.estimation.filtering.arm_proposals import (
+    ARM_LIMITS,
+    STATE_LIMITS,
+    propose_arms,
+)
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.loss import (
-    Evidence,
     chance_of_loss,
+    evidence_of,
     remembered,
     state_stddev,
 )
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
 from cardbox_tracker.estimation.filtering.walking import Walk
 
-STATE_LIMITS: FloatArray = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
-"""Shape (14, 2)."""
-_ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 _HOME_LIMIT_M = 0.7
 # Deviation of x of torsos that stand upright: larger while the search is young.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
@@ -65,8 +67,8 @@ class WholeBodyFilter:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
         self._config = c = config.whole_body
         self._body, self._rng, self._lost_iou = silhouette.body, rng, config.lost_iou
-        self._cost = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
-        self._bank = bank_of_arms()
+        self._one = WholeBodyCost(silhouette.body, silhouette.camera, c.cost)
+        self._cost: WholeBodyCost | MultiViewCost = self._one
         self._sigma = c.noise()
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[4:12] = 0.0
@@ -108,18 +110,18 @@ class WholeBodyFilter:
     def look(self, frame: Frame) -> Sight:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._frame = frame
-        self._cost.see(frame.silhouette, self._survivors[0])
-        share = self._cost.silhouette_px / self._cost.frontal_px
+        self._see(self._survivors[0])
+        return self._sight_of(self._cost.silhouette_px, self._cost.frontal_px)
+
+    def _sight_of(self, silhouette_px: int, frontal_px: int) -> Sight:
+        share = silhouette_px / frontal_px
         if share < self._config.smallest_person:
             return Sight.NOBODY
         return Sight.TOO_MUCH if share > self._config.largest_person else Sight.PERSON
 
     def follow(self, terms: Sequence[Term]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
-        self._cost.terms = tuple(term.observe(self._frame) for term in terms)
-        self._sight = self._cost.sight()
-        ahead_m = self._body.placement.distance_m - float(self._survivors[0, TORSO_X])
-        self._step_m = self._walk.see(self._frame.silhouette, self._sight, ahead_m)
+        self._observe(terms)
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             self._home_m = 0.0
@@ -130,12 +132,23 @@ class WholeBodyFilter:
         moved[0] += self._step_m
         if self._is_new or abs(self._step_m) > _STEP_M:
             # Now it is known where the legs are.
-            self._cost.see(self._frame.silhouette, moved)
+            self._see(moved)
         self._age += not self._is_new
         for _ in range(passes):
             self._search()
         self._is_new = self._is_lost = False
         return self._fit()
+
+    def _see(self, state: FloatArray) -> None:
+        """Take the silhouette of the frame, of a person about where ``state`` (14,) says."""
+        self._one.see(self._frame.silhouette, state)
+
+    def _observe(self, terms: Sequence[Term]) -> None:
+        """See what the terms say of the frame, and where its silhouette is and has moved."""
+        self._one.terms = tuple(term.observe(self._frame) for term in terms)
+        self._sight = self._one.sight()
+        ahead_m = self._body.placement.distance_m - float(self._survivors[0, TORSO_X])
+        self._step_m = self._walk.see(self._frame.silhouette, self._sight, ahead_m)
 
     def _search(self) -> None:
         """Run all stages once."""
@@ -163,9 +176,9 @@ class WholeBodyFilter:
     def _torsos(self, before: FloatArray, normals: Draws, uniforms: Draws) -> FloatArray:
         """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
         config, cost = self._config, self._cost
-        fresh = self._reference.copy()
-        fresh[TORSO_X] = before[TORSO_X]
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
+        fresh = self._reference.copy()
+        fresh[TORSO_X], sight, fresh_x_m = self._upright(before, is_settled)
         upright = config.fresh_torsos if is_settled else config.torso_explorers
         torsos = moves.propose_torsos(
             self._survivors,
@@ -174,8 +187,8 @@ class WholeBodyFilter:
             config.torso_explorers,
             upright,
             fresh,
-            _SETTLED_X_M if is_settled else _YOUNG_X_M,
-            self._sight,
+            fresh_x_m,
+            sight,
             self._step_m,
             self._body.placement.distance_m,
             STATE_LIMITS,
@@ -191,31 +204,29 @@ class WholeBodyFilter:
             before,
             cost.place,
             cost.view,
-            _ARM_LIMITS,
+            ARM_LIMITS,
         )
         # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
         return np.concatenate([pool, torsos[len(torsos) - upright :]])
+
+    def _upright(self, before: FloatArray, is_settled: bool) -> tuple[float, float, float]:
+        """Return x and direction of torsos that stand upright, and the deviation of x, m."""
+        return float(before[TORSO_X]), self._sight, _SETTLED_X_M if is_settled else _YOUNG_X_M
+
+    def _propose_arms(
+        self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
+    ) -> FloatArray:
+        """Return arms (N, 4), 0 left or 1 right, for the torso of the best state."""
+        return propose_arms(pool, arm, self._config, self._one, normals, uniforms)
 
     def _arm(
         self, pool: FloatArray, arm: int, normals: Draws, uniforms: Draws
     ) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
         config, cost = self._config, self._cost
-        arms = moves.propose_arms(
+        arms = self._propose_arms(
             pool,
             arm,
-            config.survivors,
-            config.arm_noise_rad,
-            config.arm_mirrors,
-            config.arm_tips,
-            self._bank,
-            config.banked_arms,
-            cost.uncovered(arm),
-            cost.parts,
-            cost.girdle,
-            cost.place,
-            cost.view,
-            _ARM_LIMITS,
             normals.take(config.arms, ARM_ANGLES),
             uniforms.take(config.arms, _ARM_UNIFORMS),
         )
@@ -228,7 +239,7 @@ class WholeBodyFilter:
             ratings,
             _BEST_ARMS,
             _AGAIN_NOISE * config.arm_noise_rad,
-            _ARM_LIMITS,
+            ARM_LIMITS,
             normals.take(config.arms_again, ARM_ANGLES),
         )
         both = np.concatenate([ratings, cost.arms(again, arm)])
@@ -280,21 +291,13 @@ class WholeBodyFilter:
             self._output = config.smoothing * self._output + (1.0 - config.smoothing) * mean
         _, costs_px, areas_px = cost.bodies(np.array([mean, self._output]))
         total = cost.silhouette_px
-        common = 0.5 * (total + areas_px - costs_px)
-        evidence = Evidence(
-            residual=costs_px[0] / total,
-            left_over=(total - common[0]) / total,
-            outside=(areas_px[0] - common[0]) / total,
-            area=total / cost.frontal_px,
-            prior=float(self.ratings.min()) - costs_px[0] / total,
-            arm_m=sum(self._arm_spread) / 4,
-            stddev=stddev,
-            mean=mean,
-            age=self._age,
-        )
+        best, arm_m = float(self.ratings.min()), sum(self._arm_spread) / 4
+        pixels = total, cost.frontal_px, costs_px[0], areas_px[0]
+        evidence = evidence_of(*pixels, best, arm_m, stddev, mean, self._age)
         self._chance = remembered(chance_of_loss(evidence), self._chance)
         deviations = state_stddev(stddev)
-        iou = float(common[1] / (total + areas_px[1] - common[1]))
+        either_px = float(total + areas_px[1] + costs_px[1])  # twice what either of them covers
+        iou = 2.0 * float(total + areas_px[1]) / either_px - 1.0
         return Fit(
             posture=self._output[:N_JOINTS].copy(),
             posture_stddev=deviations[:N_JOINTS],

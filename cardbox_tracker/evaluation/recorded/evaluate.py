@@ -56,7 +56,9 @@ def evaluate_sessions(
     sessions = []
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         work = [
-            pool.submit(evaluate_session, folder, preset, seeds, recovery) for folder in folders
+            pool.submit(evaluate_session, folder, preset, seeds, recovery, only)
+            for folder in folders
+            for only in _each_way(folder)
         ]
         for done, future in enumerate(work, 1):
             sessions.append(future.result())
@@ -76,19 +78,30 @@ def evaluate_sessions(
     return results
 
 
+def _each_way(folder: Path) -> list[str | None]:
+    """Return how a session is tracked: with all its cameras, and with each of several alone."""
+    cameras = load_session(folder).truth.cameras
+    return [None, *(cameras if len(cameras) > 1 else ())]
+
+
 def evaluate_session(
-    folder: Path, preset: str, seeds: tuple[int, ...], recovery: bool = False
+    folder: Path,
+    preset: str,
+    seeds: tuple[int, ...],
+    recovery: bool = False,
+    only: str | None = None,
 ) -> dict[str, Any]:
     """Return the figures of one session: of each run, and MediaPipe's beside them.
 
-    With ``recovery`` the first seed's run also has how often it recovered from disturbances.
+    Of several cameras all track, or the one that ``only`` names, without MediaPipe's figures. With
+    ``recovery`` the first seed's run also has how often it recovered from disturbances.
     """
     session = load_session(folder)
     config = PRESETS[preset]()
     try:
-        runs = track_session(session, config, seeds)
+        runs = track_session(session, config, seeds, only)
         found = [figures(session, run) for run in runs]
-        if runs[0].body is not None and recovery:
+        if runs[0].body is not None and recovery and only is None:
             found[0]["recovery"] = {
                 kind: asdict(one)
                 for kind, one in recovery_of(session, runs[0].body, config, seeds[0]).items()
@@ -96,8 +109,8 @@ def evaluate_session(
     except CardboxError as error:
         found = [{"frames": len(session.stamps_ns), "failure": str(error)}]
     return {
-        "name": session.name,
-        "mediapipe": session.mediapipe,
+        "name": session.name if only is None else f"{session.name}, {only} alone",
+        "mediapipe": session.mediapipe if only is None else {},
         "mediapipe_ms": session.mediapipe_ms,
         "runs": found,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.terms import Image
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.cameras import CameraSources, open_recording
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
@@ -46,34 +48,63 @@ class SessionRun:
 
 
 def track_session(
-    session: RecordedSession, config: TrackerConfig, seeds: tuple[int, ...]
+    session: RecordedSession,
+    config: TrackerConfig,
+    seeds: tuple[int, ...],
+    only: str | None = None,
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
+
+    Of several cameras the first one measures the person; all of them track, or the one that
+    ``only`` names.
 
     Raises:
         CardboxError: the recording cannot be read.
     """
-    with BagReader(session.bag) as bag:
-        source = SilhouetteSource(bag, session.spans["empty"])
-        offset_s = (session.truth.start_ns - bag.start_ns) / 1e9
-        bodies = [_measure(session, source, seed) for seed in seeds]
+    with open_recording(session.bag, session.spans["empty"], session.truth.cameras) as source:
+        others = source.others if isinstance(source, CameraSources) else ()
+        camera = source.first.camera
+        offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
+        bodies = [_measure(session, source.first, seed) for seed in seeds]
         trackers = [
-            Tracker(body, source.camera, config, np.random.default_rng(seed)) if body else None
+            Tracker(body, camera, config, np.random.default_rng(seed), others=others)
+            if body
+            else None
             for (body, _), seed in zip(bodies, seeds, strict=True)
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
-        for frame in source.frames(session.start_s + offset_s):
+        for stamp_ns, silhouettes, images in _seen(source, session.start_s + offset_s, only):
             for tracker, estimates, spent in zip(trackers, found, times, strict=True):
                 if tracker is None:
                     continue
                 start = time.perf_counter()
-                estimates[frame.stamp_ns] = tracker.track(frame.silhouette, frame.image)
+                estimates[stamp_ns] = tracker.track_views(silhouettes, images)
                 spent.append(1e3 * (time.perf_counter() - start))
     return [
         _run(session, body, failure, estimates, spent)
         for (body, failure), estimates, spent in zip(bodies, found, times, strict=True)
     ]
+
+
+def _seen(
+    source: SilhouetteSource | CameraSources, start_s: float, only: str | None
+) -> Iterator[tuple[int, list[Image | None], list[Image | None]]]:
+    """Yield stamp, silhouettes and images of all cameras, or of one and nothing of the others."""
+    if isinstance(source, SilhouetteSource):
+        for frame in source.frames(start_s):
+            yield frame.stamp_ns, [frame.silhouette], [frame.image]
+        return
+    for taken in source.frames(start_s):
+        frames = [
+            frame if only in (None, name) else None
+            for name, frame in zip(source.cameras, taken.frames, strict=True)
+        ]
+        yield (
+            taken.stamp_ns,
+            [frame and frame.silhouette for frame in frames],
+            [frame and frame.image for frame in frames],
+        )
 
 
 def recovery_of(
@@ -84,11 +115,11 @@ def recovery_of(
     Raises:
         CardboxError: the recording cannot be read.
     """
-    with BagReader(session.bag) as bag:
-        source = SilhouetteSource(bag, session.spans["empty"])
-        frames = list(
-            source.frames(session.start_s + (session.truth.start_ns - bag.start_ns) / 1e9)
-        )
+    first = session.truth.cameras[:1]
+    with open_recording(session.bag, session.spans["empty"], first) as opened:
+        source = opened.first
+        offset_s = (session.truth.start_ns - source.start_ns) / 1e9
+        frames = list(source.frames(session.start_s + offset_s))
         return measure_recovery(session, frames, body, source.camera, config, seed)
 
 

@@ -1,0 +1,172 @@
+"""The term of a measured depth: the model's visible surface against a depth image.
+
+An outline says little of how far away a part is. A depth image (of a depth camera, or of a
+rectified pair, :mod:`cardbox_tracker.vision.stereo`) says it wherever the surface was measured. The
+term compares both at points of trunk, head and limbs, inside the silhouette, see
+:mod:`cardbox_tracker.estimation.cost.depth_kernels`. A difference far beyond ``unit_m`` costs no
+more than an even larger one. Without a depth image the term says nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost import depth_kernels as kernels
+from cardbox_tracker.estimation.cost import whole_body_kernels as state
+from cardbox_tracker.estimation.cost.inner_cue_arms import torsos_of
+from cardbox_tracker.estimation.cost.terms import (
+    ARMS,
+    ArmCosts,
+    DepthImage,
+    Frame,
+    Silence,
+    Term,
+    TermObservation,
+    TorsoCosts,
+)
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.settings import check, setting
+from cardbox_tracker.vision.camera import Camera
+
+_SILENCE = Silence()
+
+
+@dataclass(frozen=True)
+class Depth:
+    """Settings of the term of a measured depth."""
+
+    weight: float = setting(
+        1.0,
+        "pixels of the outline that a pixel at a quite different depth is worth",
+        limits=(0.0, 100.0),
+    )
+    unit_m: float = setting(
+        0.1,
+        "difference at which half of that is reached",
+        unit="m",
+        limits=(0.001, 1.0),
+    )
+    # So that a point at which nothing was measured is as good as a usual one.
+    expected: float = setting(
+        0.3, "what points cost on average, which is subtracted", limits=(0.0, 1.0)
+    )
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of range; the text names it.
+        """
+        check(self)
+
+    def build(self, body: BodyModel, camera: Camera) -> Term:
+        """Return the term for a measured person before a working camera."""
+        return DepthTerm(self, body, camera)
+
+
+class DepthTerm:
+    """The term for one person before one camera."""
+
+    def __init__(self, config: Depth, body: BodyModel, camera: Camera) -> None:
+        """Prepare for one body before one camera, and compile the kernel if it is not yet."""
+        self.config = config
+        model = WholeBodyCost(body, camera, WholeBodyCostConfig())
+        self.parts, self.girdle, self.place, self.view = (
+            model.parts,
+            model.girdle,
+            model.place,
+            model.view,
+        )
+        # As at the place of the body model: whoever comes nearer is not to gain.
+        per_m = camera.fx / body.placement.distance_m
+        rows = [state.TORSO, state.WAIST, state.HEAD, state.UPPER_ARM, state.FOREARM]
+        wide = 0.5 * (self.parts[rows, state.BOTTOM_WIDTH] + self.parts[rows, state.TOP_WIDTH])
+        areas_px = config.weight * per_m**2 * self.parts[rows, state.HEIGHT] * wide
+        self.areas_px = np.ascontiguousarray(areas_px)
+        self.costs(np.zeros((1, 14)), np.zeros((camera.height, camera.width), np.float32))
+
+    def observe(self, frame: Frame) -> TermObservation:
+        """Return what the depth image says, or that there is none."""
+        if frame.depth_m is None:
+            return _SILENCE
+        # At the outline a pixel may show the person or what is behind.
+        inside = cv2.erode(frame.silhouette, np.ones((3, 3), np.uint8))
+        known = (inside > 0) & np.isfinite(frame.depth_m)
+        return DepthObservation(self, np.where(known, frame.depth_m, 0.0).astype(np.float32))
+
+    def costs(
+        self,
+        states: FloatArray,
+        depth_m: DepthImage,
+        has_trunk: bool = True,
+        has_left: bool = True,
+        has_right: bool = True,
+    ) -> FloatArray:
+        """Return the costs (N,), px, of some parts of states (N, 14)."""
+        costs = np.empty(len(states))
+        kernels.depth_costs(
+            np.ascontiguousarray(states, dtype=np.float64),
+            has_trunk,
+            has_left,
+            has_right,
+            self.parts,
+            self.girdle,
+            self.place,
+            self.view,
+            depth_m,
+            self.areas_px,
+            self.config.unit_m,
+            self.config.expected,
+            costs,
+        )
+        return costs
+
+
+@dataclass(frozen=True, eq=False)
+class DepthObservation:
+    """The depth of one frame; see :class:`~cardbox_tracker.estimation.cost.terms.TermObservation`.
+
+    Attributes:
+        term: the term of the person.
+        depth_m: (H, W), metres along the optical axis; 0 where it is not known.
+    """
+
+    term: DepthTerm
+    depth_m: DepthImage
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """Rate trunk and head alone."""
+
+        def costs(torsos: FloatArray) -> FloatArray:
+            states = np.zeros((len(torsos), 14))
+            states[:, :4] = torsos[:, :4]
+            states[:, 12 : 8 + torsos.shape[1]] = torsos[:, 4:]
+            return self.term.costs(states, self.depth_m, has_left=False, has_right=False)
+
+        return costs
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """Rate arms of a body whose torso is at ``torso``."""
+
+        def costs(side: str, arms: FloatArray) -> FloatArray:
+            states = np.zeros((len(arms), 14))
+            states[:, :4] = torso[:4]
+            states[:, 12 : 8 + len(torso)] = torso[4:]
+            states[:, ARMS[side]] = arms
+            is_left = side == "left"
+            return self.term.costs(states, self.depth_m, False, is_left, not is_left)
+
+        return costs
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """Rate whole bodies."""
+        states = np.zeros((len(postures), 14))
+        states[:, :12] = postures[:, :12]
+        states[:, 12:] = torsos_of(postures)[:, 4:]
+        return self.term.costs(states, self.depth_m)

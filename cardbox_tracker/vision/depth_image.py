@@ -1,0 +1,49 @@
+"""Depth images as ROS has them (REP 118): 16UC1 in millimetres, 32FC1 in metres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import EncodingError
+
+DepthImage = NDArray[np.float32]
+
+_KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
+
+
+def decode_depth(
+    data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
+) -> DepthImage:
+    """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
+
+    Raises:
+        EncodingError: it is no depth image, or the bytes do not fit it.
+    """
+    if encoding not in _KINDS:
+        raise EncodingError(
+            f"encoding '{encoding}' is no depth; expected 16UC1 (millimetres) or 32FC1 (metres)"
+        )
+    code, metres = _KINDS[encoding]
+    kind = np.dtype(f"{'>' if is_bigendian else '<'}{code}")
+    row_bytes = width * kind.itemsize
+    raw = np.frombuffer(data, np.uint8)
+    if height <= 0 or width <= 0 or step < row_bytes or len(raw) < height * step:
+        raise EncodingError(
+            f"a {encoding} image of {width}x{height} has rows of {step} bytes and {len(raw)} bytes "
+            f"in all; expected {row_bytes} or more a row: the message is incomplete"
+        )
+    rows = np.ascontiguousarray(raw[: height * step].reshape(height, step)[:, :row_bytes])
+    depth = rows.view(kind).reshape(height, width).astype(np.float32) * np.float32(metres)
+    return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
+
+
+def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
+    """Return a depth image of that size; each pixel is one that was measured, not a mean."""
+    if depth_m.shape == (height, width):
+        return depth_m
+    resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(resized, np.float32)

@@ -1,0 +1,105 @@
+"""Where a further camera stands: the rigid transform between two optical frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import CameraError
+
+FloatArray = NDArray[np.float64]
+
+# How far a matrix in a file may be from a rotation: files have three digits and more.
+_ROTATION_TOLERANCE = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Extrinsics:
+    """How points of the first camera's optical frame are seen by another camera.
+
+    A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
+
+    Attributes:
+        rotation: (3, 3).
+        translation_m: (3,), metres.
+        source: where they are from, in words.
+    """
+
+    rotation: FloatArray
+    translation_m: FloatArray
+    source: str = ""
+
+    @classmethod
+    def of(cls, matrix: object, source: str = "") -> Extrinsics:
+        """Make them of a matrix, (4, 4) or (3, 4), of numbers.
+
+        Raises:
+            CameraError: it is no rigid transform; the text names ``source``.
+        """
+        try:
+            values = np.array(matrix, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.zeros(0)
+        if values.shape not in ((4, 4), (3, 4)) or not np.isfinite(values).all():
+            raise CameraError(
+                f"{source}: expected a rigid transform of 4 x 4 finite numbers, got {matrix!r}"
+            )
+        rotation = values[:3, :3]
+        u, _, v = np.linalg.svd(rotation)
+        nearest = u @ v
+        if np.abs(nearest - rotation).max() > _ROTATION_TOLERANCE or np.linalg.det(nearest) < 0:
+            raise CameraError(
+                f"{source}: the matrix is no rotation with a translation; calibrate the cameras "
+                "anew, or copy the transform with all its digits"
+            )
+        return cls(nearest, values[:3, 3].copy(), source)
+
+    @classmethod
+    def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
+        """Make them of a rotation vector (3,), rad, and a translation (3,), metres.
+
+        Raises:
+            CameraError: they are not three finite numbers each.
+        """
+        try:
+            vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
+        except (TypeError, ValueError):
+            vectors = np.full((2, 3), np.nan)
+        if not np.isfinite(vectors).all():
+            raise CameraError(
+                f"{source}: expected a rotation vector and a translation of three numbers each, "
+                f"got {rotation!r} and {translation_m!r}"
+            )
+        turn = np.asarray(cv2.Rodrigues(vectors[0])[0], np.float64)
+        return cls(turn, vectors[1].copy(), source)
+
+    def after(self, first: Extrinsics) -> Extrinsics:
+        """Return the transform that does ``first``, then this one."""
+        moved = self.rotation @ first.translation_m + self.translation_m
+        return Extrinsics(self.rotation @ first.rotation, moved, self.source or first.source)
+
+    def inverse(self) -> Extrinsics:
+        """Return the transform back."""
+        turned = self.rotation.T
+        return Extrinsics(turned, -turned @ self.translation_m, self.source)
+
+    @property
+    def centre_m(self) -> FloatArray:
+        """The other camera's centre in the first camera's optical frame, (3,)."""
+        centre: FloatArray = -self.rotation.T @ self.translation_m
+        return centre
+
+    def difference(self, other: Extrinsics) -> tuple[float, float]:
+        """Return the angle between the directions, rad, and the distance of the centres, metres."""
+        turned = cv2.Rodrigues(self.rotation @ other.rotation.T)[0]
+        angle = float(np.linalg.norm(turned))
+        return angle, float(np.linalg.norm(self.centre_m - other.centre_m))
+
+    def __str__(self) -> str:
+        """Return distance and angle between the cameras, and the source."""
+        angle = np.degrees(np.linalg.norm(cv2.Rodrigues(self.rotation)[0]))
+        text = f"{np.linalg.norm(self.translation_m):.3f} m and {angle:.1f} degrees apart"
+        return f"{text} ({self.source})" if self.source else text

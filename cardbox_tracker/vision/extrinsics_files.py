@@ -1,0 +1,100 @@
+"""Files with extrinsics: a camchain of Kalibr (YAML), a camera group of aniposelib (TOML)."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+_EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
+# aniposelib counts in the unit of its board, usually millimetres; cameras that see one person are
+# not farther apart than this, metres.
+_FARTHEST_M = 30.0
+
+
+def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
+    """Read where cameras stand against the first one.
+
+    A camera is found by its name in the file; in a camchain also by the first part of its
+    ``rostopic``.
+
+    Args:
+        path: a camchain of Kalibr, or a TOML file of aniposelib. Lengths are metres, but
+            millimetres in a TOML file whose cameras would be more than 30 m apart.
+        cameras: names, the first camera first.
+
+    Returns:
+        Those of each further camera, by its name.
+
+    Raises:
+        CameraError: the file cannot be read, lacks a camera, or has no rigid transforms.
+    """
+    name = os.fspath(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise CameraError(
+            f"cannot read the extrinsics {name}: {reason}; give {_EXPECTED}"
+        ) from None
+    try:
+        data = tomllib.loads(text) if name.endswith(".toml") else yaml.safe_load(text)
+    except (tomllib.TOMLDecodeError, yaml.YAMLError, ValueError) as error:
+        raise CameraError(
+            f"the extrinsics {name} cannot be parsed: {error}; expected {_EXPECTED}"
+        ) from None
+    entries = data if isinstance(data, Mapping) else {}
+    entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
+    poses = _aniposelib(entries, name) if name.endswith(".toml") else _camchain(entries, name)
+    missing = [camera for camera in cameras if camera.strip("/") not in poses]
+    if missing:
+        raise CameraError(
+            f"the extrinsics {name} have no camera {', '.join(missing)}; they have "
+            f"{', '.join(sorted(poses)) or 'none'}: expected {_EXPECTED} with these names"
+        )
+    back = poses[cameras[0].strip("/")].inverse()
+    return {camera: poses[camera.strip("/")].after(back) for camera in cameras[1:]}
+
+
+def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
+    """Return poses by name: from the first camera of the chain into each, by key and by topic."""
+    poses: dict[str, Extrinsics] = {}
+    # cam0, cam1, ..., cam10
+    chain = sorted(entries, key=lambda key: (len(key), key))
+    pose = Extrinsics(np.eye(3), np.zeros(3), name)
+    for number, key in enumerate(chain):
+        entry = entries[key]
+        if number:
+            if "T_cn_cnm1" not in entry:
+                raise CameraError(f"the extrinsics {name}: {key} lacks T_cn_cnm1; give {_EXPECTED}")
+            pose = Extrinsics.of(entry["T_cn_cnm1"], f"{name}, {key}").after(pose)
+        poses[key] = pose
+        topic = str(entry.get("rostopic", "")).strip("/").removesuffix("/compressed")
+        poses.setdefault(topic.rpartition("/")[0] or key, pose)
+    return poses
+
+
+def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
+    """Return poses by name: from the world of the file into each camera."""
+    poses = {
+        str(entry.get("name", key)): Extrinsics.of_vectors(
+            entry["rotation"], entry["translation"], f"{name}, {key}"
+        )
+        for key, entry in entries.items()
+        if "rotation" in entry and "translation" in entry
+    }
+    centres = np.array([pose.centre_m for pose in poses.values()]).reshape(-1, 3)
+    if len(centres) and np.ptp(centres, axis=0).max() > _FARTHEST_M:
+        return {
+            key: Extrinsics(pose.rotation, pose.translation_m / 1000.0, pose.source)
+            for key, pose in poses.items()
+        }
+    return poses

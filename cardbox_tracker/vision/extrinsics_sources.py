@@ -1,0 +1,140 @@
+"""Extrinsics out of what cameras publish, and the choice where several sources have them.
+
+In this order: the projection matrices of a rectified pair, the transforms on ``/tf_static``, a
+file. Whatever is there has to agree.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+# Two sources that differ by more are not of the same calibration.
+_AGREE_DEG, _AGREE_M = 1.0, 0.02
+
+
+class FrameTransform(NamedTuple):
+    """What one transform of ``/tf_static`` says.
+
+    Attributes:
+        parent: frame.
+        child: frame.
+        to_parent: points of the child in the parent.
+    """
+
+    parent: str
+    child: str
+    to_parent: Extrinsics
+
+
+def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
+    """Return the extrinsics in the projection matrices of two sensor_msgs/CameraInfo.
+
+    The fourth column of P holds where a camera is in the rectified frame: P[0,3] = -fx B for a
+    right camera at the baseline B. With R unrectified images relate to it, too.
+
+    Returns:
+        None if the cameras are no rectified pair, so that both columns are zero.
+    """
+    at = []
+    for info in (first, other):
+        p = np.array(info.p, dtype=np.float64).reshape(3, 4)
+        r = np.array(info.r, dtype=np.float64).reshape(3, 3)
+        if not (p[0, 0] > 0 and p[1, 1] > 0):
+            return None
+        at.append(
+            (np.array([p[0, 3] / p[0, 0], p[1, 3] / p[1, 1], 0.0]), r if r.any() else np.eye(3))
+        )
+    (first_m, first_r), (other_m, other_r) = at
+    if not np.any(np.abs(other_m - first_m) > 1e-6):
+        return None
+    moved = other_r.T @ (other_m - first_m)
+    return Extrinsics(other_r.T @ first_r, moved, f"P of {name}'s CameraInfo")
+
+
+def of_transforms(
+    transforms: Iterable[FrameTransform], first_frame: str, other_frame: str
+) -> Extrinsics | None:
+    """Return the extrinsics between two optical frames; None if nothing connects them."""
+    beside: dict[str, list[tuple[str, Extrinsics]]] = {}
+    for transform in transforms:
+        beside.setdefault(transform.child, []).append((transform.parent, transform.to_parent))
+        beside.setdefault(transform.parent, []).append(
+            (transform.child, transform.to_parent.inverse())
+        )
+    source = "/tf_static"
+    found = {first_frame: Extrinsics(np.eye(3), np.zeros(3), source)}
+    waiting = deque([first_frame])
+    while waiting:
+        frame = waiting.popleft()
+        for neighbour, step in beside.get(frame, ()):
+            if neighbour not in found:
+                there = step.after(found[frame])
+                found[neighbour] = Extrinsics(there.rotation, there.translation_m, source)
+                waiting.append(neighbour)
+    return found.get(other_frame) if other_frame != first_frame else None
+
+
+def transforms_of(message: Any) -> list[FrameTransform]:
+    """Return what a tf2_msgs/TFMessage says, of rclpy or of a recording."""
+    return [
+        FrameTransform(
+            stamped.header.frame_id.lstrip("/"),
+            stamped.child_frame_id.lstrip("/"),
+            Extrinsics(
+                _rotation(stamped.transform.rotation),
+                np.array([getattr(stamped.transform.translation, axis) for axis in "xyz"]),
+                "/tf_static",
+            ),
+        )
+        for stamped in message.transforms
+    ]
+
+
+def _rotation(quaternion: Any) -> NDArray[np.float64]:
+    x, y, z, w = (float(getattr(quaternion, axis)) for axis in "xyzw")
+    norm = float(np.sqrt(x * x + y * y + z * z + w * w)) or 1.0
+    x, y, z, w = x / norm, y / norm, z / norm, w / norm
+    return np.array(
+        [
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        ]
+    )
+
+
+def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrinsics:
+    """Return the first of the extrinsics that are there.
+
+    Args:
+        found: of P, of ``/tf_static``, of a file; None where one has none.
+        first: name of the first camera, for the texts.
+        other: name of the other camera.
+
+    Raises:
+        CameraError: there are none, or two disagree by more than a degree or two centimetres.
+    """
+    there = [extrinsics for extrinsics in found if extrinsics is not None]
+    if not there:
+        raise CameraError(
+            f"nothing says where camera {other} stands against {first}: expected a rectified pair "
+            "(P[0,3] of CameraInfo), a transform between their optical frames on /tf_static, or a "
+            "file; give --extrinsics FILE, from Kalibr or aniposelib"
+        )
+    for one in there[1:]:
+        angle_rad, distance_m = there[0].difference(one)
+        if np.degrees(angle_rad) > _AGREE_DEG or distance_m > _AGREE_M:
+            raise CameraError(
+                f"two sources disagree about where camera {other} stands against {first}: "
+                f"{there[0]}, but {one}; they differ by {np.degrees(angle_rad):.1f} degrees and "
+                f"{100 * distance_m:.1f} cm. Remove the wrong one"
+            )
+    return there[0]

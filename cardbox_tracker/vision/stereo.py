@@ -1,0 +1,70 @@
+"""Depth from a rectified pair of images, by OpenCV's semi-global matching."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.background import brightness_of
+
+DepthImage = NDArray[np.float32]
+
+# As OpenCV's documentation has them: penalties of 8 and 32 times the pixels of a block, disparities
+# in sixteenths of a pixel, and a number of them that 16 divides.
+_BLOCK, _STEP, _PARTS = 5, 16, 16.0
+_SMALL_STEP, _LARGE_STEP = 8 * _BLOCK**2, 32 * _BLOCK**2
+_UNIQUE_PERCENT, _LEFT_RIGHT = 5, 1
+_SPECKLE_PX, _SPECKLE_RANGE = 60, 2
+
+
+class StereoDepth:
+    """Measures depth in the left one of two rectified images."""
+
+    def __init__(self, fx: float, baseline_m: float, nearest_m: float = 0.8) -> None:
+        """Prepare.
+
+        Args:
+            fx: focal length of both images, px.
+            baseline_m: distance of the cameras, metres.
+            nearest_m: anything nearer is not found; the time grows with what this costs.
+
+        Raises:
+            CameraError: focal length or baseline is not positive.
+        """
+        if not (fx > 0 and baseline_m > 0 and nearest_m > 0):
+            raise CameraError(
+                f"stereo with a focal length of {fx:g} px and a baseline of {baseline_m:g} m; "
+                "expected a rectified pair, whose right camera has P[0,3] = -fx B below 0: is the "
+                "left camera the first one?"
+            )
+        self._scale = fx * baseline_m
+        most = _STEP * math.ceil(self._scale / nearest_m / _STEP)
+        self._matcher = cv2.StereoSGBM.create(
+            minDisparity=0,
+            numDisparities=most,
+            blockSize=_BLOCK,
+            P1=_SMALL_STEP,
+            P2=_LARGE_STEP,
+            disp12MaxDiff=_LEFT_RIGHT,
+            uniquenessRatio=_UNIQUE_PERCENT,
+            speckleWindowSize=_SPECKLE_PX,
+            speckleRange=_SPECKLE_RANGE,
+            mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+        )
+
+    def __call__(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> DepthImage:
+        """Return the depth (H, W), metres along the optical axis; 0 where none was found.
+
+        Args:
+            left: (H, W) grey or (H, W, 3) bgr, rectified.
+            right: of the same size.
+        """
+        pair = (np.ascontiguousarray(brightness_of(image)) for image in (left, right))
+        disparity = np.asarray(self._matcher.compute(*pair), np.float32) / np.float32(_PARTS)
+        depth = np.zeros_like(disparity)
+        np.divide(np.float32(self._scale), disparity, out=depth, where=disparity > 0)
+        return depth

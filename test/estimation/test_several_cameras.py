@@ -1,0 +1,190 @@
+"""Tracking with several cameras: their geometry, the summed cost, and cameras that drop out."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.config import default_preset, paper_preset
+from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.tracker import NO_PERSON, TRACKING, Estimate, Tracker
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+BODY = BodyModel.of(hip_height_m=-0.41, lateral_m=0.05, camera_pitch_rad=0.1)
+CAMERA = Camera(160, 120, 150.0, 151.0, 79.0, 60.0).with_pitch(0.1)
+CONFIG = WholeBodyCostConfig()
+
+
+def aside(roll_rad: float = 0.0, angle_rad: float = 1.2) -> OtherCamera:
+    """A camera 2 m from the person, ``angle_rad`` round to their left, turned by ``roll_rad``."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    turn = np.array([(c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)])
+    middle = np.array([0.0, 0.2, 2.0])
+    centre = middle + 2.0 * turn.T @ [0.0, -0.1, -1.0]
+    turn = cv2.Rodrigues(np.array([0.0, 0.0, roll_rad]))[0] @ turn
+    camera = Camera(160, 120, 140.0, 141.0, 82.0, 58.0)
+    return OtherCamera(camera, Extrinsics(turn, -turn @ centre))
+
+
+def drawn(cost: WholeBodyCost, camera: Camera, state: np.ndarray) -> np.ndarray:
+    """The model's own outline, as it is drawn to be rated."""
+    image = np.zeros((camera.height, camera.width), np.uint8)
+    for patch in cost.corners(state):
+        pixels = np.round(16 * camera.project(patch)).astype(np.int32)
+        cv2.fillConvexPoly(image, pixels, 255, cv2.LINE_8, 4)
+    return image
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+FIRST = WholeBodyCost(BODY, CAMERA, CONFIG)
+OTHER = aside()
+VIEW = View.of(BODY, CAMERA, OTHER)
+SECOND = WholeBodyCost(VIEW.body, VIEW.camera, CONFIG)
+
+
+def state_of(time_s: float, x_m: float = 0.0) -> np.ndarray:
+    return np.append(wave(time_s), [x_m, 0.0])
+
+
+def both(state: np.ndarray) -> list[np.ndarray]:
+    return [drawn(FIRST, CAMERA, state), drawn(SECOND, VIEW.camera, VIEW.states(state))]
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, 0.02, -0.6, 1.57, 3.1, -1.5])
+def test_another_camera_sees_the_same_points(roll_rad: float, rng: np.random.Generator) -> None:
+    other = aside(roll_rad)
+    view = View.of(BODY, CAMERA, other)
+    cost = WholeBodyCost(view.body, view.camera, CONFIG)
+    pixel = np.zeros((120, 160), np.uint8)
+    for state in rng.normal(0.0, 0.2, (4, 14)):
+        there = FIRST.keypoints(state) @ other.extrinsics.rotation.T
+        expected = other.camera.project(there + other.extrinsics.translation_m)
+        found = view.camera.project(cost.keypoints(view.states(state)))
+        if view.turn is None:
+            np.testing.assert_allclose(found, expected, atol=1e-6)
+            continue
+        # The upright image has at the one what the camera's image has at the other.
+        u, v = np.round(expected[0]).astype(int)
+        pixel[:] = 0
+        cv2.circle(pixel, (int(u), int(v)), 4, 255, -1)
+        turned = np.argwhere(view.upright(pixel, is_mask=True))[:, ::-1]
+        assert len(turned) > 20
+        np.testing.assert_allclose(turned.mean(axis=0), found[0], atol=1.0)
+
+
+def test_lines_of_sight_meet_at_the_hips() -> None:
+    state = state_of(0.3, 0.2)
+    there = VIEW.states(state)
+    place, ahead = VIEW.line_of_sight(
+        float(there[0] / (VIEW.body.placement.distance_m - there[12]))
+    )
+    hips = np.array([state[12] - BODY.placement.distance_m, state[0]])
+    across = (hips - place) - ahead * ((hips - place) @ ahead)
+    np.testing.assert_allclose(across, 0.0, atol=1e-9)
+    assert ahead @ (hips - place) > 1.0
+
+
+def test_a_camera_behind_the_person_s_place_is_refused() -> None:
+    away = Extrinsics(np.diag([-1.0, 1.0, -1.0]), np.array([0.0, 0.0, 0.5]))
+    with pytest.raises(CameraError, match="in front of it"):
+        View.of(BODY, CAMERA, OtherCamera(OTHER.camera, away))
+
+
+def test_the_rating_is_the_mean_of_the_cameras_with_priors_once() -> None:
+    views = MultiViewCost(BODY, CAMERA, [(VIEW.body, VIEW.camera, VIEW.states)], CONFIG)
+    states = np.array([state_of(t) for t in (0.0, 0.2, 0.4)])
+    views.see(both(states[1]), states[1])
+    views.choose((0, 1))
+    ratings, costs_px, _ = views.bodies(states)
+    alone = [cost.bodies(to(states)) for cost, to in zip(views.costs, views.to_views, strict=True)]
+    shares = [a[1] / c.silhouette_px for a, c in zip(alone, views.costs, strict=True)]
+    priors = alone[0][0] - shares[0]
+    np.testing.assert_allclose(alone[1][0], shares[1], atol=1e-12)
+    np.testing.assert_allclose(ratings, (shares[0] + shares[1] + priors) / 2, atol=1e-12)
+    np.testing.assert_allclose(costs_px, alone[0][1] + alone[1][1])
+    assert np.argmin(costs_px) == 1
+    # A camera that does not see leaves the other one, and the priors.
+    for seeing in ((0,), (1,)):
+        views.see(both(states[1]), states[1])
+        views.choose(seeing)
+        np.testing.assert_allclose(views.bodies(states)[0], shares[seeing[0]] + priors, atol=1e-12)
+
+
+def track(tracker: Tracker, state: np.ndarray, seeing: tuple[int, ...] = (0, 1)) -> Estimate:
+    seen = [s if i in seeing else None for i, s in enumerate(both(state))]
+    return tracker.track_views(seen, [None, None])
+
+
+def error_cm(estimate: Estimate, state: np.ndarray) -> float:
+    assert estimate.keypoints_m is not None
+    distances = np.linalg.norm(estimate.keypoints_m - FIRST.keypoints(state), axis=1)
+    return 100 * float(distances.mean())
+
+
+def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
+    errors, states = [], []
+    for i in range(24):
+        seeing = (0,) if 8 <= i < 12 else (1,) if 16 <= i < 20 else (0, 1)
+        state = state_of(i / 15.0, 0.005 * i)
+        estimate = track(tracker, state, seeing)
+        errors.append(error_cm(estimate, state))
+        states.append(estimate.state)
+    assert set(states[4:]) == {TRACKING}
+    assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
+    assert max(errors[4:]) < 20.0
+    assert track(tracker, state_of(0.0), ()).state == NO_PERSON
+
+
+def test_of_a_tracker_with_one_camera_nothing_is_different() -> None:
+    one, same = (Tracker(BODY, CAMERA, default_preset()) for _ in range(2))
+    for i in range(3):
+        silhouette = both(state_of(i / 15.0))[0]
+        first, second = one.track(silhouette), same.track_views([silhouette], [None])
+        assert first.keypoints_m is not None
+        assert second.keypoints_m is not None
+        assert first.keypoints_m.tobytes() == second.keypoints_m.tobytes()
+
+
+def test_what_does_not_fit_several_cameras_is_refused() -> None:
+    with pytest.raises(ValueError, match="whole_body"):
+        Tracker(BODY, CAMERA, paper_preset(), others=[OTHER])
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
+    with pytest.raises(ValueError, match="further camera"):
+        tracker.track_views([None, np.zeros((10, 10), np.uint8)], [None, None])
+
+
+def test_the_depth_of_the_right_place_costs_least() -> None:
+    state = np.append(reference_posture("front"), [0.1, 0.0])
+    silhouette = drawn(FIRST, CAMERA, state)
+    hips = CAMERA.reference_to_optical(np.array([0.1 - BODY.placement.distance_m, 0.0, -0.1]))
+    depth = np.where(silhouette > 0, hips[2] - 0.1, np.nan).astype(np.float32)
+    states = np.tile(state, (5, 1))
+    states[:, 12] += np.linspace(-0.4, 0.4, 5)
+    term = DepthTerm(Depth(), BODY, CAMERA)
+    observation = term.observe(Frame(silhouette, 120, 1, depth_m=depth))
+    assert np.argmin(observation.postures(states)) == 2
+    torsos = states[:, [0, 1, 2, 3, 12, 13]]
+    assert np.argmin(observation.torsos_beside(None)(torsos)) == 2
+    arms = np.tile(state[4:8], (2, 1))
+    arms[1, 1] = 1.5  # straight at the camera, where nothing is
+    costs = observation.arms_beside(torsos[2])("left", arms)
+    assert costs[0] < costs[1]
+    # Without a measured depth it says nothing.
+    for frame in (Frame(silhouette, 120, 1), Frame(silhouette, 120, 1, depth_m=0 * depth)):
+        np.testing.assert_array_equal(term.observe(frame).postures(states), 0.0)

@@ -1,0 +1,128 @@
+"""Several cameras of one recording: pairing by stamps, and topics below namespaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from cardbox_tracker.errors import BagError, CameraError, CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.cameras import CameraSources, open_recording, side_by_side
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
+
+PERIOD_NS = 100_000_000
+LATER_NS = 8_000_000
+EMPTY = TimeSpan(0.0, 0.55)
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+
+
+def paired(*streams: list[int], tolerance: int = 5) -> list[tuple[int | None, ...]]:
+    return list(side_by_side([iter(s) for s in streams], int, tolerance))
+
+
+def test_what_is_near_belongs_together_and_nothing_is_used_twice() -> None:
+    assert paired([10, 20, 30], [11, 21, 31]) == [(10, 11), (20, 21), (30, 31)]
+    # One begins earlier, is silent for a while, and ends earlier.
+    assert paired([20, 30, 40, 50], [11, 21, 41]) == [
+        (None, 11),
+        (20, 21),
+        (30, None),
+        (40, 41),
+        (50, None),
+    ]
+    assert paired([10, 30], [12, 22, 32], [29]) == [
+        (10, 12, None),
+        (None, 22, None),
+        (30, 32, 29),
+    ]
+    assert paired([], [1]) == [(None, 1)]
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten images of an empty scene and something in it; the second camera lacks the eighth."""
+    folder = tmp_path_factory.mktemp("two") / "bag"
+    rng = np.random.default_rng(0)
+    with BagWriter(folder) as bag:
+        for i in range(10):
+            for number, name in enumerate(("one", "two")):
+                if (i, name) == (7, "two"):
+                    continue
+                stamp = 10**18 + i * PERIOD_NS + number * LATER_NS
+                image = rng.normal(100, 1, (48, 64)).astype(np.uint8)
+                if i >= 6:
+                    image[10:40, 20 + 5 * number : 40] = 200
+                bag.write_image(f"/{name}/image_raw", stamp, f"{name}_frame", image, "mono8")
+                bag.write_camera_info(f"/{name}/camera_info", stamp, f"{name}_frame", CAMERA)
+    return folder
+
+
+@pytest.fixture
+def chain(tmp_path: Path) -> Path:
+    file = tmp_path / "camchain.yaml"
+    moved = np.eye(4)
+    moved[0, 3] = -0.5
+    text = yaml.safe_dump({"one": {}, "two": {"T_cn_cnm1": moved.tolist()}})
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def sources(two: Path, chain: Path) -> Iterator[CameraSources]:
+    with CameraSources(two, ["one", "/two/"], EMPTY, chain) as opened:
+        yield opened
+
+
+def test_each_camera_has_its_own_silhouettes(sources: CameraSources, two: Path) -> None:
+    sets = list(sources.frames(0.55))
+    assert [s.stamp_ns - 10**18 for s in sets] == [i * PERIOD_NS for i in range(6, 10)]
+    assert [None in s.frames for s in sets] == [False, True, False, False]
+    with BagReader(two) as bag:
+        alone = SilhouetteSource(bag, EMPTY, camera="two")
+        expected = [frame.silhouette for frame in alone.frames(0.6)]
+    found = [s.frames[1].silhouette for s in sets if s.frames[1] is not None]
+    np.testing.assert_array_equal(found, expected)
+    assert np.count_nonzero(found[0]) > 100
+    np.testing.assert_allclose(sources.others[0].extrinsics.centre_m, [0.5, 0.0, 0.0])
+
+
+def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
+    with (
+        pytest.raises(CameraError, match="nothing says where camera two"),
+        CameraSources(two, ["one", "two"], EMPTY),
+    ):
+        pass
+    with pytest.raises(BagError, match="0 image topics below /three/"), BagReader(two) as bag:
+        bag.image_topic("three")
+    with pytest.raises(BagError, match="--cameras NAMESPACE"), open_recording(two, EMPTY):
+        pass
+    with pytest.raises(CardboxError, match="different namespaces"):
+        CameraSources(two, ["one", "one"], EMPTY)
+    with (
+        pytest.raises(CameraError, match="left camera the first"),
+        CameraSources(two, ["two", "one"], EMPTY, chain, depth="stereo"),
+    ):
+        pass
+
+
+def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "with_depth"
+    with BagReader(two) as old, BagWriter(folder) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for i in (6, 8):
+            depth = np.full((48, 64), 1000 + i, np.uint16)
+            stamp = 10**18 + i * PERIOD_NS + LATER_NS
+            new.write_image("/one/depth", stamp, "one_frame", depth, "16UC1")
+    with CameraSources(folder, ["one"], EMPTY, depth="/one/depth") as opened:
+        depths = [s.depth_m for s in opened.frames(0.55)]
+        assert [d is not None for d in depths] == [True, False, True, False]
+        assert depths[2] is not None
+        assert depths[2].shape == (opened.first.camera.height, opened.first.camera.width)
+        np.testing.assert_allclose(depths[2], 1.008, rtol=1e-6)
