@@ -291,9 +291,8 @@ class WholeBodyFilter:
             self._output = config.smoothing * self._output + (1.0 - config.smoothing) * mean
         _, costs_px, areas_px = cost.bodies(np.array([mean, self._output]))
         total = cost.silhouette_px
-        best, arm_m = float(self.ratings.min()), sum(self._arm_spread) / 4
-        pixels = total, cost.frontal_px, costs_px[0], areas_px[0]
-        evidence = evidence_of(*pixels, best, arm_m, stddev, mean, self._age)
+        seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
+        evidence = evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
         self._chance = remembered(chance_of_loss(evidence), self._chance)
         deviations = state_stddev(stddev)
         either_px = float(total + areas_px[1] + costs_px[1])  # twice what either of them covers
