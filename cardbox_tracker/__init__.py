@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         CardboxError,
         EncodingError,
         InitializationError,
+        NotFiniteError,
         RosMissingError,
     )
     from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
@@ -65,6 +66,7 @@ __all__ = [
     "InitializationConfig",
     "InitializationError",
     "InitializationResult",
+    "NotFiniteError",
     "RosMissingError",
     "SilhouetteExtractor",
     "Tracker",
@@ -90,6 +92,7 @@ _MODULES = {
         "CardboxError",
         "EncodingError",
         "InitializationError",
+        "NotFiniteError",
         "RosMissingError",
     ),
     "estimation.config": ("PRESETS", "TrackerConfig"),

@@ -1,12 +1,15 @@
 """Start a program of the package: ``python -m cardbox_tracker.start NAME ARGUMENTS``.
 
 What is installed as ``cardbox``, ``background`` and so on begins here, before any slow import, so
-that a signal during the imports ends it without a traceback.
+that a signal during the imports ends it without a traceback. ``colcon build`` outside the virtual
+environment makes executables for the system's Python, which lacks numba and rosbags: that is said
+in words.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 
 from cardbox_tracker import interrupts
@@ -24,8 +27,29 @@ NODES: dict[str, str] = {
 
 def _node(name: str) -> int:
     interrupts.leave_at_once(0)
-    code: int = import_module(NODES[name]).main()
-    return code
+    return start(name, lambda: import_module(NODES[name]).main())
+
+
+def start(name: str, main: Callable[[], int]) -> int:
+    """Run ``main`` of the program ``name``; a package that is missing is named.
+
+    Returns:
+        The exit code; 1 where a package is missing.
+    """
+    try:
+        return main()
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing in ("", "cardbox_tracker"):
+            raise
+        print(
+            f"{name}: the Python package '{missing}' is missing from the Python that this runs "
+            f"under, {sys.executable}. Activate the virtual environment into which cardbox_tracker "
+            "was installed with pip, source ROS, and build with 'python -m colcon build': outside "
+            "of it, 'colcon build' takes the system's Python (docs/tutorial.md)",
+            file=sys.stderr,
+        )
+        return 1
 
 
 def background() -> int:
@@ -61,11 +85,16 @@ def cardbox_nodes() -> int:
 def cardbox() -> int:
     """Run the command ``cardbox``."""
     interrupts.leave_at_once()
+    code = start("cardbox", _command)
+    # All is done and closed; what Python does at its end must not be interrupted.
+    interrupts.leave_at_once(code)
+    return code
+
+
+def _command() -> int:
     main = import_module("cardbox_tracker.commands.main").main
     interrupts.interrupt_commands()
     code: int = main()
-    # All is done and closed; what Python does at its end must not be interrupted.
-    interrupts.leave_at_once(code)
     return code
 
 

@@ -23,23 +23,23 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-
-def _is_true(text: str) -> bool:
-    return text.lower() == "true"
-
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
-# The node's parameters of the same names: default, type, meaning.
+# The node's parameters of the same names.
 ARGUMENTS = {
-    "device": ("/dev/video0", str, "V4L2 device"),
-    "file": ("", str, "video file to play instead of a device"),
-    "calibration_file": ("", str, "YAML file of camera_calibration"),
-    "horizontal_fov_deg": ("0.0", float, "field of view to assume without a calibration file"),
-    "width": ("640", int, "width to ask the device for, px"),
-    "height": ("480", int, "height to ask the device for, px"),
-    "rate_hz": ("15.0", float, "images a second"),
-    "loop": ("false", _is_true, "play the file again and again"),
-    "frame_id": ("camera_optical_frame", str, "name of the camera's optical frame"),
+    "device": Argument("/dev/video0", "V4L2 device"),
+    "file": Argument("", "video file to play instead of a device", Path),
+    "calibration_file": Argument("", "YAML file of camera_calibration", Path),
+    "horizontal_fov_deg": Argument(
+        *("0.0", "field of view to assume without a calibration file, such as 60", float),
+        limits=(0.0, 170.0),
+    ),
+    "width": Argument("640", "width to ask the device for, px", int, limits=(32, 8192)),
+    "height": Argument("480", "height to ask the device for, px", int, limits=(32, 8192)),
+    "rate_hz": Argument("15.0", "images a second", float, limits=(0.0, 240.0)),
+    "loop": Argument("false", "play the file again and again", bool),
+    "frame_id": Argument("camera_optical_frame", "name of the camera's optical frame"),
 }
 
 
@@ -47,9 +47,11 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *(
-                DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, (default, _, text) in ARGUMENTS.items()
+                DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
+                for name, a in ARGUMENTS.items()
             ),
+            # What is wrong has to be found before the first node runs.
+            OpaqueFunction(function=_check),
             OpaqueFunction(function=_in_one_process),
             # First, since it sets the environment and declares what the camera uses as well.
             IncludeLaunchDescription(
@@ -60,13 +62,17 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
+def _check(context: LaunchContext) -> list[object]:
+    values(ARGUMENTS, context.launch_configurations)
+    return []
+
+
 def _is_single(context: LaunchContext) -> bool:
     return context.launch_configurations.get("single_process", "false").lower() == "true"
 
 
 def _parameters(context: LaunchContext) -> dict[str, object]:
-    given = context.launch_configurations
-    return {name: kind(given[name]) for name, (_, kind, _) in ARGUMENTS.items()}
+    return dict(values(ARGUMENTS, context.launch_configurations))
 
 
 def _in_one_process(context: LaunchContext) -> list[object]:

@@ -31,35 +31,48 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 ARGUMENTS = {
-    "namespace": ("", "namespace of all nodes, one per camera"),
-    "config_dir": (str(SHARE / "config"), "folder of the nodes' YAML files"),
-    "image": ("image_raw", "topic of the images (without /compressed)"),
-    "camera_info": ("camera_info", "topic of their CameraInfo"),
-    "image_transport": ("raw", "raw, or compressed for the topic IMAGE/compressed"),
-    "person_distance_m": ("2.0", "level distance from the camera to the person"),
-    "camera_pitch_deg": ("0.0", "how far the camera looks down"),
-    "side_turn": ("left", "which way the person turns for the side reference: left or right"),
-    "background_file": ("", "background: read if it fits the camera, written when it is learned"),
-    "model_file": ("", "body model: read if it exists, written by every initialization"),
-    "preset": ("default", "tracker settings: paper or default"),
-    "rep155_id": ("", "also publish /humans/bodies/ID/... after REP-155, for this ID"),
-    "single_process": ("false", "all nodes in one process, for least latency"),
-    "publish_tf": ("true", "start robot_state_publisher"),
-    "rviz": ("false", "start RViz"),
+    "namespace": Argument("", "namespace of all nodes, one per camera"),
+    "config_dir": Argument(str(SHARE / "config"), "folder of the nodes' YAML files"),
+    "image": Argument("image_raw", "topic of the images (without /compressed)"),
+    "camera_info": Argument("camera_info", "topic of their CameraInfo"),
+    "image_transport": Argument(
+        *("raw", "raw, or compressed for the topic IMAGE/compressed"),
+        choices=("raw", "compressed"),
+    ),
+    "person_distance_m": Argument(
+        *("2.0", "level distance from the camera to the person", float), limits=(0.3, 20.0)
+    ),
+    "camera_pitch_deg": Argument(
+        "0.0", "how far the camera looks down", float, limits=(-80.0, 80.0)
+    ),
+    "side_turn": Argument(
+        *("left", "which way the person turns for the side reference: left or right"),
+        choices=("left", "right"),
+    ),
+    "background_file": Argument(
+        "", "background: read if it fits the camera, written when it is learned"
+    ),
+    "model_file": Argument("", "body model: read if it exists, written by every initialization"),
+    "preset": Argument(
+        "default", "tracker settings: paper or default", choices=("paper", "default")
+    ),
+    "rep155_id": Argument(
+        "", "also publish /humans/bodies/ID/... after REP-155, for this ID", name=True
+    ),
+    "single_process": Argument("false", "all nodes in one process, for least latency", bool),
+    "publish_tf": Argument("true", "start robot_state_publisher", bool),
+    "rviz": Argument("false", "start RViz", bool),
 }
 # Parameters that are launch arguments too, by node.
-GIVEN: dict[str, dict[str, type]] = {
-    "background": {"image_transport": str, "background_file": str},
-    "initializer": {
-        "person_distance_m": float,
-        "camera_pitch_deg": float,
-        "side_turn": str,
-        "model_file": str,
-    },
-    "tracker": {"preset": str, "rep155_id": str},
+GIVEN = {
+    "background": ("image_transport", "background_file"),
+    "initializer": ("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
+    "tracker": ("preset", "rep155_id"),
 }
 LAYOUT_TOPICS = ("robot_description", "markers", "keypoints", "overlay", "silhouette")
 # Nobody until somebody is measured: robot_state_publisher does not start without a description.
@@ -68,8 +81,8 @@ NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
 
 def generate_launch_description() -> LaunchDescription:
     declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        for name, (default, text) in ARGUMENTS.items()
+        DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
+        for name, a in ARGUMENTS.items()
     ]
     profiles = EnvironmentVariable(
         PROFILES, default_value=str(SHARE / "config" / "fastdds_large_images.xml")
@@ -77,6 +90,8 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *declared,
+            # What is wrong has to be found before the first node runs.
+            OpaqueFunction(function=_check),
             # Without it Fast DDS loses most large images; a profile of the user's own stays.
             SetEnvironmentVariable(PROFILES, profiles),
             OpaqueFunction(function=_nodes),
@@ -84,6 +99,17 @@ def generate_launch_description() -> LaunchDescription:
             OpaqueFunction(function=_rviz),
         ]
     )
+
+
+def _check(context: LaunchContext) -> list[object]:
+    given = context.launch_configurations
+    values(ARGUMENTS, given)
+    if not Path(given["config_dir"]).is_dir():
+        raise ValueError(
+            f"launch argument config_dir is '{given['config_dir']}'; expected a folder with the "
+            f"files of {SHARE / 'config'}"
+        )
+    return []
 
 
 def _nodes(context: LaunchContext) -> list[object]:
@@ -119,7 +145,8 @@ def _exact(parameters: dict[str, object]) -> dict[str, object]:
 
 def _typed(given: dict[str, str], node: str) -> dict[str, object]:
     """The launch arguments that are parameters of ``node``, as its types."""
-    return {name: kind(given[name]) for name, kind in GIVEN[node].items()}
+    typed = values(ARGUMENTS, given)
+    return {name: typed[name] for name in GIVEN[node]}
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
@@ -236,10 +263,7 @@ def _rviz(context: LaunchContext) -> list[object]:
 
 
 def _wanted(context: LaunchContext, name: str) -> bool:
-    value = LaunchConfiguration(name).perform(context).lower()
-    if value not in ("true", "false"):
-        raise ValueError(f"launch argument {name} is '{value}'; expected true or false")
-    return value == "true"
+    return values(ARGUMENTS, context.launch_configurations)[name] is True
 
 
 def _installed(package: str) -> bool:

@@ -7,10 +7,11 @@ pause_at:="[6.5, 9.5, 12.5]" the recording stands still at those times, so that 
 can be captured (initializer/capture_front) before play_bag/resume.
 """
 
+import subprocess
 from pathlib import Path
 
 import yaml
-from ament_index_python.packages import get_package_share_directory
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -23,33 +24,31 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.recordings.bag_reader import BagReader
-
-
-def _is_true(text: str) -> bool:
-    return text.lower() == "true"
-
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
-COMPRESSED = "/compressed"
-# The node's parameters of the same names: default, type, meaning.
+# All but 'bag' are parameters of the node, by the same names.
 ARGUMENTS = {
-    "rate": ("1.0", float, "speed; 2 plays twice as fast"),
-    "loop": ("false", _is_true, "play again and again"),
-    "start_s": ("0.0", float, "time to begin at, from the bag's start"),
-    "duration_s": ("0.0", float, "play this long; 0: to the end of the bag"),
+    "bag": Argument(None, "rosbag2 folder or .mcap file"),
+    "pause_at": Argument("[]", "times to pause at, s from the bag's start", list),
+    "rate": Argument("1.0", "speed; 2 plays twice as fast", float, limits=(0.01, 100.0)),
+    "loop": Argument("false", "play again and again", bool),
+    "start_s": Argument("0.0", "time to begin at, from the bag's start", float, limits=(0.0, 1e6)),
+    "duration_s": Argument(
+        "0.0", "play this long; 0: to the end of the bag", float, limits=(0.0, 1e6)
+    ),
 }
 
 
 def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
-            DeclareLaunchArgument("bag", description="rosbag2 folder or .mcap file"),
-            DeclareLaunchArgument("pause_at", default_value="[]", description="times to pause, s"),
             *(
-                DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, (default, _, text) in ARGUMENTS.items()
+                DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
+                for name, a in ARGUMENTS.items()
             ),
+            # What is wrong has to be found before the first node runs.
+            OpaqueFunction(function=_check),
             OpaqueFunction(function=_find_topics),
             OpaqueFunction(function=_in_one_process),
             # Before play_bag, since it sets the environment and declares what play_bag uses too.
@@ -61,18 +60,32 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
+def _check(context: LaunchContext) -> list[object]:
+    values(ARGUMENTS, context.launch_configurations)
+    return []
+
+
 def _find_topics(context: LaunchContext) -> list[object]:
-    """Take the topics from the bag, unless they are given."""
+    """Take the topics from the bag, unless they are given.
+
+    A process of play_bag looks for them: this one does not see the packages that read bags.
+    """
     given = context.launch_configurations
-    found: dict[str, str] = {}
-    with BagReader(given["bag"]) as bag:
-        if "image" not in given:
-            topic = bag.image_topic()
-            found["image"] = topic.removesuffix(COMPRESSED)
-            found["image_transport"] = "compressed" if topic.endswith(COMPRESSED) else "raw"
-        if "camera_info" not in given:
-            found["camera_info"] = bag.camera_info_topic()
-    return [SetLaunchConfiguration(name, value) for name, value in found.items()]
+    wanted = [name for name in ("image", "camera_info") if name not in given]
+    if not wanted:
+        return []
+    program = Path(get_package_prefix("cardbox_tracker")) / "lib" / "cardbox_tracker" / "play_bag"
+    found = subprocess.run(
+        [str(program), given["bag"], "--find-topics", *wanted],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if found.returncode != 0:
+        raise RuntimeError(found.stderr.strip())
+    return [
+        SetLaunchConfiguration(name, topic) for name, topic in yaml.safe_load(found.stdout).items()
+    ]
 
 
 def _is_single(context: LaunchContext) -> bool:
@@ -80,15 +93,12 @@ def _is_single(context: LaunchContext) -> bool:
 
 
 def _parameters(context: LaunchContext) -> dict[str, object]:
-    given = context.launch_configurations
-    parameters = {name: kind(given[name]) for name, (_, kind, _) in ARGUMENTS.items()}
-    parameters["bag"] = given["bag"]
+    parameters: dict[str, object] = dict(values(ARGUMENTS, context.launch_configurations))
     # The tracker compiles at its first start; the recording is not to be over by then.
     parameters["wait_for_topics"] = ["keypoints"]
-    # ROS has no empty list of a known type.
-    times = given["pause_at"].strip("[] ")
-    if times:
-        parameters["pause_at"] = [float(time) for time in times.split(",")]
+    if not parameters["pause_at"]:
+        # ROS has no empty list of a known type.
+        del parameters["pause_at"]
     return parameters
 
 

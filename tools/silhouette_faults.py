@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
-from cardbox_tracker.vision.background import SilhouetteExtractor, brightness_of
+from cardbox_tracker.vision.absorption import STILL as THING
+from cardbox_tracker.vision.absorption import StillRegions
+from cardbox_tracker.vision.background import (
+    BackgroundConfig,
+    SilhouetteExtractor,
+    brightness_of,
+)
 from cardbox_tracker.vision.calibration_watch import CalibrationWatch
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.kept_background import KeptBackground
@@ -70,7 +76,7 @@ class Session:
         first, last = empty["start_s"] + _MARGIN_S, empty["end_s"] - _MARGIN_S
         self.empty = [number for number, time_s in enumerate(times) if first <= time_s <= last]
         self.fps = 1.0 / float(np.median(np.diff(times)))
-        for number in self.empty:
+        for number in self.empty[:IMAGES]:
             self.pipeline.learn(images[number])
         self.pipeline.finish_learning()
 
@@ -244,6 +250,24 @@ def motion_cells(session: Session) -> str:
     return f"{most} | {100 * min(seen):.2f}"
 
 
+def still_cell(session: Session) -> str:
+    """Return the least that moves of a region with the person in it, in the default's images."""
+    after = BackgroundConfig().absorb_after
+    pipeline, regions = session.pipeline, StillRegions(after)
+    pipeline.restart()
+    least = []
+    for number in range(session.empty[-1] + 1, len(session.images)):
+        image = session.images[number]
+        found = regions.add(brightness_of(image), pipeline.silhouette(image), pipeline.light)
+        if found is None or number - session.empty[-1] < after:
+            continue
+        for region, share in regions.regions():
+            mask = session.masks[number][::2, ::2]
+            if np.count_nonzero(region & mask) > 0.2 * np.count_nonzero(region):
+                least.append(share)
+    return f"{100 * min(least):.0f}" if least else "-"
+
+
 def scene_cells(session: Session) -> str:
     """Return how many images show the scene, and how many shifted ones are refused."""
     model = session.pipeline.model
@@ -293,7 +317,7 @@ def fault_lines(sessions: Iterable[Session]) -> Iterator[str]:
         print(line, flush=True)
         yield line
         around.append(f"| {session.name} | {around_a_person(session)} |")
-        cells = [motion_cells(session), scene_cells(session)]
+        cells = [motion_cells(session), still_cell(session), scene_cells(session)]
         signs.append(f"| {session.name} | " + " | ".join(cells) + " |")
     yield from (
         "",
@@ -309,11 +333,14 @@ def fault_lines(sessions: Iterable[Session]) -> Iterator[str]:
         "",
         f"What the node goes by. *Moves*: share of the image in which means within {IMAGES} images "
         "differ, most of all in an empty scene and least of all with somebody in view; learning "
-        f"waits above {100 * STILL:.1f} %. *Tiles* with texture, by which a scene is recognised; "
-        f"images that show it, and those shifted by {_SHIFT_PX:.0f} px that are refused. Before a "
-        "wall without texture, a moved camera is not noticed.",
+        f"waits above {100 * STILL:.1f} %. *Of the person*: least share of a region with the "
+        f"person in it that moves within {BackgroundConfig().absorb_after} images; a region "
+        f"becomes background below {100 * THING:.0f} %. *Tiles* with texture, by which a scene is "
+        f"recognised; images that show it, and those shifted by {_SHIFT_PX:.0f} px that are "
+        "refused. Before a wall without texture, a moved camera is not noticed.",
         "",
-        "| session | moves, empty (%) | with a person | tiles | recognised | shifted: refused |",
-        "|---|---|---|---|---|---|",
+        "| session | moves, empty (%) | with a person | of the person (%) | tiles | recognised | "
+        "shifted: refused |",
+        "|---|---|---|---|---|---|---|",
     )
     yield from signs

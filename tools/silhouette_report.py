@@ -32,7 +32,8 @@ from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 from tools.silhouette_faults import Session, fault_lines
 
 Image = NDArray[np.uint8]
-Light = Callable[[float], float]
+# Factor of an image of a time (s) and a shape (H, W[, channels]).
+Light = Callable[[float, tuple[int, ...]], Any]
 
 AFTER = BackgroundConfig()
 BEFORE = replace(AFTER, color=False, soft_shadow=0.0, follow=False)
@@ -46,22 +47,37 @@ _STEP_S = 6.0
 _TURN, _TURNS = 10, 60
 
 
-def _lamp(time_s: float) -> float:
+def _lamp(time_s: float, _: tuple[int, ...]) -> float:
     return 1.35 if int(time_s / _STEP_S) % 2 else 1.0
 
 
-def _steps(time_s: float) -> float:
+def _steps(time_s: float, _: tuple[int, ...]) -> float:
     return (1.0, 0.8, 1.25, 0.65, 1.1)[int(time_s / _STEP_S) % 5]
 
 
-def _drift(time_s: float) -> float:
+def _drift(time_s: float, _: tuple[int, ...]) -> float:
     return 1.0 + 0.3 * float(np.sin(2 * np.pi * time_s / 60.0))
+
+
+def _at(column: float, row: float, reach: float) -> Light:
+    """Return a lamp at a place, as shares of the image's width and height, that is 60 % bright."""
+
+    def light(time_s: float, shape: tuple[int, ...]) -> Any:
+        if not int(time_s / _STEP_S) % 2:
+            return 1.0
+        v, u = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+        far = np.hypot(u / shape[1] - column, (v - row * shape[0]) / shape[1]) / reach
+        return (1.0 + 0.6 * np.exp(-0.5 * far**2)).reshape(*shape[:2], *[1] * (len(shape) - 2))
+
+    return light
 
 
 LIGHTS: dict[str, Light] = {
     "drift of 30 % in a minute": _drift,
     "lamp: 35 % brighter, on or off every 6 s": _lamp,
     "gain steps between 0.65 and 1.25 every 6 s": _steps,
+    "lamp in the upper left corner: up to 60 %, on or off every 6 s": _at(0.05, 0.05, 0.4),
+    "lamp at the right side, near: up to 60 %, on or off every 6 s": _at(0.95, 0.5, 0.25),
 }
 
 
@@ -110,7 +126,9 @@ def images_of(folder: Path, light: Light | None) -> Iterator[tuple[float, Image]
             time_s = (image.stamp_ns - bag.start_ns) / 1e9
             sent = image.as_sent
             if light is not None:
-                sent = np.clip(sent * np.float32(light(time_s)) + 0.5, 0, 255).astype(np.uint8)
+                sent = np.clip(sent * np.float32(light(time_s, sent.shape)) + 0.5, 0, 255).astype(
+                    np.uint8
+                )
             yield time_s, sent
 
 
@@ -126,12 +144,12 @@ def rows_of(folder: Path, config: BackgroundConfig, light: Light | None = None) 
     rows = []
     for number, (time_s, image) in enumerate(images_of(folder, light)):
         prepared = pipeline.prepare(image)
-        if time_s <= empty["end_s"] - _MARGIN_S:
-            if time_s >= empty["start_s"] + _MARGIN_S:
-                pipeline.learn(prepared)
-            continue
         if not pipeline.is_ready:
-            pipeline.finish_learning()
+            if empty["start_s"] + _MARGIN_S <= time_s <= empty["end_s"] - _MARGIN_S:
+                pipeline.learn(prepared)
+            if pipeline.has_enough or time_s > empty["end_s"] - _MARGIN_S:
+                pipeline.finish_learning()
+            continue
         frame = truth["frames"][number]
         limbs = limb_pixels(frame["joints_px"], scale) > 0 if "joints_px" in frame else None
         found = pipeline.silhouette(prepared) > 0
@@ -191,8 +209,10 @@ def cost_ratio(folder: Path, grey: bool) -> float:
         for image in bag.images():
             prepared = pipeline.prepare(image.as_sent)
             prepared = brightness_of(prepared) if grey else prepared
-            if (image.stamp_ns - bag.start_ns) / 1e9 <= empty_s:
+            if learner.count < AFTER.learn_images:
                 learner.add(prepared)
+            elif (image.stamp_ns - bag.start_ns) / 1e9 <= empty_s:
+                continue
             else:
                 images.append(prepared.copy())
     before, after = (SilhouetteExtractor(learner.model(), config) for config in (BEFORE, AFTER))
@@ -218,7 +238,8 @@ def report(sessions: list[Path], lit: Path | None) -> str:
         "Made by `python -m tools.silhouette_report`. Over all images with a person after the "
         "empty scene. *Missing* and *extra* pixels as a share of the person; *arms found*: share "
         "of the true pixels along forearms and hands. Before: brightness alone, light not "
-        "followed (`color: false`, `soft_shadow: 0`, `follow: false`); after: the defaults.",
+        "followed (`color: false`, `soft_shadow: 0`, `follow: false`); after: the defaults. The "
+        f"scene is learned from its first {AFTER.learn_images} images, as the node does.",
         "",
         "| session, segment | " + " | ".join(f"{c} before | after" for c in columns) + " |",
         "|---|" + "---|" * 8,

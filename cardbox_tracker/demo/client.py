@@ -10,9 +10,10 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -25,10 +26,14 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
-_TOPICS = {
+_UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Those of the bag that 'cardbox track --bag' writes.
+TOPICS = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
     "silhouette": (Image, qos.REPLAY),
+    "silhouette/camera_info": (CameraInfo, qos.REPLAY),
+    "overlay": (Image, _UNRELIABLE),
     **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
 }
 
@@ -66,16 +71,17 @@ class Client:
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
         self._executor = make_executor()
         self._executor.add_node(self._node)
-        for topic, (kind, profile) in _TOPICS.items():
+        for topic, (kind, profile) in TOPICS.items():
             self._node.create_subscription(
-                kind, topic, self._recorder(topic, kind), profile, raw=True
+                kind, topic, self.recorder(topic, kind), profile, raw=True
             )
         self._node.create_subscription(String, "play_bag/status", self._note_status, qos.LATCHED)
         self._node.create_subscription(
             DiagnosticStatus, "initializer/result", self._note_result, qos.LATCHED
         )
 
-    def _recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+    def recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        """Return what keeps a message of ``topic``, given as its bytes."""
         name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
         def record(raw: bytes) -> None:
@@ -84,7 +90,7 @@ class Client:
                 stamp = message.header.stamp
                 self._stamp_ns = stamp.sec * 10**9 + stamp.nanosec
             self._keep(topic, message)
-            self._bag.write_raw(topic, name, raw, self._stamp_ns)
+            self._bag.write_raw(f"/{topic}", name, raw, self._stamp_ns)
 
         return record
 

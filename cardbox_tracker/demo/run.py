@@ -13,7 +13,7 @@ from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.errors import CardboxError, RosMissingError
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
-from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.result_bag import result_writer
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
 from cardbox_tracker.simulation.session import synthesize_session
 
@@ -53,7 +53,7 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     truth = load_ground_truth(session / "ground_truth.json")
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
-    with running_nodes(output) as nodes, BagWriter(output / "bag", overwrite=True) as bag:
+    with running_nodes(output) as nodes, result_writer(output / "bag", overwrite=True) as bag:
         client = Client(nodes, bag)
         try:
             _start_nodes(nodes, truth, preset, seed)

@@ -1,4 +1,7 @@
-"""The bag that ``cardbox track --bag`` writes: what the tracker node would have published."""
+"""The bag that ``cardbox track --bag`` writes: what the tracker node would have published.
+
+``cardbox demo`` records the same topics of the nodes, see :func:`result_writer`.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,17 @@ from cardbox_tracker.recordings.silhouettes import Frame
 _LATCHED = ("/body_model", "/robot_description")
 
 
+def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
+    """Return the writer of a bag of results, whose topics have full names.
+
+    With ``overwrite`` a recording of that name is replaced.
+
+    Raises:
+        BagError: something is in the way.
+    """
+    return BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
+
+
 class ResultBag:
     """Context that collects estimates in a bag; without a path it does nothing."""
 
@@ -26,9 +40,7 @@ class ResultBag:
 
         With ``overwrite`` a recording of that name is replaced.
         """
-        self._writer = None
-        if path is not None:
-            self._writer = BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
+        self._writer = None if path is None else result_writer(path, overwrite)
         self._frame_id = frame_id
         self._described: BodyModel | None = None
         self._outputs = OutputStream()

@@ -86,7 +86,10 @@ class SilhouetteSource:
         config: BackgroundConfig | None = None,
         size: tuple[int, int] = WORKING_SIZE,
     ) -> None:
-        """Learn the empty scene from the images of the span ``background``.
+        """Learn the empty scene from the first images of the span ``background``.
+
+        They are as many as a live node learns from, ``config.learn_images``, or fewer if the span
+        ends before.
 
         Args:
             bag: an open recording.
@@ -106,7 +109,7 @@ class SilhouetteSource:
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
         for _, time_s, image in self._images():
-            if time_s > background.end_s:
+            if time_s > background.end_s or self._pipeline.has_enough:
                 break
             if background.contains(time_s):
                 self._pipeline.learn(image)

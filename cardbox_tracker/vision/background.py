@@ -14,17 +14,19 @@ chroma, and soft shadows are told from dark clothes.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.vision.absorption import Absorber
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.chroma import ChromaScore
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.light import LightFollower
+from cardbox_tracker.vision.partial_scene import merged
 from cardbox_tracker.vision.regions import clean_silhouette
 from cardbox_tracker.vision.shadows import decide_shadows
 from cardbox_tracker.vision.window import Window, window_of
@@ -49,110 +51,7 @@ _MARGIN_PX, _COLOR_MARGIN_PX = 2, 8
 _WHOLE_EVERY = 8
 # A fraction of a darker brightness than this is all noise, grey levels.
 _DARKEST = 8.0
-
-
-@dataclass(frozen=True)
-class BackgroundConfig:
-    """How the scene is learned and how a silhouette is cut out of it."""
-
-    learn_images: int = setting(30, "images of the empty scene to learn from", limits=(2, 10000))
-    threshold: float = setting(
-        2.0,
-        "a pixel is foreground if it differs from the background by this many standard deviations "
-        "or more, equation (1)",
-        limits=(0.1, 50.0),
-    )
-    min_stddev: float = setting(
-        1.5,
-        "smallest standard deviation that is assumed of a pixel",
-        unit="grey levels",
-        limits=(0.0, 100.0),
-    )
-    clean_up: bool = setting(
-        True, "false applies equation (1) alone: all settings after this one have no effect"
-    )
-    smoothing_px: float = setting(
-        0.6,
-        "standard deviation of the Gaussian that smooths the difference before the threshold; "
-        "it lowers the noise and with it the specks",
-        unit="px",
-        limits=(0.0, 20.0),
-    )
-    min_contrast: float = setting(
-        7.0,
-        "a smoothed difference below this is never foreground",
-        unit="grey levels",
-        limits=(0.0, 255.0),
-    )
-    shadow: float = setting(
-        0.13,
-        "a pixel that is darker than the background by less than this fraction is a shadow, not "
-        "the person; 0 is off",
-        limits=(0.0, 1.0),
-    )
-    soft_shadow: float = setting(
-        0.07,
-        "a darker pixel is also a shadow where the brightness relative to the background changes "
-        "by less than this fraction within 5x5 px, all the way from the background; 0 is off",
-        limits=(0.0, 1.0),
-    )
-    darkest_shadow: float = setting(
-        0.4,
-        "a pixel that is darker than the background by more than this fraction is no soft shadow",
-        limits=(0.0, 1.0),
-    )
-    color: bool = setting(
-        True,
-        "a pixel is also foreground if its colour differs; only for images in colour",
-    )
-    min_color_contrast: float = setting(
-        7.0,
-        "a colour difference (Cr, Cb) below this is never foreground",
-        unit="grey levels",
-        limits=(0.1, 255.0),
-    )
-    color_edge: float = setting(
-        0.45,
-        "a colour difference is dropped if it is less than this fraction of the largest within "
-        "6 px, because JPEG smears colours over an outline",
-        limits=(0.0, 1.0),
-    )
-    # Smoothing spreads a strong contrast beyond the outline.
-    edge: float = setting(
-        0.35,
-        "a pixel is dropped if its difference is less than this fraction of the largest among its "
-        "8 neighbours, so that smoothing does not widen the outline; 0 is off",
-        limits=(0.0, 1.0),
-    )
-    flicker: float = setting(
-        0.1,
-        "with follow off: a brightness change of the whole scene up to this fraction is "
-        "compensated; 0 is off",
-        limits=(0.0, 1.0),
-    )
-    follow: bool = setting(
-        True,
-        "follow the light of the scene: drift, automatic gain and white balance, a lamp; the "
-        "person never becomes background",
-    )
-    min_area: float = setting(
-        0.004,
-        "foreground regions smaller than this fraction of the image are dropped",
-        limits=(0.0, 1.0),
-    )
-    max_hole: float = setting(
-        0.0008,
-        "holes smaller than this fraction of the image are filled",
-        limits=(0.0, 1.0),
-    )
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
+_LEAST_LIGHT = np.float32(1e-3)
 
 
 class SilhouetteExtractor:
@@ -161,21 +60,38 @@ class SilhouetteExtractor:
     def __init__(self, model: BackgroundModel, config: BackgroundConfig | None = None) -> None:
         """Prepare the thresholds of every pixel."""
         self.config = config = config or BackgroundConfig()
-        self.model = model
         self.gain = 1.0
+        step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
+        self._grid = (slice(None, None, step), slice(None, None, step))
+        # As far as three standard deviations; OpenCV's own choice is wider and takes longer.
+        size = 2 * math.ceil(3 * config.smoothing_px) + 1
+        self._kernel_size = (size, size)
+        self._light: LightFollower | None = None
+        self._chroma: ChromaScore | None = None
+        self._learned = model
+        self._use(model)
+        if config.follow and config.clean_up:
+            chroma = None if model.chroma is None else model.chroma.mean
+            self._light = LightFollower(model.mean, chroma)
+        self._absorber = Absorber(config.absorb_after) if config.absorb_after else None
+        # The last silhouette's, and how many images were compared by colour.
+        self._last, self._images = Window(0, 0, 0, 0), 0
+        # Allocated once: new memory for each image takes longer than the arithmetic on it.
+        self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
+
+    def _use(self, model: BackgroundModel) -> None:
+        """Compare the next images with ``model``."""
+        config = self.config
+        self.model = model
         self._limit = config.threshold * np.maximum(model.stddev, config.min_stddev)
         # Factors that turn a difference of either sign into a score, 1 at its limit.
         brighter = np.maximum(self._limit, config.min_contrast)
         darker = np.maximum(brighter, config.shadow * model.mean)
         self._brighter = np.asarray(1.0 / brighter, dtype=np.float32)
         self._darker = np.asarray(-1.0 / darker, dtype=np.float32)
-        step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
-        self._grid = (slice(None, None, step), slice(None, None, step))
         self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
-        # As far as three standard deviations; OpenCV's own choice is wider and takes longer.
-        size = 2 * math.ceil(3 * config.smoothing_px) + 1
-        self._kernel_size = (size, size)
-        self._chroma: ChromaScore | None = None
+        self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
+        before, self._chroma = self._chroma, None
         if model.chroma is not None and config.color:
             self._chroma = ChromaScore(
                 model.chroma,
@@ -183,16 +99,25 @@ class SilhouetteExtractor:
                 config.min_color_contrast,
                 config.color_edge,
                 config.follow,
+                before,
             )
-        self._light: LightFollower | None = None
-        if config.follow and config.clean_up:
-            chroma = None if model.chroma is None else model.chroma.mean
-            self._light = LightFollower(model.mean, chroma)
-        self._per_level = np.asarray(1.0 / np.maximum(model.mean, _DARKEST), np.float32)
-        # The last silhouette's, and how many images were compared by colour.
-        self._last, self._images = Window(0, 0, 0, 0), 0
-        # Allocated once: new memory for each image takes longer than the arithmetic on it.
-        self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
+        if self._light is not None:
+            self._light.replace(model.mean, None if model.chroma is None else model.chroma.mean)
+
+    def _absorb(self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray) -> None:
+        """Let what was moved and stays become background."""
+        if self._absorber is None:
+            return
+        absorbed = self._absorber.add(image, brightness, silhouette, self.gain)
+        if absorbed is not None:
+            pixels, now = absorbed
+            if self._chroma is not None and now.chroma is not None:
+                now = replace(now, chroma=self._chroma.without_cast(now.chroma))
+            factors = np.full(pixels.shape, self.gain, np.float32)
+            if self._light is not None:
+                factors = self._light.factors()
+            light = np.asarray(1.0 / np.maximum(factors, _LEAST_LIGHT), np.float32)
+            self._use(merged(self.model, now, pixels, light))
 
     def __call__(self, image: ImageArray) -> ImageArray:
         """Return the silhouette (H, W) of an image: 255 for the person, else 0.
@@ -250,6 +175,7 @@ class SilhouetteExtractor:
         self._last = window_of(silhouette)
         if self._light is not None:
             self._light.exclude(silhouette)
+        self._absorb(image, brightness, silhouette)
         return silhouette
 
     def _colored_window(
@@ -271,10 +197,14 @@ class SilhouetteExtractor:
         return near, near
 
     def restart(self) -> None:
-        """Forget what was followed: the next image is not the one after the last."""
+        """Forget what was followed and absorbed: the next image is not the one after the last."""
         self._last, self._images = Window(0, 0, 0, 0), 0
         if self._light is not None:
             self._light.restart()
+        if self._absorber is not None:
+            self._absorber.restart()
+        if self.model is not self._learned:
+            self._use(self._learned)
 
     def expect_other_light(self) -> None:
         """Say that the next image may be in another light than what was learned."""

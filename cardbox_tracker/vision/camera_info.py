@@ -28,7 +28,8 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         raise CameraError(
             f"the camera that publishes {image_topic} is not calibrated: the matrix K in "
             f"{info_topic} {problem}. Calibrate it with camera_calibration, or give its driver "
-            "the calibration file, so that the CameraInfo has its focal length"
+            "the calibration file, so that the CameraInfo has its focal length. For a first look, "
+            "this package's camera node assumes an ideal lens with horizontal_fov_deg:=60.0"
         )
     roi = message.roi
     if roi.width and roi.height and (roi.width, roi.height) != (width, height):

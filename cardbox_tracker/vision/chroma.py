@@ -79,6 +79,7 @@ class ChromaScore:
         min_contrast: float,
         edge: float,
         follow: bool = False,
+        before: ChromaScore | None = None,
     ) -> None:
         """Prepare the limits of every pixel.
 
@@ -88,6 +89,7 @@ class ChromaScore:
             min_contrast: smallest difference that counts, grey levels.
             edge: fraction of the highest score nearby that the outline is put at.
             follow: allow for a white balance that has changed.
+            before: what compared the images so far, whose white balance still holds.
         """
         self._mean = model.mean
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
@@ -101,7 +103,9 @@ class ChromaScore:
         self._grid = (slice(step // 2, None, step), slice(step // 2, None, step))
         self._known = np.ascontiguousarray(self._mean[(slice(None), *self._grid)])
         self._shares = np.empty((2, self._known[0].size), np.float32)
-        self._cast = np.float32(0), np.float32(0)
+        self._cast: tuple[np.float32, np.float32] = (np.float32(0), np.float32(0))
+        if before is not None:
+            self._cast = before._cast
 
     def __call__(self, image: ImageArray, window: Window | None = None) -> FloatImage:
         """Return a margin for a bgr image (H, W, 3): not negative where it is foreground.
@@ -123,6 +127,11 @@ class ChromaScore:
         _score(colors, self._mean, self._brightest, self._weights, self._cast, place, score)
         _margin(score, np.asarray(cv2.dilate(score, _WINDOW), np.float32), self._edge)
         return np.asarray(cv2.resize(score, part.shape[1::-1]), np.float32)
+
+    def without_cast(self, model: ChromaModel) -> ChromaModel:
+        """Return colours seen now, in the white balance that the scene was learned in."""
+        cast = np.array([0.0, *self._cast], np.float32)[:, None, None]
+        return ChromaModel(model.mean - cast * model.mean[0], model.stddev)
 
     def _see_cast(self, colors: ImageArray) -> None:
         """Find Cr and Cb that the white balance has added, as shares of the brightness.

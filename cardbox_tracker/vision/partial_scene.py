@@ -131,17 +131,31 @@ def _merged(
     known: BackgroundModel, other: BackgroundModel, new: Mask, both: Mask
 ) -> BackgroundModel:
     """Return ``known`` with the pixels ``new`` of ``other``, in the light of ``known``."""
-    level = np.float32(1.0)
+    level = 1.0
     if both.any():
-        ratios = known.mean[both] / np.maximum(other.mean[both], 1.0)
-        level = np.float32(np.median(ratios))
-    mean = np.where(new, other.mean * level, known.mean)
+        level = float(np.median(known.mean[both] / np.maximum(other.mean[both], 1.0)))
+    return merged(known, other, new, np.full(new.shape, level, np.float32))
+
+
+def merged(
+    known: BackgroundModel, other: BackgroundModel, new: Mask, light: FloatImage
+) -> BackgroundModel:
+    """Return a model with some pixels of another one.
+
+    Args:
+        known: the model, (H, W).
+        other: of the same scene at another time.
+        new: pixels (H, W) that are taken from it.
+        light: factor of its brightness there, (H, W).
+    """
+    mean = np.where(new, other.mean * light, known.mean)
     stddev = np.where(new, other.stddev, known.stddev)
     if known.chroma is None or other.chroma is None:
         return BackgroundModel(mean, stddev)
-    small = _resized(new, known.chroma.mean.shape[:0:-1])
+    size = known.chroma.mean.shape[:0:-1]
+    small = _resized(new, size)
     neutral = np.array([0.0, 128.0, 128.0], np.float32)[:, None, None]
-    colors = (other.chroma.mean - neutral) * level + neutral
+    colors = (other.chroma.mean - neutral) * cv2.resize(light, size) + neutral
     chroma = ChromaModel(
         np.where(small, colors, known.chroma.mean),
         np.where(small, other.chroma.stddev, known.chroma.stddev),

@@ -73,8 +73,10 @@ def _small(brightness: ImageArray) -> FloatImage:
     return np.asarray(cv2.GaussianBlur(small, (0, 0), _SMOOTHING_PX), np.float32)
 
 
-def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
-    """Return where two images (h, w) differ by more than their noise, in whatever light.
+def changed_pixels(
+    before: FloatImage, after: FloatImage, times_noise: float = _TIMES_NOISE
+) -> Mask:
+    """Return where two images (h, w) differ by so many times their noise, in whatever light.
 
     The level of the light and the noise are medians: what moves covers less than half of it.
     """
@@ -82,4 +84,4 @@ def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
     # In more light differences are larger, too.
     difference = np.abs(after - level * before) / max(level, 1.0)
     noise = _FROM_MEDIAN * float(np.median(difference))
-    return np.asarray(difference > min(max(_LEAST, _TIMES_NOISE * noise), _MOST), np.bool_)
+    return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)

@@ -148,6 +148,11 @@ class SilhouettePipeline:
         if self._extractor is not None:
             self._extractor.restart()
 
+    @property
+    def light(self) -> float:
+        """Brightness of the scene in the last image as a factor of what was learned."""
+        return 1.0 if self._extractor is None else self._extractor.gain
+
     def drift(self, image: ImageArray) -> float:
         """Return how much brighter a prepared image is than the background, grey levels.
 

@@ -12,6 +12,7 @@ from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
 
 
@@ -85,6 +86,25 @@ def test_images_of_a_camera_with_colours_have_them(tmp_path: Path) -> None:
         frame = next(colours.frames(0.3))
     assert frame.image is not None
     np.testing.assert_array_equal(frame.image, pixels[:, :, ::-1])
+
+
+def test_as_many_images_are_learned_from_as_a_live_node_does(tmp_path: Path) -> None:
+    empty = np.full((48, 64), 90, np.uint8)
+    other = empty.copy()
+    other[10:40, 20:40] = 200
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+    with BagWriter(tmp_path / "bag") as bag:
+        for number in range(8):
+            bag.write_camera_info("/camera_info", number * 10**8, "optical", camera)
+            image = empty if number < 4 else other
+            bag.write_image("/image_raw", number * 10**8, "optical", image, "mono8")
+    with BagReader(tmp_path / "bag") as reader:
+        found = [
+            next(SilhouetteSource(reader, TimeSpan(0, 1), config, (64, 48)).frames(0.6)).silhouette
+            for config in (BackgroundConfig(learn_images=4), BackgroundConfig(learn_images=8))
+        ]
+    np.testing.assert_array_equal(found[0] > 0, other == 200)
+    assert not found[1][other == 200].all()
 
 
 def test_images_are_brought_to_the_working_size(recording: Any) -> None:

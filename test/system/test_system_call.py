@@ -63,11 +63,20 @@ def test_a_refusal_is_told_in_the_nodes_own_words(graph: Any) -> None:
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.parametrize("name", ["", "no name", "//do"])
+def test_what_is_no_name_of_a_service_is_told(graph: Any, name: str) -> None:
+    result = called(graph, name)
+    assert result.returncode == 1
+    assert f"{name!r} is no name of a service" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 @pytest.mark.slow
 def test_a_service_that_is_not_there_is_answered_with_those_that_are(graph: Any) -> None:
     offer(graph, "/eye/other", True, "")
     result = called(graph, "/eye/missing/do")
     assert result.returncode == 1
+    assert "for somebody to offer /eye/missing/do" in result.stdout
     assert "nobody offers the service /eye/missing/do" in result.stderr
     assert "/eye/other/do" in result.stderr
     assert result.stderr.count("missing") == 1

@@ -62,6 +62,18 @@ def test_video_and_calibration_come_out_at_the_rate(
     assert process.stop() == 0
 
 
+def test_a_video_is_seen_from_its_beginning_and_says_what_it_lacks(
+    own_graph: Any, video: Path
+) -> None:
+    process = own_graph.start("camera", file=video, rate_hz=40.0)
+    own_graph.wait(lambda: "a subscriber of /image_raw" in process.text(), "the words")
+    assert "horizontal_fov_deg:=60.0" in process.text()
+    own_graph.spin(0.5)
+    images = own_graph.collect(Image, "image_raw", qos.REPLAY)
+    own_graph.wait(lambda: len(images) == 20, "all images")
+    assert images[0].data[0] < 5
+
+
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [

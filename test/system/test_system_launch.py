@@ -88,7 +88,7 @@ def launched(graph: Any, log: Path, *arguments: str) -> Iterator[subprocess.Pope
             process.wait()
 
 
-@pytest.mark.parametrize("cardbox_nodes", ["false", "true"])
+@pytest.mark.parametrize("single_process", ["false", "true"])
 @pytest.mark.parametrize("source", ["replay", "live"])
 def test_a_launch_file_leads_to_joint_states(
     own_graph: Any, recorded: dict[str, Path], scene: Any, source: str, single_process: str
@@ -133,6 +133,6 @@ def test_every_argument_is_explained(name: str) -> None:
         check=False,
     )
     assert shown.returncode == 0, shown.stderr
-    for argument in ("namespace", "cardbox_nodes", "person_distance_m", "rep155_id"):
+    for argument in ("namespace", "single_process", "person_distance_m", "rep155_id"):
         assert f"'{argument}':" in shown.stdout
     assert "No description given" not in shown.stdout

@@ -9,7 +9,8 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
-from sensor_msgs.msg import Image, JointState  # noqa: E402
+from rclpy.context import Context  # noqa: E402
+from sensor_msgs.msg import CompressedImage, Image, JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
@@ -18,8 +19,9 @@ from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 def is_reported(graph: Any, words: str) -> bool:
     status = graph.diagnosis("tracker")
-    assert status.level != DiagnosticStatus.OK
-    return any(words in value.value for value in status.values)
+    return status.level != DiagnosticStatus.OK and any(
+        words in value.value for value in status.values
+    )
 
 
 def test_a_best_effort_silhouette_is_told_with_the_remedy(graph: Any) -> None:
@@ -39,6 +41,21 @@ def test_a_latched_subscriber_of_joint_states_is_told(graph: Any) -> None:
     graph.wait(lambda: words in tracker.text(), "the warning in the log")
     assert "qos_overrides./joint_states.publisher.durability:=transient_local" in tracker.text()
     graph.wait(lambda: is_reported(graph, words), "the warning in the diagnostics")
+
+
+def test_another_message_type_is_told_with_the_node(graph: Any) -> None:
+    tracker = graph.processes[0]
+    context = Context()
+    rclpy.init(context=context, domain_id=graph.domain)
+    other = rclpy.create_node("other", context=context, enable_rosout=False)
+    other.create_publisher(CompressedImage, "silhouette", qos.SILHOUETTE)
+    words = "another node (/other) publishes /silhouette as sensor_msgs/msg/CompressedImage"
+    graph.wait(lambda: words in tracker.text(), "the warning in the log")
+    graph.wait(lambda: is_reported(graph, words), "the warning in the diagnostics")
+    assert "/joint_states as" not in tracker.text()
+    other.destroy_node()
+    context.try_shutdown()
+    graph.wait(lambda: not is_reported(graph, words), "the end of the warning")
 
 
 def test_the_remedy_works(graph: Any, scene: Any) -> None:

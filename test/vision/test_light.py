@@ -14,7 +14,8 @@ from cardbox_tracker.vision.background import (
     BackgroundLearner,
     SilhouetteExtractor,
 )
-from cardbox_tracker.vision.light import LightFollower, collect_ratios, sum_cells
+from cardbox_tracker.vision.light import LightFollower
+from cardbox_tracker.vision.light_samples import collect_ratios, sum_cells
 
 H, W = 120, 160
 PERSON = (slice(30, 120), slice(60, 95))
@@ -33,10 +34,12 @@ def truth() -> np.ndarray:
 class Room:
     """A textured wall, learned in its first light, then images of it in other lights."""
 
-    def __init__(self, grey: bool, seed: int = 0, **config: object) -> None:
+    def __init__(
+        self, grey: bool, seed: int = 0, brightness: float = 1.0, **config: object
+    ) -> None:
         self.rng = np.random.default_rng(seed)
         self.grey = grey
-        self.wall = WALL * self.rng.uniform(0.9, 1.1, (H, W, 1))
+        self.wall = brightness * WALL * self.rng.uniform(0.9, 1.1, (H, W, 1))
         learner = BackgroundLearner()
         for _ in range(20):
             learner.add(self.image(1.0, None))
@@ -87,6 +90,23 @@ def test_a_lamp_at_one_side_is_followed(grey: bool) -> None:
     assert np.mean(lit[2 * FPS :]) > 0.93
     off = [room.iou(1.0) for _ in range(4 * FPS)]
     assert np.mean(off[2 * FPS :]) > 0.93
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.75, 0.1), (1.0, 0.9)])
+def test_a_lamp_that_cuts_off_the_wall_does_not_become_foreground(
+    place: tuple[float, float],
+) -> None:
+    room = Room(grey=False, brightness=1.6)
+    y, x = np.mgrid[:H, :W] / W
+    far = (x - place[0]) ** 2 + (y - place[1] * H / W) ** 2
+    lamp = 1.0 + 0.5 * np.exp(-far / (2 * 0.35**2))
+    assert np.mean(room.image(lamp, None).max(axis=-1) == 255) > 0.01
+    for _ in range(FPS):
+        room.iou(1.0)
+    lit = [room.iou(lamp) for _ in range(4 * FPS)]
+    assert np.mean(lit[-FPS:]) > 0.9
+    off = [room.iou(1.0) for _ in range(3 * FPS)]
+    assert np.mean(off[-FPS:]) > 0.93
 
 
 @pytest.mark.parametrize("grey", [True, False])
@@ -171,8 +191,14 @@ def test_the_sums_are_those_of_numpy(seed: int, shape: tuple[int, int]) -> None:
     count = collect_ratios(small, mean, brightest, field, person, ratios)
     np.testing.assert_allclose(ratios[:count], (ratio / field)[known], rtol=1e-5)
     cells = np.empty((2, 3, 4), np.float32)
-    sum_cells(small, mean, brightest, field, person, 1.2, 0.4, cells)
-    used = known & (np.abs(ratio / 1.2 / field - 1) < 0.4)
+    base = rng.uniform(0.8, 1.2, shape).astype(np.float32)
+    sum_cells(small, mean, brightest, field, base, person, 1.2, 0.4, cells)
+    change = ratio / np.float32(1.2) / field - 1
+    # What is cut off is a lower bound.
+    seen = (person == 0) & ((ratio * brightest < 250) | (change > 0))
+    used = seen & (np.abs(change) < 0.4)
     share = 12 / small.size
     assert cells[1].sum() == pytest.approx(share * used.sum(), abs=1e-3)
-    assert cells[0].sum() == pytest.approx(share * (ratio / 1.2 - 1)[used].sum(), abs=1e-2)
+    assert cells[0].sum() == pytest.approx(
+        share * (ratio / 1.2 / base - 1)[used].sum(), abs=1e-2, rel=1e-4
+    )

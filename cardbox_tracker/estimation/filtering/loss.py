@@ -3,7 +3,7 @@
 The chance is a logistic regression on 37,518 frames of 22 recorded sessions with three seeds; in
 1.8 % of them the keypoints are wrong by more than 30 cm on average. Wrong and right frames weigh
 alike, so 0.5 is where a frame is as typical of either. With the coefficients fitted to the other 21
-sessions, 84 % of the wrong frames of a session and 16 % of all its frames are above 0.5.
+sessions, 78 % of the wrong frames of a session and 12 % of all its frames are above 0.6.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ class Evidence(NamedTuple):
         stddev: deviations of the states, weighted by fit, (14,).
         mean: their mean, (14,).
         age: frames since the search began.
-        way_m: how far the person walked across the image lately, m.
     """
 
     residual: float
@@ -42,10 +41,9 @@ class Evidence(NamedTuple):
     stddev: FloatArray
     mean: FloatArray
     age: int
-    way_m: float
 
 
-_INTERCEPT = -4.803
+_INTERCEPT = -3.936
 # What each adds to the logit; between these the area and the prior count.
 _AREA_LIMITS = (0.1, 3.0)
 _PRIOR_LIMITS = (-0.2, 0.3)
@@ -75,18 +73,17 @@ def chance_of_loss(evidence: Evidence) -> float:
     log_area = log(min(max(evidence.area, _AREA_LIMITS[0]), _AREA_LIMITS[1]))
     logit = (
         _INTERCEPT
-        + 2.580 * evidence.residual
-        + 11.158 * evidence.left_over
-        - 3.466 * evidence.outside
-        - 0.981 * log_area
-        + 4.191 * abs(log_area)
-        + 14.703 * min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1])
-        + 30.060 * evidence.arm_m
-        + 66.401 * float(evidence.stddev[TORSO_X])
-        + 1.314 * abs(float(evidence.mean[YAW]))
-        - 1.687 * abs(float(evidence.mean[PITCH]))
-        + 0.471 * exp(-evidence.age / _FRESH_FRAMES)
-        + 7.220 * abs(evidence.way_m)
+        + 2.574 * evidence.residual
+        + 8.733 * evidence.left_over
+        - 2.048 * evidence.outside
+        - 1.448 * log_area
+        + 1.815 * abs(log_area)
+        + 10.544 * min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1])
+        + 25.654 * evidence.arm_m
+        + 49.456 * float(evidence.stddev[TORSO_X])
+        + 2.136 * abs(float(evidence.mean[YAW]))
+        - 0.205 * abs(float(evidence.mean[PITCH]))
+        + 0.323 * exp(-evidence.age / _FRESH_FRAMES)
     )
     return 1.0 / (1.0 + exp(-logit))
 

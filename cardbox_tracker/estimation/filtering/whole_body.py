@@ -291,7 +291,6 @@ class WholeBodyFilter:
             stddev=stddev,
             mean=mean,
             age=self._age,
-            way_m=self._walk.way_m,
         )
         self._chance = remembered(chance_of_loss(evidence), self._chance)
         deviations = state_stddev(stddev)

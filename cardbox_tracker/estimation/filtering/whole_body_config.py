@@ -148,7 +148,7 @@ class WholeBodyConfig:
         restarts=True,
     )
     uncertain_from: float = setting(
-        0.5, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
+        0.6, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
     )
     lost_from: float = setting(
         0.95,

@@ -27,6 +27,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +39,8 @@ SEQUENCE_LENGTH = 7
 _NOT_MOTIONS = ("empty", "enter", "front", "side", "arms", "transition", "neutral")
 # People do not take a posture, or leave the view, exactly at the end of a segment.
 _MARGIN_S = 0.2
+# The background is learned from every image of the empty scene.
+_WHOLE_SPAN = BackgroundConfig(learn_images=10000)
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,7 @@ def recorded_session(
         seed=seed,
     )
     with BagReader(bag_folder) as bag:
-        source = SilhouetteSource(bag, spans.pop("empty"), size=size)
+        source = SilhouetteSource(bag, spans.pop("empty"), _WHOLE_SPAN, size)
         result = initialize_from_recording(source, spans, config, progress)
         frames = list(source.frames(start_s))
         camera = source.camera.with_pitch(config.camera_pitch_rad)

@@ -14,6 +14,7 @@ from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.background_advice import Findings, advice
 from cardbox_tracker.ros.nodes.node_parameters import BackgroundParameters
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
@@ -23,6 +24,8 @@ from cardbox_tracker.vision.calibration_watch import CalibrationWatch
 from cardbox_tracker.vision.kept_background import KeptBackground
 from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
+
+_DOES = "Cut the person out of a camera's images: images in, silhouettes out."
 
 
 class BackgroundNode(CardboxNode):
@@ -188,7 +191,7 @@ class BackgroundNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(BackgroundNode, args)
+    return run_node(BackgroundNode, plain_command_line("background", _DOES, args))
 
 
 if __name__ == "__main__":

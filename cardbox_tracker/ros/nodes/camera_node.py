@@ -28,6 +28,7 @@ from cardbox_tracker.vision.camera_device import (
 )
 
 _RETRY_S = 1.0
+_SETTLE_S = 0.5
 
 
 class CameraNode(CardboxNode):
@@ -51,6 +52,12 @@ class CameraNode(CardboxNode):
             if settings.calibration_file
             else None
         )
+        if self._calibration is None and settings.horizontal_fov_deg <= 0:
+            self.diagnostics.warn(
+                "the images have no calibration (K is all zero), so nobody can be measured in "
+                "them: give calibration_file, or for a first look the lens's field of view, such "
+                "as horizontal_fov_deg:=60.0"
+            )
         self._locked = bool(settings.file) or not settings.lock_exposure
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
@@ -72,6 +79,8 @@ class CameraNode(CardboxNode):
 
     def _read(self) -> None:
         """Read, publish, keep the rate; a file that ends stops or starts over."""
+        if self.parameters.value.file:
+            self._wait_for_listener()
         started_s = due_s = time.monotonic()
         while not self._stop.is_set():
             settings = self.parameters.value
@@ -101,6 +110,16 @@ class CameraNode(CardboxNode):
             except Exception as error:
                 if not self._stop.is_set():
                     self.diagnostics.problem(f"cannot publish the image: {error!r}")
+
+    def _wait_for_listener(self) -> None:
+        """Wait until somebody takes the images, so that a video is seen from its beginning."""
+        while not self._stop.is_set():
+            if self._images.get_subscription_count():
+                # Their CameraInfo, too, has to be found.
+                self._stop.wait(_SETTLE_S)
+                return
+            self.diagnostics.wait_for(f"a subscriber of {self._images.topic_name} to begin")
+            self._stop.wait(_SETTLE_S / 10)
 
     def _publish(self, image: conversions.ImageArray, settings: CameraParameters) -> None:
         header = Header(frame_id=settings.frame_id, stamp=self.get_clock().now().to_msg())

@@ -31,9 +31,12 @@ from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
 from cardbox_tracker.ros.nodes.saved_model import SavedModel
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Camera
+
+_DOES = "Measure a person from the silhouettes of three reference postures."
 
 
 class InitializerNode(CardboxNode):
@@ -185,9 +188,10 @@ def _answer(result: InitializationResult) -> str:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
+    command_line = plain_command_line("initializer", _DOES, args)
     # The tracker, which gets the same silhouettes, has priority.
     os.nice(5)
-    return run_node(InitializerNode, args)
+    return run_node(InitializerNode, command_line)
 
 
 if __name__ == "__main__":

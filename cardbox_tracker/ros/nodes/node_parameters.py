@@ -79,6 +79,7 @@ class BackgroundParameters(NodeParameters):
     follow: bool = shared(BackgroundConfig, "follow")
     min_area: float = shared(BackgroundConfig, "min_area")
     max_hole: float = shared(BackgroundConfig, "max_hole")
+    absorb_after: int = shared(BackgroundConfig, "absorb_after")
 
     def config(self) -> BackgroundConfig:
         """Return the settings of the core."""

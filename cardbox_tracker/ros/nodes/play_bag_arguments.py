@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 
+import yaml
 from rclpy.parameter import Parameter
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+
+_COMPRESSED = "/compressed"
 
 
 def overrides_from(arguments: list[str]) -> list[Parameter]:
-    """Turn the command line (without ROS arguments) into values of the node's parameters."""
+    """Turn the command line (without ROS arguments) into values of the node's parameters.
+
+    Raises:
+        SystemExit: it is wrong, or asks for something to be printed.
+    """
     parser = argparse.ArgumentParser(
         prog="play_bag",
         description="Play a rosbag2 recording (sqlite3 or mcap) with its original stamps.",
@@ -30,5 +41,39 @@ def overrides_from(arguments: list[str]) -> list[Parameter]:
         default=None,
         help="do not wait for a subscriber",
     )
+    parser.add_argument(
+        "--find-topics",
+        nargs="+",
+        choices=("image", "camera_info"),
+        help="print the names of these topics of the bag as YAML, and exit",
+    )
     given = vars(parser.parse_args(arguments))
+    wanted = given.pop("find_topics")
+    if wanted:
+        try:
+            print(yaml.safe_dump(find_topics(given["bag"] or "", wanted)), end="")
+        except CardboxError as error:
+            parser.exit(1, f"{error}\n")
+        parser.exit()
     return [Parameter(name, value=value) for name, value in given.items() if value is not None]
+
+
+def find_topics(bag: str, wanted: Iterable[str]) -> dict[str, str]:
+    """Return what the launch arguments of the same names are for a bag.
+
+    Args:
+        bag: rosbag2 folder or file.
+        wanted: ``image``, which comes with ``image_transport``, and ``camera_info``.
+
+    Raises:
+        CardboxError: it cannot be read, or does not have exactly one of each.
+    """
+    found = {}
+    with BagReader(bag) as reader:
+        if "image" in wanted:
+            topic = reader.image_topic()
+            found["image"] = topic.removesuffix(_COMPRESSED)
+            found["image_transport"] = "compressed" if topic.endswith(_COMPRESSED) else "raw"
+        if "camera_info" in wanted:
+            found["camera_info"] = reader.camera_info_topic()
+    return found

@@ -113,7 +113,10 @@ class ReferenceCapture:
         text = f"captured '{name}' from {len(silhouettes)} silhouettes{warning}"
         age_s = time.monotonic() - self._received_s
         if age_s > _OLD_S:
-            text += f"; the latest came {age_s:.0f} s ago, is the camera running?"
+            text += (
+                f"; the latest came {age_s:.0f} s ago, as it must while a recording is paused; of "
+                "a camera, see whether it runs"
+            )
         if self.missing:
             return f"{text}; missing: {', '.join(self.missing)}"
         return f"{text}; all three are there"

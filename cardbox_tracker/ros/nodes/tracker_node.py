@@ -21,11 +21,14 @@ from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.stream import Step
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
+
+_DOES = "Follow the measured person: silhouettes in, joint states out."
 
 
 class TrackerNode(CardboxNode):
@@ -153,7 +156,7 @@ class TrackerNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(TrackerNode, args)
+    return run_node(TrackerNode, plain_command_line("tracker", _DOES, args))
 
 
 if __name__ == "__main__":

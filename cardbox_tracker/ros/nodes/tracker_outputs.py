@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from sensor_msgs.msg import Image, JointState
-from std_msgs.msg import Bool, Header, String
+from sensor_msgs.msg import Image
+from std_msgs.msg import Bool, Header
 
-from cardbox_tracker.description.rep155 import Rep155Joints, joint_names
-from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.drawing.overlay import draw_message, draw_overlay
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
-from cardbox_tracker.outputs import JointValues, Output, OutputStream, outputs, place_of
+from cardbox_tracker.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
+from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -65,37 +63,6 @@ class TrackerOutputs:
             return
         image = draw_message(conversions.silhouette_of(message), text)
         self._overlay.publish(conversions.image_message(message.header, image, "bgr8"))
-
-
-class Rep155Outputs:
-    """``/humans/bodies/<id>/joint_states`` and the URDF of those joints, latched, beside it."""
-
-    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Advertise the topics of the body ``settings.rep155_id``."""
-        self._id = body_id = settings.rep155_id
-        self._torso_place = settings.torso_place
-        self._names = tuple(joint_names(body_id, settings.torso_place))
-        self._convert = Rep155Joints()
-        self._described: tuple[Any, str] | None = None
-        place = f"/humans/bodies/{body_id}"
-        self._joints = node.advertise(JointState, f"{place}/joint_states", qos.RESULT)
-        self._description = node.advertise(String, f"{place}/robot_description", qos.LATCHED)
-
-    def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
-        """Publish the posture if there is one, before it the URDF if the person is another."""
-        if estimate.posture is None:
-            return
-        if self._described != (tracker.body, header.frame_id):
-            self._described = (tracker.body, header.frame_id)
-            self._convert = Rep155Joints()
-            frame_id = header.frame_id or "camera_optical_frame"
-            urdf = rep155_urdf(tracker.body, self._id, frame_id, self._torso_place)
-            self._description.publish(String(data=urdf))
-        values = self._convert(estimate.posture)
-        if self._torso_place:
-            values = np.concatenate([values, place_of(estimate)])
-        joints = JointValues(self._names, values)
-        self._joints.publish(results.joint_state_message(header, joints))
 
 
 def _wanted(publisher: Any) -> bool:

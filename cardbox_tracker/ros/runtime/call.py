@@ -9,16 +9,18 @@ import time
 from collections.abc import Callable
 
 import rclpy
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _FIND_S = 10.0
+_TELL_S = 1.0
 _GONE_S = 5.0
 _STEP_S = 0.05
 _TYPE = "std_srvs/srv/Trigger"
@@ -29,21 +31,26 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
 
     Args:
         service: its name, such as ``initializer/initialize``.
-        say: is given what the same node publishes on its topic ``status`` meanwhile.
+        say: is given what the same node publishes on its topic ``status`` meanwhile, and what is
+            waited for.
 
     Raises:
-        CardboxError: nobody offers the service, or it refused; the text says why.
+        CardboxError: ``service`` is no name, nobody offers it, or it refused; the text says why.
     """
     rclpy.init(args=[])
     try:
         node = rclpy.create_node("cardbox_call", enable_rosout=False)
         executor = make_executor()
         executor.add_node(node)
-        client = node.create_client(Trigger, service)
-        end_s = time.monotonic() + _FIND_S
+        client = _client(node, service)
+        begun_s, told = time.monotonic(), False
         while not client.service_is_ready():
-            if time.monotonic() > end_s:
+            waited_s = time.monotonic() - begun_s
+            if waited_s > _FIND_S:
                 raise CardboxError(_not_found(node, service))
+            if waited_s > _TELL_S and not told:
+                told = True
+                say(f"waiting up to {_FIND_S:g} s for somebody to offer {service}")
             executor.spin_once(timeout_sec=_STEP_S)
         status = f"{service.rpartition('/')[0]}/status".lstrip("/")
         topic = f"/{status}" if service.startswith("/") else status
@@ -73,6 +80,20 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
     if not answer.success:
         raise CardboxError(str(answer.message))
     return str(answer.message)
+
+
+def _client(node: Node, service: str) -> Client:
+    try:
+        if not service:
+            raise ValueError("it is empty")
+        return node.create_client(Trigger, service)
+    except Exception as error:
+        # Another class in each release of rclpy.
+        reason = " ".join(str(error).split())
+        raise CardboxError(
+            f"{quoted(service)} is no name of a service: {cut(reason)}; expected one such as "
+            "initializer/initialize"
+        ) from None
 
 
 def _not_found(node: Node, service: str) -> str:

@@ -46,6 +46,8 @@ class NodeDiagnostics:
             when it ceases.
         advice: called once a second for warnings that come and go, such as lost images: kind to
             text. The kind "" is for what the node logs itself.
+        remarks: called once a second for what every node watches, such as the types of its topics;
+            it logs for itself.
     """
 
     def __init__(self, node: Node) -> None:
@@ -54,6 +56,7 @@ class NodeDiagnostics:
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
+        self.remarks: Callable[[], list[str]] = list
         self._node = node
         self._waiting = ""
         self._problem = ""
@@ -147,7 +150,7 @@ class NodeDiagnostics:
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
                 self._node.get_logger().warning(text)
-        return [*self._warnings, *found.values()]
+        return [*self._warnings, *self.remarks(), *found.values()]
 
     def _tick(self) -> None:
         self._look_for_silence()

@@ -25,6 +25,7 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
 from cardbox_tracker.ros.runtime.static_executor import make_executor
+from cardbox_tracker.ros.runtime.topic_types import TopicTypes
 
 Callback = Callable[[Any, int], None]
 """Takes a message and when it left its sender, ns since the epoch."""
@@ -56,6 +57,8 @@ class CardboxNode(Node):
         super().__init__(name, **options)
         self._intra_process = intra_process
         self.diagnostics = NodeDiagnostics(self)
+        self._types = TopicTypes(self)
+        self.diagnostics.remarks = self._types.remarks
 
     def resolve(self, topic: str) -> str:
         """Return the full name of ``topic`` after namespace and remapping.
@@ -74,6 +77,7 @@ class CardboxNode(Node):
 
     def advertise(self, kind: Any, topic: str, profile: QoSProfile) -> Publisher:
         """Create a publisher whose QoS can be overridden and whose mismatches are reported."""
+        self._types.add(self.resolve(topic), kind)
         return self.create_publisher(
             kind,
             topic,
@@ -106,6 +110,7 @@ class CardboxNode(Node):
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
+        self._types.add(self.resolve(topic), kind)
         if self._intra_process is not None and self._intra_process.take(
             self.resolve(topic), guarded
         ):

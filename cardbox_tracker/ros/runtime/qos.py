@@ -92,29 +92,18 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
 
 
 def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
-    """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
+    """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
     return SubscriptionEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, True),
-        incompatible_type=lambda _: report(_type_text(topic, "publishes")),
+        incompatible_qos=partial(_report_mismatch, topic, report, True)
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
-    """Return callbacks that pass a mismatch of QoS or of type on ``topic`` to ``report``."""
-    return PublisherEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, False),
-        incompatible_type=lambda _: report(_type_text(topic, "subscribes to")),
-    )
+    """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
+    return PublisherEventCallbacks(incompatible_qos=partial(_report_mismatch, topic, report, False))
 
 
 def _report_mismatch(
     topic: str, report: Callable[[str], None], subscribing: bool, event: Any
 ) -> None:
     report(mismatch_text(topic, event.last_policy_kind, subscribing=subscribing))
-
-
-def _type_text(topic: str, verb: str) -> str:
-    return (
-        f"another node {verb} {topic} with a different message type, so nothing passes between "
-        "the two; compare the types with 'ros2 topic info --verbose'"
-    )

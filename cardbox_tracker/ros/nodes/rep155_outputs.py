@@ -1,0 +1,75 @@
+"""What the tracker publishes after REP-155 below ``/humans``.
+
+Who is there is a message of the package hri_msgs, which may be missing: then it is not published.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, String
+
+from cardbox_tracker.description.rep155 import Rep155Joints, joint_names
+from cardbox_tracker.description.rep155_urdf import rep155_urdf
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.outputs import JointValues, place_of
+from cardbox_tracker.ros.messages import results
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+
+
+class Rep155Outputs:
+    """What other programs know of the body ``rep155_id``: joints, URDF, and that it is there."""
+
+    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
+        """Advertise the topics of the body ``settings.rep155_id``."""
+        self._id = body_id = settings.rep155_id
+        self._torso_place = settings.torso_place
+        self._names = tuple(joint_names(body_id, settings.torso_place))
+        self._convert = Rep155Joints()
+        self._described: tuple[Any, str] | None = None
+        place = f"/humans/bodies/{body_id}"
+        self._joints = node.advertise(JointState, f"{place}/joint_states", qos.RESULT)
+        # The first is what ROS names it, the second what libhri reads.
+        self._descriptions = [
+            node.advertise(String, f"{place}/{name}", qos.LATCHED)
+            for name in ("robot_description", "urdf")
+        ]
+        self._ids_list = _ids_list()
+        self._tracked = (
+            None
+            if self._ids_list is None
+            else node.advertise(self._ids_list, "/humans/bodies/tracked", qos.RESULT)
+        )
+
+    def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
+        """Publish the posture if there is one, before it the URDF if the person is another."""
+        if self._tracked is not None:
+            ids = [] if estimate.posture is None else [self._id]
+            self._tracked.publish(self._ids_list(header=header, ids=ids))
+        if estimate.posture is None:
+            return
+        if self._described != (tracker.body, header.frame_id):
+            self._described = (tracker.body, header.frame_id)
+            self._convert = Rep155Joints()
+            frame_id = header.frame_id or "camera_optical_frame"
+            urdf = rep155_urdf(tracker.body, self._id, frame_id, self._torso_place)
+            for publisher in self._descriptions:
+                publisher.publish(String(data=urdf))
+        values = self._convert(estimate.posture)
+        if self._torso_place:
+            values = np.concatenate([values, place_of(estimate)])
+        joints = JointValues(self._names, values)
+        self._joints.publish(results.joint_state_message(header, joints))
+
+
+def _ids_list() -> Any:
+    """Return the message class of a list of people, or None where it is not installed."""
+    try:
+        return importlib.import_module("hri_msgs.msg").IdsList
+    except ImportError:
+        return None

@@ -1,0 +1,114 @@
+"""Arguments of the launch files: their types, and what is said of a value that is none.
+
+``ros2 launch`` runs under the system's Python, which does not see the virtual environment that the
+nodes run in. Hence only the standard library is imported here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cardbox_tracker.errors import CardboxError, quoted
+
+Value = bool | int | float | str | list[float]
+
+_EXPECTED = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    list: "a list of numbers such as [6.5, 9.5]",
+    Path: "a file that exists, or nothing",
+}
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One argument of a launch file.
+
+    Attributes:
+        default: as text; None if it must be given.
+        meaning: one line for ``--show-args``.
+        kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
+        choices: the texts that are allowed; empty: any.
+        limits: lowest and highest number that is allowed.
+        name: True if its value must be a letter, then letters, digits and underscores, or empty.
+    """
+
+    default: str | None
+    meaning: str
+    kind: type = str
+    choices: tuple[str, ...] = ()
+    limits: tuple[float, float] | None = None
+    name: bool = False
+
+    def value(self, text: str) -> Value:
+        """Return the value that ``text`` stands for.
+
+        Raises:
+            ValueError: it stands for none; the error's text is what was expected.
+        """
+        expected = " or ".join(self.choices) if self.choices else _EXPECTED.get(self.kind, "")
+        lowest, highest = self.limits or (-math.inf, math.inf)
+        if self.limits is not None:
+            expected += f" from {lowest:g} to {highest:g}"
+        if self.name:
+            expected = "a letter, then letters, digits and underscores, or nothing"
+        found = _parsed(self.kind, text.strip())
+        if (
+            found is None
+            or (self.choices and found not in self.choices)
+            or (self.name and not re.fullmatch(r"([A-Za-z]\w*)?", text, re.ASCII))
+            or (isinstance(found, int | float) and not lowest <= found <= highest)
+        ):
+            raise ValueError(expected)
+        return found
+
+
+def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[str, Value]:
+    """Return the value of each of ``arguments`` from the texts ``given`` by name.
+
+    Raises:
+        CardboxError: some are wrong; the text names each, and what was expected.
+    """
+    found: dict[str, Value] = {}
+    wrong = []
+    for name, argument in arguments.items():
+        try:
+            found[name] = argument.value(given[name])
+        except ValueError as error:
+            wrong.append(f"launch argument {name} is {quoted(given[name])}; expected {error}")
+    if wrong:
+        raise CardboxError("; ".join(wrong))
+    return found
+
+
+def _parsed(kind: type, text: str) -> Value | None:
+    """Return ``text`` as ``kind``; None if it is not one."""
+    if kind is bool:
+        return {"true": True, "false": False}.get(text.lower())
+    if kind is list:
+        words = text.removeprefix("[").removesuffix("]").split(",")
+        numbers = [_number(word) for word in words if word.strip()]
+        return None if None in numbers else [one for one in numbers if one is not None]
+    if kind is Path:
+        return text if not text or Path(text).expanduser().is_file() else None
+    if kind is float:
+        return _number(text)
+    if kind is int:
+        try:
+            return int(text)
+        except ValueError:
+            return None
+    return text
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None

@@ -1,0 +1,73 @@
+"""What libhri reads of a body: its URDF, and in a list of hri_msgs that it is there."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from rclpy.qos import DurabilityPolicy
+from std_msgs.msg import Header
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate
+from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
+
+PLACE = "/humans/bodies/p1"
+
+
+class IdsList(SimpleNamespace):
+    """As hri_msgs has it."""
+
+
+class Recorder:
+    """A node that keeps what is published."""
+
+    def __init__(self) -> None:
+        self.sent: dict[str, list[Any]] = {}
+        self.latched: set[str] = set()
+
+    def advertise(self, kind: Any, topic: str, profile: Any) -> Any:
+        self.sent[topic] = []
+        if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            self.latched.add(topic)
+        return SimpleNamespace(publish=self.sent[topic].append)
+
+
+def published(*estimates: Estimate) -> Recorder:
+    node: Any = Recorder()
+    settings: Any = SimpleNamespace(rep155_id="p1", torso_place=True)
+    outputs = Rep155Outputs(node, settings)
+    tracker: Any = SimpleNamespace(body=BodyModel.of(distance_m=2.3))
+    for estimate in estimates:
+        outputs.publish(Header(frame_id="eye"), estimate, tracker)
+    return node
+
+
+FOUND = Estimate(TRACKING, reference_posture("front"), np.full(12, 0.1))
+
+
+def test_the_urdf_is_where_libhri_reads_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "hri_msgs.msg", None)
+    node = published(FOUND, FOUND)
+    assert {f"{PLACE}/urdf", f"{PLACE}/robot_description"} == node.latched
+    (text,), (same,) = node.sent[f"{PLACE}/urdf"], node.sent[f"{PLACE}/robot_description"]
+    assert text.data == same.data and "human_p1" in text.data
+    assert "/humans/bodies/tracked" not in node.sent
+
+
+def test_with_hri_msgs_it_is_said_who_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("hri_msgs.msg")
+    module.__dict__["IdsList"] = IdsList
+    monkeypatch.setitem(sys.modules, "hri_msgs", ModuleType("hri_msgs"))
+    monkeypatch.setitem(sys.modules, "hri_msgs.msg", module)
+    node = published(FOUND, Estimate(LOST), FOUND)
+    lists = node.sent["/humans/bodies/tracked"]
+    assert [message.ids for message in lists] == [["p1"], [], ["p1"]]
+    assert lists[0].header.frame_id == "eye"

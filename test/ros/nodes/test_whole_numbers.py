@@ -1,0 +1,49 @@
+"""A whole number in a YAML file is a number: ``threshold: 3`` where the default is 3.5."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+GIVEN = {"play_bag": {"bag": "bag"}}
+
+
+def whole(default: float, lowest: float | None, highest: float | None) -> int | None:
+    """The whole number of the range nearest to the default; None if there is none."""
+    number = round(default) if lowest is None else max(round(default), math.ceil(lowest))
+    return number if highest is None or number <= highest else None
+
+
+@pytest.mark.parametrize("place", ["/**", "/**/{name}"])
+@pytest.mark.parametrize("name", NODES)
+def test_whole_numbers_of_a_file_are_accepted(
+    name: str, place: str, make_node: Callable[..., Any], tmp_path: Path
+) -> None:
+    kind = NODES[name]
+    numbers: dict[str, Any] = {}
+    for key, spec in kind.specs().items():
+        if kind.types()[key] is float:
+            number = whole(getattr(kind, key), spec.minimum, spec.maximum)
+            if number is not None:
+                numbers[key] = number
+        elif kind.types()[key] == list[float]:
+            numbers[key] = [1, 2]
+    path = tmp_path / "numbers.yaml"
+    section = {"ros__parameters": numbers | GIVEN.get(name, {})}
+    path.write_text(yaml.safe_dump({place.format(name=name): section}))
+    found = LiveParameters(make_node("--params-file", str(path), name=name), kind).value
+    assert numbers
+    for key, number in numbers.items():
+        value = getattr(found, key)
+        assert value == number, key
+        assert all(type(one) is float for one in (value if isinstance(value, list) else [value]))

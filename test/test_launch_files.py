@@ -1,0 +1,248 @@
+"""Launch files in a Python without the package's dependencies, as ``ros2 launch`` runs them.
+
+Where launch is not installed, stand-ins of its actions are carried out in its order.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.recordings.bag_writer import BagWriter
+
+ROOT = Path(__file__).resolve().parents[1]
+NAMES = ("nodes", "live", "replay")
+# What only the virtual environment has.
+NOT_THERE = ("rosbags", "numpy", "cv2", "numba", "matplotlib", "tqdm", "lz4")
+NODES = ["background", "initializer", "tracker"]
+
+
+class Action:
+    """Remembers what it was made with."""
+
+    def __init__(self, *words: Any, **options: Any) -> None:
+        self.words, self.options = words, options
+
+
+def action(name: str) -> type[Action]:
+    return type(name, (Action,), {})
+
+
+class LaunchConfiguration(Action):
+    def perform(self, context: Any) -> str:
+        return str(context.launch_configurations[self.words[0]])
+
+
+class Context:
+    def __init__(self, given: dict[str, str]) -> None:
+        self.launch_configurations = dict(given)
+
+
+def stand_ins(prefix: Path) -> dict[str, dict[str, Any]]:
+    """Names by module; ``prefix`` is where the package is installed."""
+    actions = (
+        *("DeclareLaunchArgument", "IncludeLaunchDescription", "LogInfo", "OpaqueFunction"),
+        *("SetEnvironmentVariable", "SetLaunchConfiguration"),
+    )
+    return {
+        "ament_index_python.packages": {
+            "PackageNotFoundError": KeyError,
+            "get_package_prefix": lambda name: str(prefix),
+            "get_package_share_directory": lambda name: str(ROOT),
+        },
+        "launch": {"LaunchContext": Context, "LaunchDescription": action("LaunchDescription")},
+        "launch.actions": {name: action(name) for name in actions},
+        "launch.launch_description_sources": {
+            "PythonLaunchDescriptionSource": action("PythonLaunchDescriptionSource")
+        },
+        "launch.substitutions": {
+            "EnvironmentVariable": action("EnvironmentVariable"),
+            "LaunchConfiguration": LaunchConfiguration,
+        },
+        "launch_ros.actions": {"Node": action("Node")},
+        "launch_ros.parameter_descriptions": {"ParameterValue": action("ParameterValue")},
+        "launch_ros.ros_adapters": {"get_ros_node": lambda context: None},
+        "rclpy.parameter": {"Parameter": action("Parameter")},
+        "rclpy.parameter_client": {"AsyncParameterClient": action("AsyncParameterClient")},
+        "rclpy.qos": {"DurabilityPolicy": None, "QoSProfile": None},
+        "std_msgs.msg": {"String": None},
+    }
+
+
+@pytest.fixture
+def launch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., list[str]]]:
+    """Return a function that carries out a launch file and returns the nodes it starts."""
+    program = tmp_path / "lib" / "cardbox_tracker" / "play_bag"
+    program.parent.mkdir(parents=True)
+    program.write_text(
+        f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m '
+        'cardbox_tracker.ros.nodes.play_bag_node "$@"\n'
+    )
+    program.chmod(0o755)
+    for name in [n for n in sys.modules if n.partition(".")[0] == "cardbox_tracker"]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in NOT_THERE:
+        monkeypatch.setitem(sys.modules, name, None)
+    for name, values in stand_ins(tmp_path).items():
+        for end in range(name.count(".") + 1):
+            parent = ".".join(name.split(".")[: end + 1])
+            if parent == name or parent not in stand_ins(tmp_path):
+                monkeypatch.setitem(sys.modules, parent, ModuleType(parent))
+        sys.modules[name].__dict__.update(values)
+    yield lambda name, **given: started(load(name).generate_launch_description(), Context(given))
+    for name in [n for n in sys.modules if n.partition(".")[0] == "cardbox_tracker"]:
+        del sys.modules[name]
+
+
+def load(name: str) -> ModuleType:
+    path = ROOT / "launch" / f"{name}.launch.py"
+    spec = importlib.util.spec_from_file_location(f"{name}_launch", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+RUNNING: list[Action] = []
+
+
+def started(description: Action, context: Context) -> list[Action]:
+    RUNNING.clear()
+    carry_out(description.words[0], context)
+    return list(RUNNING)
+
+
+def carry_out(actions: list[Action], context: Context) -> None:
+    given = context.launch_configurations
+    for one in actions:
+        kind = type(one).__name__
+        if kind == "DeclareLaunchArgument":
+            default = one.options["default_value"]
+            given.setdefault(one.words[0], default)
+            assert given[one.words[0]] is not None
+        elif kind == "SetLaunchConfiguration":
+            given[one.words[0]] = one.words[1]
+        elif kind == "OpaqueFunction":
+            carry_out(one.options["function"](context), context)
+        elif kind == "IncludeLaunchDescription":
+            name = Path(one.words[0].words[0]).name.removesuffix(".launch.py")
+            carry_out(load(name).generate_launch_description().words[0], context)
+        elif kind == "Node":
+            RUNNING.append(one)
+
+
+def executables(nodes: list[Action]) -> list[str]:
+    return [node.options["executable"] for node in nodes]
+
+
+def recording(folder: Path, images: int = 1) -> Path:
+    from cardbox_tracker.vision.camera import Camera
+
+    with BagWriter(folder / "bag") as bag:
+        bag.write_camera_info("/eye/camera_info", 1, "eye", Camera(4, 3, 5.0, 5.0, 1.5, 1.0))
+        for number in range(images):
+            bag.write_image(f"/eye/{number}", 1, "eye", np.zeros((3, 4), np.uint8), "mono8")
+    return folder / "bag"
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """Made before ``launch`` takes away what it is made with."""
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    return recording(tmp_path)
+
+
+def test_replay_finds_the_topics_in_a_process_that_can_read_bags(
+    bag: Path, launch: Callable[..., Any]
+) -> None:
+    nodes = launch("replay", bag=str(bag), pause_at="[1, 2.5]", publish_tf="false")
+    assert executables(nodes) == [*NODES, "play_bag"]
+    names = dict(nodes[0].options["remappings"])
+    assert names["image_raw"] == "/eye/0"
+    assert names["camera_info"] == "/eye/camera_info"
+    assert nodes[-1].options["parameters"][1]["pause_at"] == [1.0, 2.5]
+
+
+def test_replay_says_why_a_bag_cannot_be_played(launch: Callable[..., Any]) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    with pytest.raises(RuntimeError, match="/nowhere/bag") as caught:
+        launch("replay", bag="/nowhere/bag")
+    assert "Traceback" not in str(caught.value)
+    assert RUNNING == []
+
+
+def test_topics_that_are_given_are_not_looked_for(launch: Callable[..., Any]) -> None:
+    nodes = launch("replay", bag="/nowhere", image="/i", camera_info="/c", publish_tf="false")
+    assert dict(nodes[0].options["remappings"])["image_raw"] == "/i"
+
+
+def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) -> None:
+    nodes = launch("live", width="320", loop="True", publish_tf="false")
+    assert executables(nodes) == [*NODES, "camera"]
+    parameters = nodes[-1].options["parameters"][1]
+    assert (parameters["width"], parameters["loop"]) == (320, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "argument", "value", "expected"),
+    [
+        ("live", "width", "abc", "a whole number from 32 to 8192"),
+        ("live", "width", "5", "a whole number from 32 to 8192"),
+        ("live", "loop", "yes", "true or false"),
+        ("live", "rate_hz", "nan", "a number from 0 to 240"),
+        ("live", "rviz", "yes", "true or false"),
+        ("live", "single_process", "1", "true or false"),
+        ("live", "preset", "papers", "paper or default"),
+        ("live", "config_dir", "/nowhere", "a folder"),
+        ("live", "file", "/nowhere.mp4", "a file that exists"),
+        ("live", "calibration_file", "/nowhere.yaml", "a file that exists"),
+        ("nodes", "rep155_id", "1st", "a letter, then"),
+        ("nodes", "person_distance_m", "-1", "a number from 0.3 to 20"),
+        ("nodes", "image_transport", "jpeg", "raw or compressed"),
+        ("replay", "pause_at", "[1, x]", "a list of numbers"),
+        ("replay", "rate", "fast", "a number from 0.01 to 100"),
+    ],
+)
+def test_a_wrong_argument_is_named_before_anything_runs(
+    name: str, argument: str, value: str, expected: str, launch: Callable[..., Any]
+) -> None:
+    given = {"bag": "/nowhere", "image": "/i", "camera_info": "/c"} if name == "replay" else {}
+    with pytest.raises(Exception, match=f"launch argument {argument} is '.*expected {expected}"):
+        launch(name, **given, **{argument: value})
+    assert RUNNING == []
+
+
+def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    from cardbox_tracker.ros.nodes.node_parameters import NODES as PARAMETERS
+
+    compared = 0
+    for name, of in (("live", "camera"), ("replay", "play_bag"), ("nodes", "")):
+        with pytest.MonkeyPatch.context() as patch:
+            for module, values in stand_ins(ROOT).items():
+                if module.startswith(("launch", "ament")):
+                    for parent in {module.partition(".")[0], module}:
+                        stand_in = ModuleType(parent)
+                        stand_in.__dict__.update(stand_ins(ROOT).get(parent, values))
+                        patch.setitem(sys.modules, parent, stand_in)
+            loaded = load(name)
+        given = {of: tuple(loaded.ARGUMENTS)} if of else loaded.GIVEN
+        for node, arguments in given.items():
+            specs, types = PARAMETERS[node].specs(), PARAMETERS[node].types()
+            for argument in arguments:
+                mine, spec = loaded.ARGUMENTS[argument], specs[argument]
+                kind = getattr(types[argument], "__origin__", types[argument])
+                assert mine.kind is kind or (mine.kind, kind) == (Path, str), argument
+                assert set(mine.choices) == set(spec.choices), argument
+                if spec.minimum is not None:
+                    limits = pytest.approx((spec.minimum, spec.maximum))
+                    assert mine.limits == limits, argument
+                compared += 1
+    assert compared > 15
