@@ -392,8 +392,9 @@ def test_nodes_for_long(live: Live) -> None:
     live.now_s = from_s + seconds
     pairs = [(s, live.arrived_s[i] - s) for i, s in sent_s.items() if i in live.arrived_s]
     times_s, took_s = np.array(pairs).T
-    first = np.median(took_s[times_s < start_s + 0.25 * seconds])
-    last = np.median(took_s[times_s > start_s + 0.75 * seconds])
+    # What is quick tells of the nodes, what is slow of other programs on the machine.
+    first = np.percentile(took_s[times_s < start_s + 0.25 * seconds], 10)
+    last = np.percentile(took_s[times_s > start_s + 0.75 * seconds], 10)
     print(f"{live.layout}: {number} images, {len(pairs)} answers, latency x {last / first:.2f}")
     print(early, late, sep="\n")
     assert len(pairs) > number / 10
@@ -423,7 +424,7 @@ def test_the_core_for_long() -> None:
             assert np.isfinite(estimate.posture).all()
     after = resources_of(os.getpid())
     quarter = count // 4
-    ratio = np.median(took_s[-quarter:]) / np.median(took_s[1:quarter])
+    ratio = np.percentile(took_s[-quarter:], 10) / np.percentile(took_s[1:quarter], 10)
     print(
         f"{count} images: {before} to {after} (MB, files, threads), time of an image x {ratio:.2f}"
     )
