@@ -234,8 +234,7 @@ class WholeBodyFilter:
             ARM_LIMITS,
             normals.take(config.arms_again, ARM_ANGLES),
         )
-        both = np.concatenate([ratings, cost.arms(again, arm)])
-        return np.concatenate([arms, again]), both
+        return np.concatenate([arms, again]), np.concatenate([ratings, cost.arms(again, arm)])
 
     def _together(
         self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
