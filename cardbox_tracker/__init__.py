@@ -30,6 +30,8 @@ if TYPE_CHECKING:
         RosMissingError,
     )
     from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
+    from cardbox_tracker.estimation.cost.depth import Depth
+    from cardbox_tracker.estimation.cost.view import OtherCamera
     from cardbox_tracker.estimation.initialization.config import (
         InitializationConfig,
         InitializationResult,
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
         SilhouetteExtractor,
     )
     from cardbox_tracker.vision.camera import Calibration, Camera, load_calibration
+    from cardbox_tracker.vision.extrinsics import Extrinsics
+    from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 
 __version__ = "0.1.0"
 
@@ -61,12 +65,15 @@ __all__ = [
     "Camera",
     "CameraError",
     "CardboxError",
+    "Depth",
     "EncodingError",
     "Estimate",
+    "Extrinsics",
     "InitializationConfig",
     "InitializationError",
     "InitializationResult",
     "NotFiniteError",
+    "OtherCamera",
     "RosMissingError",
     "SilhouetteExtractor",
     "Tracker",
@@ -75,6 +82,7 @@ __all__ = [
     "initialize_body",
     "load_body_model",
     "load_calibration",
+    "load_extrinsics",
     "save_body_model",
 ]
 
@@ -96,6 +104,8 @@ _MODULES = {
         "RosMissingError",
     ),
     "estimation.config": ("PRESETS", "TrackerConfig"),
+    "estimation.cost.depth": ("Depth",),
+    "estimation.cost.view": ("OtherCamera",),
     "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
     "estimation.initialization.measure": ("initialize_body",),
     "estimation.tracker": ("Estimate", "Tracker"),
@@ -106,6 +116,8 @@ _MODULES = {
         "SilhouetteExtractor",
     ),
     "vision.camera": ("Calibration", "Camera", "load_calibration"),
+    "vision.extrinsics": ("Extrinsics",),
+    "vision.extrinsics_files": ("load_extrinsics",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -15,10 +15,13 @@ from cardbox_tracker.commands.arguments import (
     span,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.errors import CardboxError
 
 NAME = "initialize"
 HELP = "measure the person in a recording"
 
+# Where the search for the distance begins when two cameras measure it.
+_GUESSED_M = 2.0
 _REFERENCES = {
     "front": "faces the camera, arms hanging 20 degrees away from the body",
     "side": "stands the same, turned by 90 degrees",
@@ -43,10 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--distance",
         type=float,
-        required=True,
+        default=None,
         metavar="M",
         help="from the camera to the person, metres along the floor; all sizes are proportional "
-        "to it",
+        "to it; not needed with two or more --cameras, which measure it",
     )
     parser.add_argument(
         "--side-turn",
@@ -73,14 +76,24 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.cameras import open_recording
-    from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
+    from cardbox_tracker.recordings.cameras import CameraSources, open_recording
+    from cardbox_tracker.recordings.initialize import (
+        describe,
+        initialize_from_cameras,
+        initialize_from_recording,
+    )
 
     pitch_rad = math.radians(options.camera_pitch_deg)
     # An impossible distance or pitch is refused by its own name, before anything follows from it.
-    BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
+    if options.distance is None and len(options.cameras) < 2:
+        raise CardboxError(
+            "one camera does not show how far away the person is; give --distance M, or two "
+            "--cameras"
+        )
+    distance_m = _GUESSED_M if options.distance is None else options.distance
+    BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
     config = InitializationConfig(
-        distance_m=options.distance,
+        distance_m=distance_m,
         camera_pitch_rad=pitch_rad,
         side_turn=options.side_turn,
         seed=options.seed,
@@ -93,7 +106,10 @@ def run(options: argparse.Namespace) -> None:
         ) as source,
         progress_bar("initialize") as show,
     ):
-        result = initialize_from_recording(source.first, spans, config, show)
+        if options.distance is None and isinstance(source, CameraSources):
+            result = initialize_from_cameras(source, spans, config, show)
+        else:
+            result = initialize_from_recording(source.first, spans, config, show)
     print_remarks(source.first)
     save_body_model(result.body, options.output)
     print(describe(result))

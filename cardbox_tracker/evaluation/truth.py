@@ -51,6 +51,7 @@ class GroundTruth:
         pitch_deg: how far the camera looks down.
         side_turn: the way the person turned for the side reference.
         cameras: namespaces of several cameras, the first camera's first; empty with one.
+        is_rectified: the first two of them are a rectified pair.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -60,6 +61,7 @@ class GroundTruth:
     pitch_deg: float
     side_turn: str
     cameras: tuple[str, ...] = ()
+    is_rectified: bool = False
 
 
 def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
@@ -95,6 +97,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             float(data["camera"]["pitch_down_deg"]),
             str(data["side_posture_turns_to"]),
             tuple(str(camera["name"]) for camera in data.get("cameras", ())),
+            "baseline_m" in str(data.get("cameras", ())),
         )
     except OSError as error:
         raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None

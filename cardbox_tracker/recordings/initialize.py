@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
@@ -11,6 +12,8 @@ from cardbox_tracker.estimation.initialization.config import (
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
+from cardbox_tracker.estimation.initialization.scale import measured_scale
+from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 # More of one posture look alike.
@@ -37,6 +40,33 @@ def initialize_from_recording(
         every = -(-len(frames) // _MOST_IMAGES)
         images[name] = [frame.image for frame in frames[::every] if frame.image is not None]
     return initialize_body(references, source.camera, config, progress, images)
+
+
+def initialize_from_cameras(
+    sources: CameraSources,
+    spans: Mapping[str, TimeSpan],
+    config: InitializationConfig,
+    progress: Callable[[float], None] | None = None,
+) -> InitializationResult:
+    """Measure the person with the first camera, and the distance with the second one.
+
+    The distance of ``config`` is only where the search begins.
+
+    Raises:
+        CardboxError: a span has no image.
+        InitializationError: as :func:`initialize_from_recording`, or the second camera does not
+            show that person.
+    """
+    guessed = initialize_from_recording(sources.first, spans, config).body
+    second = {
+        name: average_silhouette([f.silhouette for f in sources.sources[1].held(spans[name], name)])
+        for name in ("front", "arms")
+    }
+    camera = sources.first.camera.with_pitch(config.camera_pitch_rad)
+    scale = measured_scale(guessed, camera, sources.others[0], second)
+    # Again, since what no outline shows is taken from the proportions of people of that size.
+    measured = replace(config, distance_m=scale * config.distance_m)
+    return initialize_from_recording(sources.first, spans, measured, progress)
 
 
 def describe(result: InitializationResult) -> str:

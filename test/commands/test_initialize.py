@@ -62,3 +62,11 @@ def test_a_missing_output_folder_is_told_before_the_recording_is_read(
     options = spans | {"--distance": "2", "--output": f"{tmp_path / 'none' / 'body.yaml'}"}
     done = cardbox("initialize", "no_bag", *(f"{n}={text}" for n, text in options.items()))
     done.assert_refused("initialize", "No such file or directory; choose a folder")
+
+
+def test_one_camera_needs_the_distance(
+    tmp_path: Path, spans: dict[str, str], cardbox: Callable
+) -> None:
+    options = spans | {"--output": f"{tmp_path / 'body.yaml'}", "--cameras": "left"}
+    done = cardbox("initialize", "no_bag", *(f"{n}={text}" for n, text in options.items()))
+    done.assert_refused("initialize", "give --distance M, or two --cameras")

@@ -8,7 +8,7 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.errors import CameraError
+from cardbox_tracker.errors import CameraError, InitializationError
 from cardbox_tracker.estimation.config import default_preset, paper_preset
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
@@ -16,6 +16,7 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.initialization.scale import measured_scale, scaled
 from cardbox_tracker.estimation.tracker import NO_PERSON, TRACKING, Estimate, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
@@ -188,3 +189,17 @@ def test_the_depth_of_the_right_place_costs_least() -> None:
     # Without a measured depth it says nothing.
     for frame in (Frame(silhouette, 120, 1), Frame(silhouette, 120, 1, depth_m=0 * depth)):
         np.testing.assert_array_equal(term.observe(frame).postures(states), 0.0)
+
+
+@pytest.mark.parametrize("guessed", [0.75, 1.3])
+def test_a_second_camera_measures_how_far_away_the_person_is(guessed: float) -> None:
+    references = {}
+    for name in ("front", "arms"):
+        state = np.append(reference_posture(name), [0.0, 0.0])
+        state[0] = BODY.placement.lateral_m
+        references[name] = drawn(SECOND, VIEW.camera, VIEW.states(state))
+    found = measured_scale(scaled(BODY, guessed), CAMERA, OTHER, references)
+    assert found * guessed == pytest.approx(1.0, abs=0.02)
+    nobody = {"front": np.zeros((120, 160), np.uint8)}
+    with pytest.raises(InitializationError, match="does not show the person"):
+        measured_scale(BODY, CAMERA, OTHER, nobody)

@@ -13,10 +13,10 @@ observation is asked in three ways:
     observation.postures(postures)                  (N, 12) -> (N,)
 
 The first call of the first two prepares what all particles share. The whole-body filter also finds
-how far the hips have moved along the line of sight and up; it asks the last two only, and appends
-``torso_x`` and ``torso_z`` to torsos, (6,), and to postures, (N, 14). So a term reads d1..d4 and
-d1..d12 by their places and uses the last two if they are there. A new term is one new file with a
-settings class, see ``docs/extending.md``.
+how far the hips have moved along the line of sight and up; it asks for torsos without arms, and
+appends ``torso_x`` and ``torso_z`` to torsos, (N, 6) or (6,), and to postures, (N, 14). So a term
+reads d1..d4 and d1..d12 by their places and uses the last two if they are there. A new term is one
+new file with a settings class, see ``docs/extending.md``.
 """
 
 from __future__ import annotations

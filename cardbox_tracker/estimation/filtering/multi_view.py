@@ -20,7 +20,7 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
-from cardbox_tracker.estimation.filtering.arm_proposals import STATE_LIMITS, propose_arms
+from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.pose_filter import Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 

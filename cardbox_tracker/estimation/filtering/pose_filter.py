@@ -23,6 +23,13 @@ class Sight(Enum):
     TOO_MUCH = "more foreground than a person can be"
 
 
+def sight_of(share: float, smallest: float, largest: float) -> Sight:
+    """Return what a silhouette is whose pixels are this share of the model's from the front."""
+    if share < smallest:
+        return Sight.NOBODY
+    return Sight.TOO_MUCH if share > largest else Sight.PERSON
+
+
 @dataclass(frozen=True)
 class Fit:
     """What a filter has found in a frame.

@@ -28,11 +28,7 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     TORSO_Z,
 )
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
-from cardbox_tracker.estimation.filtering.arm_proposals import (
-    ARM_LIMITS,
-    STATE_LIMITS,
-    propose_arms,
-)
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.loss import (
     chance_of_loss,
@@ -40,7 +36,7 @@ from cardbox_tracker.estimation.filtering.loss import (
     remembered,
     state_stddev,
 )
-from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 _HOME_LIMIT_M = 0.7
@@ -115,9 +111,7 @@ class WholeBodyFilter:
 
     def _sight_of(self, silhouette_px: int, frontal_px: int) -> Sight:
         share = silhouette_px / frontal_px
-        if share < self._config.smallest_person:
-            return Sight.NOBODY
-        return Sight.TOO_MUCH if share > self._config.largest_person else Sight.PERSON
+        return sight_of(share, self._config.smallest_person, self._config.largest_person)
 
     def follow(self, terms: Sequence[Term]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -224,12 +218,8 @@ class WholeBodyFilter:
     ) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
         config, cost = self._config, self._cost
-        arms = self._propose_arms(
-            pool,
-            arm,
-            normals.take(config.arms, ARM_ANGLES),
-            uniforms.take(config.arms, _ARM_UNIFORMS),
-        )
+        random = normals.take(config.arms, ARM_ANGLES), uniforms.take(config.arms, _ARM_UNIFORMS)
+        arms = self._propose_arms(pool, arm, *random)
         ratings = cost.arms(arms, arm)
         self._arm_spread[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
             arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
@@ -242,8 +232,7 @@ class WholeBodyFilter:
             ARM_LIMITS,
             normals.take(config.arms_again, ARM_ANGLES),
         )
-        both = np.concatenate([ratings, cost.arms(again, arm)])
-        return np.concatenate([arms, again]), both
+        return np.concatenate([arms, again]), np.concatenate([ratings, cost.arms(again, arm)])
 
     def _together(
         self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws

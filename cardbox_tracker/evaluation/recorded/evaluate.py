@@ -18,6 +18,7 @@ from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import recovery_of, track_session
 from cardbox_tracker.files import atomic_path
+from cardbox_tracker.recordings.cameras import STEREO
 
 
 def evaluate_sessions(
@@ -78,10 +79,17 @@ def evaluate_sessions(
     return results
 
 
+def _named(only: str | None) -> str:
+    if only is None:
+        return ""
+    return ", with depth" if only == STEREO else f", {only} alone"
+
+
 def _each_way(folder: Path) -> list[str | None]:
-    """Return how a session is tracked: with all its cameras, and with each of several alone."""
-    cameras = load_session(folder).truth.cameras
-    return [None, *(cameras if len(cameras) > 1 else ())]
+    """Return how a session is tracked: all its cameras, each of several alone, with depth."""
+    truth = load_session(folder).truth
+    alone = truth.cameras if len(truth.cameras) > 1 else ()
+    return [None, *alone, *([STEREO] if truth.is_rectified else [])]
 
 
 def evaluate_session(
@@ -109,7 +117,7 @@ def evaluate_session(
     except CardboxError as error:
         found = [{"frames": len(session.stamps_ns), "failure": str(error)}]
     return {
-        "name": session.name if only is None else f"{session.name}, {only} alone",
+        "name": session.name + _named(only),
         "mediapipe": session.mediapipe if only is None else {},
         "mediapipe_ms": session.mediapipe_ms,
         "runs": found,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.terms import Image
+from cardbox_tracker.estimation.cost.depth import Depth
+from cardbox_tracker.estimation.cost.terms import DepthImage, Image
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
-from cardbox_tracker.recordings.cameras import CameraSources, open_recording
+from cardbox_tracker.recordings.cameras import STEREO, CameraSources, open_recording
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
@@ -56,12 +57,16 @@ def track_session(
     """Initialize and track one session with each of ``seeds``.
 
     Of several cameras the first one measures the person; all of them track, or the one that
-    ``only`` names.
+    ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
 
     Raises:
         CardboxError: the recording cannot be read.
     """
-    with open_recording(session.bag, session.spans["empty"], session.truth.cameras) as source:
+    depth = STEREO if only == STEREO else None
+    if depth:
+        config, only = replace(config, terms=(*config.terms, Depth())), None
+    cameras, empty = session.truth.cameras, session.spans["empty"]
+    with open_recording(session.bag, empty, cameras, depth=depth) as source:
         others = source.others if isinstance(source, CameraSources) else ()
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
@@ -74,12 +79,14 @@ def track_session(
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
-        for stamp_ns, silhouettes, images in _seen(source, session.start_s + offset_s, only):
+        for stamp_ns, silhouettes, images, depth_m in _seen(
+            source, session.start_s + offset_s, only
+        ):
             for tracker, estimates, spent in zip(trackers, found, times, strict=True):
                 if tracker is None:
                     continue
                 start = time.perf_counter()
-                estimates[stamp_ns] = tracker.track_views(silhouettes, images)
+                estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m)
                 spent.append(1e3 * (time.perf_counter() - start))
     return [
         _run(session, body, failure, estimates, spent)
@@ -89,11 +96,11 @@ def track_session(
 
 def _seen(
     source: SilhouetteSource | CameraSources, start_s: float, only: str | None
-) -> Iterator[tuple[int, list[Image | None], list[Image | None]]]:
-    """Yield stamp, silhouettes and images of all cameras, or of one and nothing of the others."""
+) -> Iterator[tuple[int, list[Image | None], list[Image | None], DepthImage | None]]:
+    """Yield stamp, silhouettes, images and depth of all cameras, or of one alone."""
     if isinstance(source, SilhouetteSource):
         for frame in source.frames(start_s):
-            yield frame.stamp_ns, [frame.silhouette], [frame.image]
+            yield frame.stamp_ns, [frame.silhouette], [frame.image], None
         return
     for taken in source.frames(start_s):
         frames = [
@@ -104,6 +111,7 @@ def _seen(
             taken.stamp_ns,
             [frame and frame.silhouette for frame in frames],
             [frame and frame.image for frame in frames],
+            taken.depth_m,
         )
 
 
