@@ -17,7 +17,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.initialization.scale import measured_scale, scaled
-from cardbox_tracker.estimation.tracker import NO_PERSON, TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.tracker import NO_PERSON, TRACKING, UNCERTAIN, Estimate, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -146,7 +146,7 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
         estimate = track(tracker, state, seeing)
         errors.append(error_cm(estimate, state))
         states.append(estimate.state)
-    assert set(states[4:]) == {TRACKING}
+    assert set(states[4:]) <= {TRACKING, UNCERTAIN}
     assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
     assert max(errors[4:]) < 20.0
     assert track(tracker, state_of(0.0), ()).state == NO_PERSON
