@@ -98,7 +98,8 @@ def run(options: argparse.Namespace) -> None:
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    check_outputs((options.output,), options.force, inputs=(options.recording,))
+    inputs = options.recording, options.extrinsics
+    check_outputs((options.output,), options.force, inputs=inputs)
     spans = {name: getattr(options, name) for name in _REFERENCES}
     with (
         open_recording(

@@ -21,7 +21,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 def check_outputs(
     outputs: Iterable[Path | None],
     force: bool,
-    inputs: Sequence[Path] = (),
+    inputs: Sequence[Path | None] = (),
     results: Iterable[Path] = (),
 ) -> None:
     """Refuse what could not be written, or would destroy something, before any work is done.
@@ -29,7 +29,7 @@ def check_outputs(
     Args:
         outputs: files to write; None are left out.
         force: whether files that exist may be replaced.
-        inputs: files and recordings that are read; they are never replaced.
+        inputs: files and recordings that are read; they are never replaced. None are left out.
         results: files and folders that are written in ways of their own: only ``force`` and
             ``inputs`` are looked at.
 
@@ -60,12 +60,14 @@ def _is_something(path: Path) -> bool:
     return path.exists() and not is_written_in_place(path)
 
 
-def _files_of(inputs: Iterable[Path]) -> Iterator[Path]:
+def _files_of(inputs: Iterable[Path | None]) -> Iterator[Path]:
     for path in inputs:
+        if path is None:
+            continue
         yield path
         if path.is_dir():
             # A session's folder has its recording in a folder of its own.
-            yield from (inside for inside in path.glob("*"))
+            yield from path.glob("*")
             yield from (path / "bag").glob("*")
 
 

@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> None:
     check_outputs(
         (options.csv, options.video),
         options.force,
-        inputs=(options.recording, options.model),
+        inputs=(options.recording, options.model, options.extrinsics),
         results=() if options.bag is None else (options.bag,),
     )
     body = load_body_model(options.model)

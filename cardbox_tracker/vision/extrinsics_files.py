@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
@@ -39,15 +38,12 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
     """
     name = os.fspath(path)
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise CameraError(
-            f"cannot read the extrinsics {name}: {reason}; give {_EXPECTED}"
-        ) from None
+        text = read_small_text(path)
+    except SmallYamlError as error:
+        raise CameraError(f"cannot read the extrinsics {name}: {error}; give {_EXPECTED}") from None
     try:
-        data = tomllib.loads(text) if name.endswith(".toml") else yaml.safe_load(text)
-    except (tomllib.TOMLDecodeError, yaml.YAMLError, ValueError) as error:
+        data = tomllib.loads(text) if name.endswith(".toml") else parse_small_yaml(text)
+    except (tomllib.TOMLDecodeError, SmallYamlError) as error:
         raise CameraError(
             f"the extrinsics {name} cannot be parsed: {error}; expected {_EXPECTED}"
         ) from None

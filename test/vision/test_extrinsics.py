@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -146,3 +147,20 @@ def test_sources_have_an_order_and_have_to_agree() -> None:
         choose([one, None, far], "left", "right")
     with pytest.raises(CameraError, match="--extrinsics FILE"):
         choose([None, None, None], "left", "right")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("a: &a [1]\nb: *a\n", "alias"), ("a: 1\n" * 20_000, "64 kB")],
+)
+def test_a_file_that_stands_for_more_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    path = tmp_path / "chain.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CameraError, match=reason):
+        load_extrinsics(path, ["cam0", "cam1"])
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "chain.yaml")
+    with pytest.raises(CameraError, match="it is no file"):
+        load_extrinsics(tmp_path / "chain.yaml", ["cam0", "cam1"])
