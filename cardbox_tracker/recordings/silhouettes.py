@@ -147,7 +147,7 @@ class SilhouetteSource:
         for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
                 break
-            silhouette = self._pipeline.silhouette(image)
+            silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
                 yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
 

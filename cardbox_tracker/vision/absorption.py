@@ -29,6 +29,8 @@ _LEAST_LEVEL = 1e-3
 _TIMES_NOISE = 4.0
 # Images that a mean is made of: a second at 15 Hz, so that noise is a quarter of an image's.
 _BLOCK = 15
+# Images that follow each other more closely, as at more than 20 Hz, do not all count.
+_SPACING_NS = 50_000_000
 # A region is still if no larger share of it with what is near, and of its outline, has changed
 # in so many images. In 300 of them, of things 0.5 % changes, and up to 9 % where hands pass by; of
 # people of eleven sessions, who sway by 3 mm, 54 % or more, of one who stands for a minute 38 %,
@@ -92,12 +94,14 @@ class StillRegions:
     def regions(self) -> Iterator[tuple[Mask, float]]:
         """Yield the regions of the last fifteen silhouettes, and how much of each moves.
 
-        Regions are (H / 2, W / 2), shares from 0 to 1.
+        Regions are (H / 2, W / 2), shares from 0 to 1. What is near a region is part of it, so that
+        a head is not left alone where the neck has the colour of the wall.
         """
         moves = (self._still < self._blocks).astype(np.uint8)
-        count, labels = cv2.connectedComponents(self._seen, connectivity=8)
+        joined = cv2.dilate(self._seen, _disk(_NEAR_PX // _SCALE))
+        count, labels = cv2.connectedComponents(joined, connectivity=8)
         for number in range(1, count):
-            region = (labels == number).astype(np.uint8)
+            region = ((labels == number) & (self._seen > 0)).astype(np.uint8)
             near = cv2.dilate(region, _disk(_NEAR_PX // _SCALE))
             outline = near - cv2.erode(region, _disk(_NEAR_PX // 2 // _SCALE))
             yield region > 0, max(cv2.mean(moves, part)[0] for part in (near, outline))
@@ -117,9 +121,15 @@ class Absorber:
         self._things: Mask | None = None
         self._others = np.zeros((0, 0), np.uint8)
         self._learner = BackgroundLearner()
+        self._last_ns: int | None = None
 
     def add(
-        self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray, level: float
+        self,
+        image: ImageArray,
+        brightness: ImageArray,
+        silhouette: ImageArray,
+        level: float,
+        stamp_ns: int = 0,
     ) -> tuple[Mask, BackgroundModel] | None:
         """Look at an image, grey (H, W) or bgr (H, W, 3), and its silhouette (H, W).
 
@@ -128,10 +138,14 @@ class Absorber:
             brightness: of it, (H, W).
             silhouette: 0 or 255.
             level: of the light, as a factor of what was learned.
+            stamp_ns: of the image, 0 if unknown; nobody sways in images that follow too closely, so
+                those are left out.
 
         Returns:
             Pixels (H, W) that have become background, and what they look like now; mostly None.
         """
+        if self._is_too_soon(stamp_ns):
+            return None
         if self._things is not None:
             self._learner.add(image)
             cv2.bitwise_or(self._others, silhouette, dst=self._others)
@@ -149,6 +163,14 @@ class Absorber:
         self._others = np.zeros_like(silhouette)
         self._learner = BackgroundLearner()
         return absorbed
+
+    def _is_too_soon(self, stamp_ns: int) -> bool:
+        """Whether an image follows the last one that counted too closely."""
+        last_ns = self._last_ns
+        if stamp_ns and last_ns is not None and 0 <= stamp_ns - last_ns < _SPACING_NS:
+            return True
+        self._last_ns = stamp_ns or None
+        return False
 
 
 def _disk(radius_px: int) -> ImageArray:

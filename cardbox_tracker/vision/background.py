@@ -104,11 +104,13 @@ class SilhouetteExtractor:
         if self._light is not None:
             self._light.replace(model.mean, None if model.chroma is None else model.chroma.mean)
 
-    def _absorb(self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray) -> None:
+    def _absorb(
+        self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray, stamp_ns: int
+    ) -> None:
         """Let what was moved and stays become background."""
         if self._absorber is None:
             return
-        absorbed = self._absorber.add(image, brightness, silhouette, self.gain)
+        absorbed = self._absorber.add(image, brightness, silhouette, self.gain, stamp_ns)
         if absorbed is not None:
             pixels, now = absorbed
             if self._chroma is not None and now.chroma is not None:
@@ -119,11 +121,12 @@ class SilhouetteExtractor:
             light = np.asarray(1.0 / np.maximum(factors, _LEAST_LIGHT), np.float32)
             self._use(merged(self.model, now, pixels, light))
 
-    def __call__(self, image: ImageArray) -> ImageArray:
+    def __call__(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
         """Return the silhouette (H, W) of an image: 255 for the person, else 0.
 
         Args:
             image: brightness (H, W), or bgr (H, W, 3).
+            stamp_ns: of the image; 0 if unknown.
 
         Raises:
             ValueError: the image's size is not the background's.
@@ -175,7 +178,7 @@ class SilhouetteExtractor:
         self._last = window_of(silhouette)
         if self._light is not None:
             self._light.exclude(silhouette)
-        self._absorb(image, brightness, silhouette)
+        self._absorb(image, brightness, silhouette, stamp_ns)
         return silhouette
 
     def _colored_window(

@@ -104,7 +104,8 @@ class BackgroundConfig:
     absorb_after: int = setting(
         300,
         "images after which a region of the silhouette in and near which nothing moves, such as a "
-        "door left open, becomes background; a person sways; 0: never",
+        "door left open, becomes background; a person sways; of more than 20 images a second not "
+        "all count; 0: never",
         limits=(0, 1000000),
     )
 

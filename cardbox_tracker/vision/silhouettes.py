@@ -133,15 +133,17 @@ class SilhouettePipeline:
             left = np.count_nonzero(other(image))
         self._extractor = other if found > _IN_WRONG_LIGHT * left else extractor
 
-    def silhouette(self, image: ImageArray) -> ImageArray:
+    def silhouette(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
         """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
+
+        Its stamp, 0 if unknown, only says how fast images come.
 
         Raises:
             RuntimeError: no background is learned yet.
         """
         if self._extractor is None:
             raise RuntimeError("no background is learned yet; call finish_learning() first")
-        return self._extractor(image)
+        return self._extractor(image, stamp_ns)
 
     def restart(self) -> None:
         """Say that the next image is not the one after the last, so that no light is followed."""

@@ -110,6 +110,15 @@ def test_without_the_setting_nothing_is_absorbed(room: Any) -> None:
     assert silhouette[DOOR].all()
 
 
+@pytest.mark.parametrize(("rate_hz", "is_absorbed"), [(15, True), (200, False)])
+def test_a_flood_of_images_is_no_longer_time(room: Any, rate_hz: int, is_absorbed: bool) -> None:
+    extractor = learned(room)
+    open_door(room)
+    for number in range(2 * ENOUGH):
+        silhouette = extractor(room.image(), 1 + number * 10**9 // rate_hz)
+    assert silhouette[DOOR].any() != is_absorbed
+
+
 def test_restarted_it_does_not_remember(room: Any) -> None:
     extractor = learned(room)
     open_door(room)
@@ -118,6 +127,18 @@ def test_restarted_it_does_not_remember(room: Any) -> None:
     assert first[0][DOOR].any() and not first[-1][DOOR].any()
     extractor.restart()
     np.testing.assert_array_equal(first, [extractor(image) for image in images])
+
+
+def test_a_head_apart_from_a_moving_body_is_no_thing() -> None:
+    regions = StillRegions(AFTER)
+    silhouette = np.zeros((200, 200), np.uint8)
+    silhouette[20:60, 80:120] = 255  # the head, which keeps still
+    silhouette[70:, 60:140] = 255  # 10 px below it the body
+    for number in range(2 * AFTER):
+        image = np.where(silhouette > 0, 190, 90).astype(np.uint8)
+        image[70:, 60:140] = 90 + 100 * (number // 15 % 2)
+        found = regions.add(image, silhouette, 1.0)
+        assert found is None or not found.any()
 
 
 @pytest.mark.parametrize(("moved", "is_thing"), [(0.5 * STILL, True), (2.0 * STILL, False)])

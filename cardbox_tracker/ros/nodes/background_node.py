@@ -153,7 +153,7 @@ class BackgroundNode(CardboxNode):
         if self._images.get_subscription_count():
             # Before the silhouette, so that nobody who needs both has to wait.
             self._images.publish(conversions.image_message(header, image))
-        silhouette = pipeline.silhouette(image)
+        silhouette = pipeline.silhouette(image, conversions.stamp_ns(header.stamp))
         # The silhouette first, so that the tracker does not wait for a CameraInfo that rarely
         # changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
