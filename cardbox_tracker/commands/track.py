@@ -76,6 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="particles of each of the three filters; without it, the preset's",
     )
     parser.add_argument(
+        "--refine-sizes",
+        action="store_true",
+        help="refine the breadths while tracking, slowly and near the model's",
+    )
+    parser.add_argument(
         "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
     )
     parser.add_argument(
@@ -152,7 +157,9 @@ def _config(options: argparse.Namespace) -> TrackerConfig:
     from cardbox_tracker.estimation.config import PRESETS
     from cardbox_tracker.estimation.cost.depth import Depth
 
-    config = replace(PRESETS[options.preset](), strategy=options.strategy)
+    config = replace(
+        PRESETS[options.preset](), strategy=options.strategy, refine_sizes=options.refine_sizes
+    )
     if options.depth is not None:
         config = replace(config, terms=(*config.terms, Depth()))
     if options.particles is None:

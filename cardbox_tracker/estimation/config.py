@@ -69,7 +69,8 @@ class TrackerConfig:
         whole_body: settings of the filter ``whole_body``.
 
     The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
-    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person`` and ``lost_frames``.
+    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``refine_sizes`` and
+    ``lost_frames``.
     """
 
     filter: str = setting(
@@ -124,6 +125,12 @@ class TrackerConfig:
         False,
         "only the parts of the silhouette count that can be the person, not a door, a chair or "
         "somebody who passes by",
+        restarts=True,
+    )
+    refine_sizes: bool = setting(
+        False,
+        "breadths of trunk, arms and head are refined while tracking, slowly and near the measured "
+        "ones; with the filter whole_body and one camera",
         restarts=True,
     )
     lost_iou: float = setting(

@@ -28,6 +28,7 @@ from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.further_camera import FurtherCamera
 from cardbox_tracker.estimation.person_region import PersonRegion
+from cardbox_tracker.estimation.size_refinement import SizeRefinement
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
@@ -93,8 +94,9 @@ class Tracker:
         """Set up for ``body``; the camera is pitched as the body model says.
 
         Args:
-            body: the person. What is unknown of them is fitted while tracking, which replaces the
-                attribute ``body``; until then no estimate is better than ``uncertain``.
+            body: the person. What is unknown of them is fitted while tracking, and with
+                ``refine_sizes`` their breadths are refined; either replaces the attribute
+                ``body``. Until what is unknown is known, no estimate is better than ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -122,11 +124,22 @@ class Tracker:
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next silhouette on."""
         self.body, self._silhouette = body, silhouette
+        self._refinement: SizeRefinement | None = None
         self._terms = self._built(self.config)
         self._further = [
             FurtherCamera(body, self.camera, other, self.config) for other in self._others
         ]
         self.reset()
+
+    def _refine(self) -> None:
+        """Let the last frame, which was sure, say what it does of the sizes."""
+        if self._refinement is None or not isinstance(self._filter, WholeBodyFilter):
+            return
+        body = self._refinement.add(*self._filter.best())
+        if body is not None:
+            self.body, self._silhouette = body, CompiledSilhouette(body, self.camera)
+            self._terms = self._built(self.config)
+            self._filter.use_body(self._silhouette)
 
     def _built(self, config: TrackerConfig) -> list[Term]:
         return [settings.build(self.body, self.camera) for settings in config.terms]
@@ -140,6 +153,12 @@ class Tracker:
             further.reset(self.config)
         self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
         self._region = PersonRegion(self.body, self.camera) if self.config.select_person else None
+        is_refined = self.config.refine_sizes and not (self._others or self.body.unknown)
+        if not is_refined:
+            self._refinement = None
+        elif self._refinement is None and isinstance(self._filter, WholeBodyFilter):
+            cost = self.config.whole_body.cost
+            self._refinement = SizeRefinement(self.body, self.camera, cost)
         self._poor_frames = 0
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
@@ -254,6 +273,8 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
+        if not fit.is_uncertain and not fit.is_poor:
+            self._refine()
         return Estimate(
             UNCERTAIN if fit.is_uncertain else TRACKING,
             fit.posture,

@@ -84,6 +84,7 @@ class TrackerParameters(NodeParameters):
     select_person: str = shared(
         TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")
     )
+    refine_sizes: bool = shared(TrackerConfig, "refine_sizes")
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
     seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1), effect=_NEXT_START)
@@ -125,6 +126,7 @@ class TrackerParameters(NodeParameters):
             average=self.average or base.average,
             relocalize=_chosen(self.relocalize, base.relocalize),
             select_person=_chosen(self.select_person, base.select_person),
+            refine_sizes=self.refine_sizes,
             lost_iou=self.lost_iou,
             lost_frames=self.lost_frames,
         )
