@@ -16,8 +16,9 @@ from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_prob
 
 FloatArray = NDArray[np.float64]
 
-
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
+# What images of JPEG can have; a CameraInfo may hold any number, a file one of any length.
+_MOST_SIDE_PX = 65535
 
 
 @dataclass(frozen=True)
@@ -167,10 +168,12 @@ class Calibration:
         return Rectifier(*maps)
 
     def _check(self) -> None:
-        if self.width <= 0 or self.height <= 0:
+        size = (self.width, self.height)
+        if not all(0 < side <= _MOST_SIDE_PX for side in size):
             raise CameraError(
-                f"the calibration is for an image of {self.width}x{self.height}; expected the "
-                "camera's size in pixels: calibrate the camera, or fill in width and height"
+                f"the calibration is for an image of {quoted(self.width)}x{quoted(self.height)}; "
+                f"expected the camera's size in pixels, at most {_MOST_SIDE_PX} each: calibrate "
+                "the camera, or fill in width and height"
             )
         problem = matrix_problem(self.k, self.width, self.height)
         if problem:

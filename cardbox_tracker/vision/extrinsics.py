@@ -8,12 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import CameraError
+from cardbox_tracker.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 
 # How far a matrix in a file may be from a rotation: files have three digits and more.
 _ROTATION_TOLERANCE = 1e-2
+# No length is larger, even in millimetres; sums of such numbers stay finite.
+_LARGEST = 1e6
+
+
+def _is_possible(values: FloatArray) -> bool:
+    return bool(np.all(np.abs(values) <= _LARGEST))  # false for NaN, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +47,12 @@ class Extrinsics:
         """
         try:
             values = np.array(matrix, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.zeros(0)
-        if values.shape not in ((4, 4), (3, 4)) or not np.isfinite(values).all():
+        if values.shape not in ((4, 4), (3, 4)) or not _is_possible(values):
             raise CameraError(
-                f"{source}: expected a rigid transform of 4 x 4 finite numbers, got {matrix!r}"
+                f"{source}: expected a rigid transform of 4 x 4 finite numbers in metres, got "
+                f"{quoted(matrix)}"
             )
         rotation = values[:3, :3]
         u, _, v = np.linalg.svd(rotation)
@@ -66,12 +73,12 @@ class Extrinsics:
         """
         try:
             vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             vectors = np.full((2, 3), np.nan)
-        if not np.isfinite(vectors).all():
+        if not _is_possible(vectors):
             raise CameraError(
                 f"{source}: expected a rotation vector and a translation of three numbers each, "
-                f"got {rotation!r} and {translation_m!r}"
+                f"got {quoted(rotation)} and {quoted(translation_m)}"
             )
         turn = np.asarray(cv2.Rodrigues(vectors[0])[0], np.float64)
         return cls(turn, vectors[1].copy(), source)

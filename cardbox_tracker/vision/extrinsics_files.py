@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.errors import CameraError
+from cardbox_tracker.errors import CameraError, cut
 from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
@@ -43,9 +43,10 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
         raise CameraError(f"cannot read the extrinsics {name}: {error}; give {_EXPECTED}") from None
     try:
         data = tomllib.loads(text) if name.endswith(".toml") else parse_small_yaml(text)
-    except (tomllib.TOMLDecodeError, SmallYamlError) as error:
+    except (ValueError, RecursionError, SmallYamlError) as error:
+        # Of tomllib also numbers of thousands of digits, and lists in lists in lists.
         raise CameraError(
-            f"the extrinsics {name} cannot be parsed: {error}; expected {_EXPECTED}"
+            f"the extrinsics {name} cannot be parsed: {cut(str(error))}; expected {_EXPECTED}"
         ) from None
     entries = data if isinstance(data, Mapping) else {}
     entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
@@ -54,7 +55,7 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
     if missing:
         raise CameraError(
             f"the extrinsics {name} have no camera {', '.join(missing)}; they have "
-            f"{', '.join(sorted(poses)) or 'none'}: expected {_EXPECTED} with these names"
+            f"{cut(', '.join(sorted(poses))) or 'none'}: expected {_EXPECTED} with these names"
         )
     back = poses[cameras[0].strip("/")].inverse()
     return {camera: poses[camera.strip("/")].after(back) for camera in cameras[1:]}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -38,7 +38,9 @@ from cardbox_tracker.vision.encodings import (
     decode_compressed,
     decode_grey,
 )
+from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 
+CORPUS = Path(__file__).parent / "corpus"
 MODEL = dumps_body_model(BodyModel())
 CALIBRATION = {
     "image_width": 64,
@@ -48,6 +50,21 @@ CALIBRATION = {
     "camera_matrix": {"rows": 3, "cols": 3, "data": [60.0, 0, 31.5, 0, 60.0, 23.5, 0, 0, 1]},
     "distortion_coefficients": {"rows": 1, "cols": 5, "data": [0.1, 0, 0, 0, 0]},
 }
+CAMCHAIN = """left:
+  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+right:
+  T_cn_cnm1: [[1, 0, 0, -0.12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+  rostopic: /right/image_raw
+"""
+CAMERA_GROUP = """[cam_0]
+name = "left"
+rotation = [0.0, 0.1, 0.0]
+translation = [0.0, 0.0, 0.0]
+[cam_1]
+name = "right"
+rotation = [0.0, 0.0, 0.0]
+translation = [0.1, 0.0, 0.0]
+"""
 JUNK = st.one_of(
     st.text(max_size=12),
     st.sampled_from(
@@ -126,14 +143,45 @@ def calibrations(draw: st.DrawFn) -> str:
 
 @pytest.mark.promise("A damaged calibration file is read or refused in words")
 @given(calibrations())
+@example(yaml.safe_dump({**CALIBRATION, "image_width": 10**400}))
 def test_calibration(text: str) -> None:
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", errors="replace") as file:
-        file.write(text)
+    read_calibration(text.encode("utf-8", "replace"))
+
+
+def read_calibration(data: bytes) -> None:
+    with tempfile.NamedTemporaryFile() as file:
+        file.write(data)
         file.flush()
         with refusals():
             found = load_calibration(file.name)
             found.camera(64, 48)
             found.rectifier(64, 48)
+
+
+def read_extrinsics(data: bytes, suffix: str) -> None:
+    with tempfile.NamedTemporaryFile(suffix=suffix) as file:
+        file.write(data)
+        file.flush()
+        with refusals():
+            (found,) = load_extrinsics(file.name, ["left", "right"]).values()
+            assert np.isfinite([*found.centre_m, *found.rotation.ravel()]).all()
+
+
+@pytest.mark.promise("A damaged extrinsics file is read or refused in words")
+@given(damaged_text(CAMCHAIN), st.just(".yaml"))
+@example(CAMCHAIN.replace("-0.12", "0x" + "f" * 300), ".yaml")
+@example(CAMCHAIN.replace("-0.12", "1e308"), ".yaml")
+def test_extrinsics(text: str, suffix: str) -> None:
+    read_extrinsics(text.encode("utf-8", "replace"), suffix)
+
+
+@pytest.mark.promise("A damaged camera group of aniposelib is read or refused in words")
+@given(damaged_text(CAMERA_GROUP), st.just(".toml"))
+@example(CAMERA_GROUP.replace("0.1", "1e308"), ".toml")
+@example(CAMERA_GROUP.replace("0.1", "9" * 5000), ".toml")
+@example("a = " + "[" * 3000, ".toml")
+def test_camera_group(text: str, suffix: str) -> None:
+    read_extrinsics(text.encode("utf-8", "replace"), suffix)
 
 
 @pytest.mark.promise("Any CameraInfo gives a camera or is refused in words")
@@ -226,6 +274,26 @@ def test_recording(files: dict[str, bytes]) -> None:
                 assert image.as_sent.dtype == np.uint8
     finally:
         shutil.rmtree(folder)
+
+
+def test_corpus() -> None:
+    """Every input of the corpus: see its README."""
+    readers: dict[str, Callable[[bytes], Any]] = {
+        "yaml": lambda data: parse_small_yaml(data.decode("utf-8", "replace")),
+        "body_model": lambda data: loads_body_model(data.decode("utf-8", "replace")),
+        "calibration": read_calibration,
+        "extrinsics": lambda data: read_extrinsics(data, ".yaml"),
+        "camera_group": lambda data: read_extrinsics(data, ".toml"),
+        "compressed_image": lambda data: decode_compressed(data, None, most_pixels=10**6),
+    }
+    folders = {folder.name for folder in CORPUS.iterdir() if folder.is_dir()}
+    assert folders == set(readers)
+    for name, read in readers.items():
+        files = sorted((CORPUS / name).iterdir())
+        assert files
+        for file in files:
+            with refusals():
+                read(file.read_bytes())
 
 
 @pytest.mark.promise("Any word on the command line is understood or refused in words")
