@@ -162,7 +162,8 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    return Markers(marker_shapes(body, tracker.camera, estimate.posture))
+    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m
+    return Markers(marker_shapes(*seen))
 
 
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:

@@ -76,7 +76,7 @@ class ResultBag:
         self._described = body
         bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
-        overlay = draw_overlay(frame.brightness, body, camera, estimate)
+        overlay = draw_overlay(frame.picture, body, camera, estimate)
         bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(estimate, tracker):
             _write_value(bag, f"/{output.topic}", stamp, optical, value)

@@ -42,26 +42,31 @@ class TrackerOutputs:
         self,
         header: Header,
         estimate: Estimate,
-        silhouette: conversions.ImageArray,
+        picture: conversions.ImageArray,
         tracker: Tracker,
     ) -> None:
-        """Publish the outputs of an image; without a posture, no old one under its stamp."""
+        """Publish the outputs of an image; without a posture, no old one under its stamp.
+
+        ``picture`` is what the overlay is drawn on: the camera's image, or else the silhouette.
+        """
         for output, value in self._stream.values(estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
-            image = draw_overlay(silhouette, tracker.body, tracker.camera, estimate)
+            image = draw_overlay(picture, tracker.body, tracker.camera, estimate)
             self._overlay.publish(conversions.image_message(header, image, "bgr8"))
 
     def _is_wanted(self, output: Output) -> bool:
         return _wanted(self._publishers[output.topic])
 
-    def waiting(self, message: Image, text: str) -> None:
-        """Publish on ``overlay`` the silhouette and what the tracker waits for."""
+    def waiting(self, message: Image, seen: Image | None, text: str) -> None:
+        """Publish on ``overlay`` the image, or the silhouette, and what the tracker waits for."""
         if not _wanted(self._overlay) or self._guided:
             return
-        image = draw_message(conversions.silhouette_of(message), text)
+        silhouette = conversions.silhouette_of(message)
+        picture = conversions.image_behind(silhouette, seen)
+        image = draw_message(silhouette if picture is None else picture, text)
         self._overlay.publish(conversions.image_message(message.header, image, "bgr8"))
 
 
