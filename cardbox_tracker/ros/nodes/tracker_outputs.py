@@ -12,6 +12,7 @@ from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
+from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -21,7 +22,11 @@ class TrackerOutputs:
     """The tracker's topics; each message is made only while the topic has a subscriber."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Advertise the topics for ``node``, those of REP-155 if ``settings`` have its ID."""
+        """Advertise the topics for ``node``, those of REP-155 and TF if ``settings`` ask for them.
+
+        Raises:
+            CardboxError: they ask for TF, whose messages are not installed.
+        """
         topics = outputs(settings.torso_place)
         self._publishers = {
             output.topic: node.advertise(
@@ -32,6 +37,7 @@ class TrackerOutputs:
         self._stream = OutputStream(topics)
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._human = Rep155Outputs(node, settings) if settings.rep155_id else None
+        self._tf = TfOutputs(node, settings) if settings.publish_tf else None
         self._guided = False
         node.subscribe(Bool, "initializer/guiding", self._on_guiding, qos.LATCHED)
 
@@ -53,6 +59,8 @@ class TrackerOutputs:
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
+        if self._tf is not None:
+            self._tf.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
             image = draw_overlay(picture, tracker.body, tracker.camera, estimate)
             self._overlay.publish(conversions.image_message(header, image, "bgr8"))
