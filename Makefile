@@ -1,5 +1,6 @@
 # make setup   everything in .venv: the cardbox command, the nodes, the tools of the tests
 # make demo    the whole chain on a synthetic recording; results in demo_output/
+# make example   a small recording, its measured person and their posture, in example/
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
@@ -79,6 +80,16 @@ test: lint
 demo: setup
 	$(BIN)/cardbox demo --output demo_output
 
+# As the README does it by hand; the times are those of the synthetic session.
+.PHONY: example
+example: setup
+	@mkdir -p example
+	$(BIN)/cardbox synthesize --motion wave --compressed --force --output example/session
+	$(BIN)/cardbox initialize example/session --background 0:3.9 --front 6.8:8.2 --side 9.8:11.2 \
+		--arms 12.8:14.2 --distance 2.0 --force --output example/person.yaml
+	$(BIN)/cardbox track example/session --model example/person.yaml --background 0:3.9 \
+		--start 15.6 --force --csv example/person.csv --video example/person.mp4 --bag example/results
+
 # The extra is left out of the set-up, for few need it: it replaces NumPy by an older one.
 .PHONY: benchmark
 benchmark: setup
@@ -120,4 +131,4 @@ colcon: setup
 
 .PHONY: clean
 clean:
-	rm -rf $(VENV) build dist *.egg-info demo_output .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist *.egg-info demo_output example .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -35,7 +35,16 @@ class EncodingError(CardboxError):
 
 
 class InitializationError(CardboxError):
-    """The reference silhouettes do not allow the body to be measured."""
+    """The reference silhouettes do not allow the body to be measured.
+
+    Attributes:
+        words: what the person in front of the camera should do, in a few words.
+    """
+
+    def __init__(self, text: str, words: str = "Once more, please") -> None:
+        """``text`` says what was wrong and what to do, to whoever runs the program."""
+        super().__init__(text)
+        self.words = words
 
 
 class BagError(CardboxError):

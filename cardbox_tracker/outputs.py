@@ -135,7 +135,7 @@ def posture_from(joints: JointValues) -> FloatArray:
     Raises:
         ValueError: a joint of the posture is missing.
     """
-    by_name = _by_name(joints)
+    by_name = positions_of(joints)
     missing = [name for name in JOINT_NAMES if name not in by_name]
     if missing:
         raise ValueError(f"joints {', '.join(missing)} are missing")
@@ -144,13 +144,14 @@ def posture_from(joints: JointValues) -> FloatArray:
 
 def place_from(joints: JointValues) -> FloatArray | None:
     """Return ``torso_x`` and ``torso_z`` (2,) among named joints; None unless both are there."""
-    by_name = _by_name(joints)
+    by_name = positions_of(joints)
     if not by_name.keys() >= set(PLACE_NAMES):
         return None
     return np.array([by_name[name] for name in PLACE_NAMES])
 
 
-def _by_name(joints: JointValues) -> dict[str, float]:
+def positions_of(joints: JointValues) -> dict[str, float]:
+    """Return the value of each joint by its name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
@@ -162,7 +163,8 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    return Markers(marker_shapes(body, tracker.camera, estimate.posture))
+    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m
+    return Markers(marker_shapes(*seen))
 
 
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:

@@ -26,7 +26,7 @@ INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.(?:py|md|yaml|xml|rviz|json|png|jpg)")
 # Made by a command, or of a user.
-NOT_HERE = ("demo_output/", "/", "~")
+NOT_HERE = ("demo_output/", "example/", "/", "~")
 
 
 def text_of(document: Path) -> str:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.estimation.tracker import (
@@ -39,8 +40,14 @@ from cardbox_tracker.vision.camera import Camera
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TRACKER = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
 POSTURE = reference_posture("arms")
-FOUND = Estimate(TRACKING, POSTURE, np.full(12, 0.1), np.zeros((6, 3)), 812, 0.87654)
-PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
+POINTS_M = CAMERA.reference_to_optical(keypoints_m(BodyModel(), POSTURE))
+FOUND = Estimate(TRACKING, POSTURE, np.full(12, 0.1), POINTS_M, 812, 0.87654)
+PLACED = replace(
+    FOUND,
+    keypoints_m=POINTS_M + np.array([0.0, 0.05, -0.25]),
+    offset_m=np.array([0.25, -0.05]),
+    offset_stddev_m=np.array([0.03, 0.01]),
+)
 ALL_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
 TOPICS = ["tracking_state", "joint_states", "joint_states_stddev", "keypoints", "markers"]
 

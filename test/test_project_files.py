@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 import yaml
 
+from cardbox_tracker.commands.main import build_parser
+
 ROOT = Path(__file__).resolve().parents[1]
 TOOLS = {"python", "ruff", "mypy", "pytest"}
 
@@ -92,3 +94,25 @@ def test_the_image_does_not_take_in_what_is_built() -> None:
     assert {".git", ".venv", "build"} <= set(ignored)
     for needed in ("cardbox_tracker", "config", "launch", "resource", "setup.py", "setup.cfg"):
         assert needed not in ignored
+
+
+def test_rosdoc2_finds_its_settings_and_the_documents() -> None:
+    """In the form that it asks for: two sections, and a folder beside package.xml."""
+    xml = ElementTree.parse(ROOT / "package.xml").getroot()
+    name = xml.findtext("export/rosdoc2")
+    assert name is not None
+    about, settings = yaml.safe_load_all((ROOT / name).read_text(encoding="utf-8"))
+    assert about == {"type": "rosdoc2 config", "version": 1}
+    assert settings["settings"] == {"never_run_doxygen": True}
+    (builder,) = settings["builders"]
+    assert (ROOT / builder["sphinx"]["user_doc_dir"] / "topics.md").is_file()
+
+
+def test_the_example_is_made_by_commands_that_there_are() -> None:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+    (recipe,) = re.findall(r"(?ms)^example: setup\n(.*?)^\n", text)
+    commands = re.findall(r"\$\(BIN\)/cardbox (.*)", recipe)
+    assert [words.split()[0] for words in commands] == ["synthesize", "initialize", "track"]
+    for words in commands:
+        build_parser().parse_args(shlex.split(words))
+    assert "/example/" in (ROOT / ".gitignore").read_text(encoding="utf-8").split()

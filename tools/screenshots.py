@@ -18,14 +18,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.drawing.guidance import draw_guidance
+from cardbox_tracker.body.posture import REFERENCE_NAMES
+from cardbox_tracker.drawing.guide import Guide
 from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.initialization.guidance import instruction
+from cardbox_tracker.estimation.initialization.guidance import Step, short_words
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
@@ -40,8 +39,9 @@ _QUALITY = 82
 _WIDTH_PX = 1200
 # Moments that show most, as fractions of each motion.
 _MOMENTS = {"wave": 0.53, "bend": 0.63, "bow": 0.45}
-# Not yet quite in the posture, so that the image shows what the outline is for.
-_BEFORE_ARMS_S = 0.45
+# Reference, seconds before it is held, and those left: not yet quite in the posture, and in it, so
+# that the image shows what the outline and its colours are for.
+_GUIDED = (("front", -0.3, 1), ("side", 0.9, 3), ("arms", 0.45, 2))
 _SETTLED_S = 0.3
 
 
@@ -92,7 +92,7 @@ def _shots(
             if motion not in overlays and frame.time_s >= time_s - 1e-6:
                 frames[motion] = frame
                 overlays[motion] = draw_overlay(
-                    frame.brightness, result.body, tracker.camera, estimate, _SCALE
+                    frame.picture, result.body, tracker.camera, estimate, _SCALE
                 )
     steps = [frames["wave"].brightness, frames["wave"].silhouette]
     return {
@@ -103,21 +103,13 @@ def _shots(
 
 
 def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> ImageArray:
-    """What is shown before the references ``front`` and ``arms`` are captured."""
+    """What is shown before the references are captured, as in a mirror."""
+    guide = Guide(source.camera, InitializationConfig(2.0))
     shown = []
-    for name, before_s, left_s in (("front", -_SETTLED_S, 1), ("arms", _BEFORE_ARMS_S, 3)):
+    for name, before_s, left_s in _GUIDED:
         frame = next(source.frames(segments[name].start_s - before_s))
-        shown.append(
-            draw_guidance(
-                frame.silhouette,
-                BodyModel(),
-                source.camera,
-                reference_posture(name),
-                instruction(name, "left"),
-                left_s,
-                _SCALE,
-            )
-        )
+        step = Step(name, short_words(name, guide.config.side_turn), left_s)
+        shown.append(guide.draw(step, frame.silhouette, frame.picture, mirror=True))
     return _row(shown)
 
 

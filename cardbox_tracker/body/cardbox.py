@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import Part, parts_of_bodies
 from cardbox_tracker.body.sizes import FloatArray
@@ -92,7 +92,14 @@ def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float =
         around it, the patches ordered as ``PATCH_NAMES``. With a neck its patch follows as the
         16th, ``NECK_PATCHES``.
     """
-    frames = forward_kinematics(body, postures)
+    return patches_at(body, forward_kinematics(body, postures), neck_to_head)
+
+
+def patches_at(body: BodyModel, frames: BodyFrames, neck_to_head: float = 0.0) -> FloatArray:
+    """Return the corners of the patches of ``body`` whose parts are at ``frames``.
+
+    See :func:`cardbox_patches`, which takes postures.
+    """
     patches = part_patches(body.sizes, neck_to_head)
     return np.concatenate(
         [

@@ -121,6 +121,26 @@ def _arm(
     return Arm(shoulder, elbow, hand, upper_arm, forearm)
 
 
+def with_shoulders(frames: BodyFrames, shoulders_m: FloatArray) -> BodyFrames:
+    """Return ``frames`` with both arms moved, each with its shoulder where it is said to be.
+
+    The whole-body filter lifts the shoulder of a raised arm, which :func:`forward_kinematics`, as
+    the paper has it, does not.
+
+    Args:
+        frames: of one or many postures.
+        shoulders_m: left, then right, (..., 2, 3), metres in the reference frame.
+    """
+    arms = [
+        arm._replace(shoulder=place, elbow=arm.elbow + moved, hand=arm.hand + moved)
+        for arm, place in zip(
+            (frames.left, frames.right), np.moveaxis(shoulders_m, -2, 0), strict=True
+        )
+        for moved in [place - arm.shoulder]
+    ]
+    return frames._replace(left=arms[0], right=arms[1])
+
+
 def keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
     """Return shoulder, elbow and hand of the left, then the right arm.
 

@@ -18,7 +18,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.outputs import OUTPUTS, place_from, posture_from
+from cardbox_tracker.outputs import OUTPUTS, place_from, positions_of, posture_from
+from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
@@ -27,7 +28,7 @@ from cardbox_tracker.ros.runtime.processes import Nodes
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Those of the bag that 'cardbox track --bag' writes.
+# Those of the bag that 'cardbox track --bag' writes; /tf is made of two of them.
 TOPICS = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
@@ -66,6 +67,7 @@ class Client:
         self._state = ""
         self._nodes = nodes
         self._bag = bag
+        self._transforms = BagTransforms(bag)
         self._stamp_ns = 0
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
@@ -98,11 +100,14 @@ class Client:
         stamp = self._stamp_ns
         if topic == "body_model":
             self.body_model = message.data
+        elif topic == "robot_description":
+            self._transforms.describe(message.data)
         elif topic == "tracking_state":
             # It has no stamp; the tracker sends it right before the joint state of its image.
             self._state = message.data
         elif topic == "joint_states":
             joints = results.joint_values_of(message)
+            self._transforms.write(stamp, positions_of(joints))
             self.postures[stamp] = posture_from(joints)
             place_m = place_from(joints)
             if place_m is not None:

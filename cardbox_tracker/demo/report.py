@@ -76,6 +76,7 @@ def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int,
         estimate = Estimate(
             result.states.get(stamp) or TRACKING,
             posture=result.postures[stamp],
+            keypoints_m=result.keypoints_m.get(stamp),
             offset_m=result.places_m.get(stamp),
         )
         placed = estimate.placed(result.body)
@@ -123,7 +124,7 @@ def write_overlay(
         pipeline = SilhouettePipeline(bag.calibration(), (camera.width, camera.height))
         for image in bag.images():
             if image.stamp_ns >= result.start_ns:
-                small = pipeline.prepare(image.grey)
+                small = pipeline.prepare(image.as_sent)
                 estimate = estimates.get(image.stamp_ns, nothing)
                 write(draw_overlay(small, result.body, camera, estimate, _VIDEO_SCALE))
 

@@ -1,99 +1,204 @@
-"""Draw instructions that can be read from two metres away: an outline and large text."""
+"""Draw instructions that are read from two metres away: an outline, few words, a big number."""
 
 from __future__ import annotations
 
 import textwrap
+from typing import NamedTuple
 
 import cv2
+import numpy as np
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.overlay import (
-    TEXT_BGR,
-    ImageArray,
-    draw_outline,
-    enlarged,
-)
+from cardbox_tracker.drawing.overlay import TEXT_BGR, ImageArray, draw_outline, enlarged
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import in_front
 
-WANTED_BGR = (0, 220, 255)
+Bgr = tuple[int, int, int]
 
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
-# Fractions of the image: readable from two metres away, without covering the head.
-_LINE_HEIGHT = 0.075
-_NUMBER_HEIGHT = 0.22
-_WIDTH = 0.95
+FIT_BGR: dict[str, Bgr] = {"far": (60, 60, 255), "nearly": (0, 190, 255), "fits": (70, 220, 70)}
+"""Colour of the outline, red, amber or green, by how well the person fits into it."""
+MOOD_BGR: dict[str, Bgr] = {"ask": (50, 40, 30), "good": (50, 120, 30), "bad": (30, 60, 170)}
+"""Ground of the words, by whether they ask for something, praise or refuse."""
+
+_FONT = cv2.FONT_HERSHEY_DUPLEX
+# Fractions of the image's height, and of its width.
+_BAND, _LINE_HEIGHT, _NUMBER_HEIGHT = 0.30, 0.095, 0.24
+_WIDTH = 0.94
 _LINES = 2
+# As fractions of the image's width.
+_OUTLINE, _ARROW = 1 / 110, 1 / 45
+_NOSE_M, _NOSE_HALF_M = 0.08, 0.045
+# Somebody whose face points more to the side than this, of 1, is drawn with nose and arrow.
+_SIDEWAYS = 0.5
+
+
+class Asked(NamedTuple):
+    """The posture that a person is to take.
+
+    Attributes:
+        body: of about the person's size, where they stand.
+        camera: working camera, pitched as the body model says.
+        posture: (12,), rad and metres.
+        fit: how well they are in it: ``far``, ``nearly`` or ``fits``.
+    """
+
+    body: BodyModel
+    camera: Camera
+    posture: FloatArray
+    fit: str = "far"
 
 
 def draw_guidance(
     image: ImageArray,
-    body: BodyModel,
-    camera: Camera,
-    posture: FloatArray,
     words: str,
+    mood: str = "ask",
     number: int | None = None,
+    asked: Asked | None = None,
     scale: int = 1,
+    mirror: bool = False,
 ) -> ImageArray:
-    """Return a colour image with an outline to stand in, what to do, and a big number.
+    """Return a colour image of what a person is to do, with the words in a band above it.
 
     Args:
         image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        body: a body of about the person's size, at their distance.
-        camera: working camera.
-        posture: the wanted posture (12,).
-        words: written along the top, in two lines.
+        words: a few; they are written in two lines at most.
+        mood: colour of the band: ``ask``, ``good`` or ``bad``.
         number: seconds left, beside the head; None for none.
+        asked: outline to stand in, with nose and arrow if it looks aside; None for none.
         scale: enlargement of the result.
+        mirror: swap left and right of the image, not of words and number, as in a mirror.
 
     Returns:
-        (scale H, scale W, 3) bgr.
+        (1.3 scale H, scale W, 3) bgr.
     """
     canvas = enlarged(image, scale)
-    view = camera.scaled(*canvas.shape[1::-1])
-    patches = cardbox_patches(body, posture)
-    width = max(2, round(canvas.shape[1] / 160))
-    # A dark rim keeps the line visible on a white silhouette.
-    draw_outline(canvas, view, patches, (0, 0, 0), width + 2)
-    draw_outline(canvas, view, patches, WANTED_BGR, width)
-    end = _draw_words(canvas, words)
+    if asked is not None:
+        _draw_asked(canvas, asked)
+    if mirror:
+        canvas = np.ascontiguousarray(canvas[:, ::-1])
     if number is not None:
-        _draw_number(canvas, str(number), end)
-    return canvas
+        _draw_number(canvas, str(number))
+    if asked is not None and asked.fit == "fits":
+        _draw_tick(canvas)
+    return np.vstack([_band(words, mood, canvas.shape[1], canvas.shape[0]), canvas])
 
 
-def _draw_words(canvas: ImageArray, words: str) -> int:
-    """Write along the top, on a darkened ground; return the row where it ends."""
-    lines = textwrap.wrap(words, max(len(words) // _LINES + 8, 12))
-    if not lines:
-        return 0
+def _draw_asked(canvas: ImageArray, asked: Asked) -> None:
+    view = asked.camera.scaled(*canvas.shape[1::-1])
+    colour = FIT_BGR[asked.fit]
+    width = max(2, round(canvas.shape[1] * _OUTLINE))
+    patches = cardbox_patches(asked.body, asked.posture)
+    # A dark rim keeps the line visible on a white silhouette.
+    draw_outline(canvas, view, patches, (0, 0, 0), width + 4)
+    draw_outline(canvas, view, patches, colour, width)
+    frames = forward_kinematics(asked.body, asked.posture)
+    forward = frames.torso_rotation[:, 0]
+    if abs(float(forward[1])) > _SIDEWAYS:
+        depth_m = body_parts(asked.body.sizes).head.depth_m
+        _draw_nose(canvas, view, frames.head, forward, depth_m, colour)
+        _draw_turn(canvas, view, frames.hip, 1 if forward[1] > 0 else -1)
+
+
+def _draw_nose(
+    canvas: ImageArray,
+    view: Camera,
+    head_m: FloatArray,
+    forward: FloatArray,
+    depth_m: float,
+    colour: Bgr,
+) -> None:
+    """Draw the nose of somebody who looks in the direction ``forward``."""
+    face, up = head_m + 0.5 * depth_m * forward, np.array([0.0, 0.0, _NOSE_HALF_M])
+    points = view.reference_to_optical(np.array([face + up, face + _NOSE_M * forward, face - up]))
+    if not in_front(points).all():
+        return
+    corners = np.round(view.project(points)).astype(np.int32)
+    width = max(2, round(canvas.shape[1] * _OUTLINE))
+    cv2.fillConvexPoly(canvas, corners, colour, cv2.LINE_AA)
+    cv2.polylines(canvas, [corners], True, (0, 0, 0), max(1, width // 2), cv2.LINE_AA)
+
+
+def _draw_turn(canvas: ImageArray, view: Camera, hip_m: FloatArray, side: int) -> None:
+    """Draw an arrow around the body, from the front to the right (``side`` 1) or the left (-1)."""
     height, width = canvas.shape[:2]
-    size = min(_size_of_width(line, width) for line in lines)
-    size = min(size, _size_of_height(_LINE_HEIGHT * height))
-    step = round(_LINE_HEIGHT * height * 1.3)
-    end = min(int((len(lines) + 0.3) * step), int(height))
-    canvas[:end] //= 4
-    for number, line in enumerate(lines, 1):
-        _put(canvas, line, size, number * step)
-    return end
+    hip = view.reference_to_optical(hip_m)
+    if not in_front(hip[None]).all():
+        return
+    column = float(np.clip(view.project(hip)[0], 0.25 * width, 0.75 * width))
+    row, wide, high = 0.74 * height, 0.2 * width, 0.1 * height
+    # From the viewer's side, at the bottom of the ellipse, to where the face will point.
+    turned = np.radians(np.linspace(115.0, 8.0, 24))
+    points = np.stack([column + side * wide * np.cos(turned), row + high * np.sin(turned)], axis=1)
+    tip = points[-1] + (0.0, -0.16 * height)
+    line = np.round(points).astype(np.int32)
+    base = np.array([(0.075 * width, 0.0), (-0.075 * width, 0.0)])
+    head = np.round(np.vstack([tip, points[-1] + base])).astype(np.int32)
+    thick = max(2, round(width * _ARROW))
+    for colour, grow in (((0, 0, 0), 6), (TEXT_BGR, 0)):
+        cv2.polylines(canvas, [line], False, colour, thick + grow, cv2.LINE_AA)
+        cv2.fillConvexPoly(canvas, head, colour, cv2.LINE_AA)
+        if grow:
+            cv2.polylines(canvas, [head], True, colour, grow, cv2.LINE_AA)
 
 
-def _draw_number(canvas: ImageArray, text: str, top: int) -> None:
-    """Write at the left edge, below ``top``: beside the head of a person in the middle."""
+def _draw_number(canvas: ImageArray, text: str) -> None:
+    """Write in the upper left corner: beside the head of a person in the middle."""
     height, width = canvas.shape[:2]
     size = _size_of_height(_NUMBER_HEIGHT * height)
     thickness = _thickness(size)
-    corner = (round(0.06 * width), top + round((_NUMBER_HEIGHT + 0.03) * height))
-    cv2.putText(canvas, text, corner, _FONT, size, (0, 0, 0), thickness + 6, cv2.LINE_AA)
-    cv2.putText(canvas, text, corner, _FONT, size, WANTED_BGR, thickness, cv2.LINE_AA)
+    corner = (round(0.04 * width), round((_NUMBER_HEIGHT + 0.05) * height))
+    cv2.putText(canvas, text, corner, _FONT, size, (0, 0, 0), 2 * thickness, cv2.LINE_AA)
+    cv2.putText(canvas, text, corner, _FONT, size, TEXT_BGR, thickness, cv2.LINE_AA)
 
 
-def _put(canvas: ImageArray, text: str, size: float, bottom: int) -> None:
+def _draw_tick(canvas: ImageArray) -> None:
+    """Tick in the upper right corner, for those who cannot tell red from green."""
+    height, width = canvas.shape[:2]
+    tall = _NUMBER_HEIGHT * height
+    corner = np.array([0.96 * width - 1.1 * tall, 0.05 * height])
+    parts = corner + tall * np.array([(0.0, 0.55), (0.38, 0.92), (1.1, 0.1)])
+    tick = np.round(parts).astype(np.int32)
+    thick = max(2, round(0.14 * tall))
+    for colour, grow in (((0, 0, 0), 6), (FIT_BGR["fits"], 0)):
+        cv2.polylines(canvas, [tick], False, colour, thick + grow, cv2.LINE_AA)
+
+
+def _band(words: str, mood: str, width: int, height: int) -> ImageArray:
+    """Return the words on their ground, ``width`` px wide, for an image of ``height`` px."""
+    tall = round(_BAND * height)
+    band = np.full((tall, width, 3), MOOD_BGR[mood], np.uint8)
+    lines = _two_lines(words)
+    if not lines:
+        return band
+    size = min(_size_of_width(line, width) for line in lines)
+    size = min(size, _size_of_height(_LINE_HEIGHT * height))
+    for number, line in enumerate(lines):
+        middle = tall * (2 * number + 1) / (2 * len(lines))
+        _put(band, line, size, middle)
+    return band
+
+
+def _two_lines(words: str) -> list[str]:
+    """Return the words in two lines as equally long as they can be, a few words in one."""
+    if len(words) <= 16:
+        return [words] if words else []
+    for width in range(len(words) // _LINES, len(words) + 1):
+        lines = textwrap.wrap(words, width)
+        if len(lines) <= _LINES:
+            return lines
+    return [words]
+
+
+def _put(canvas: ImageArray, text: str, size: float, middle: float) -> None:
     thickness = _thickness(size)
-    (width, _), _ = cv2.getTextSize(text, _FONT, size, thickness)
+    (width, height), _ = cv2.getTextSize(text, _FONT, size, thickness)
     left = (canvas.shape[1] - width) // 2
-    cv2.putText(canvas, text, (left, bottom), _FONT, size, TEXT_BGR, thickness, cv2.LINE_AA)
+    corner = (left, round(middle + height / 2))
+    cv2.putText(canvas, text, corner, _FONT, size, TEXT_BGR, thickness, cv2.LINE_AA)
 
 
 def _size_of_height(height_px: float) -> float:

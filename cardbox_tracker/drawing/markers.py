@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.drawing.model_frames import model_frames
 from cardbox_tracker.vision.camera import Camera
 
 Rgba = tuple[float, float, float, float]
@@ -46,16 +46,19 @@ class MarkerShape(NamedTuple):
 
 
 def marker_shapes(
-    body: BodyModel, camera: Camera, posture: FloatArray
+    body: BodyModel, camera: Camera, posture: FloatArray, keypoints_m: FloatArray | None = None
 ) -> tuple[MarkerShape, MarkerShape]:
-    """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``."""
-    corners = camera.reference_to_optical(cardbox_patches(body, posture))
+    """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``.
+
+    The shoulders are those of ``keypoints_m`` (6, 3), metres in the optical frame, if given.
+    """
+    frames = model_frames(body, camera, posture, keypoints_m)
+    corners = camera.reference_to_optical(patches_at(body, frames))
     colors = [
         color
         for name in PATCH_NAMES
         for color in [_SIDES.get(name.split("_")[0], _TORSO_RGBA)] * len(_TRIANGLES)
     ]
-    frames = forward_kinematics(body, posture)
     bones = [(frames.hip, frames.neck), (frames.neck, frames.head)]
     for arm in (frames.left, frames.right):
         bones += [(frames.neck, arm.shoulder), (arm.shoulder, arm.elbow), (arm.elbow, arm.hand)]

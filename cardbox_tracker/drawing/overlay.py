@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
+from cardbox_tracker.body.kinematics import BodyFrames
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.drawing.model_frames import model_frames
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, in_front
 
@@ -49,6 +50,10 @@ class Drawable(Protocol):
         """d1..d12, or None."""
 
     @property
+    def keypoints_m(self) -> FloatArray | None:
+        """Keypoints (6, 3), metres in the optical frame, or None."""
+
+    @property
     def cost_px(self) -> int | None:
         """Equation (2), or None."""
 
@@ -81,7 +86,8 @@ def draw_overlay(
     if estimate.posture is not None:
         view = camera.scaled(*canvas.shape[1::-1])
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
-        draw_model(canvas, estimate.placed(body), view, estimate.posture, outline)
+        there = estimate.placed(body)
+        draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoints_m)
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
@@ -100,23 +106,25 @@ def draw_model(
     camera: Camera,
     posture: FloatArray,
     outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
+    keypoints_m: FloatArray | None = None,
 ) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
-    Tinted patches by side, the outline of them all in ``outline_bgr``, and the skeleton.
+    Tinted patches by side, the outline of them all in ``outline_bgr``, and the skeleton; with the
+    shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if there are any.
     """
+    frames = model_frames(body, camera, posture, keypoints_m)
+    patches = patches_at(body, frames)
     tint = canvas.copy()
     # The torso first, so that an arm in front of it stays visible.
-    parts = sorted(
-        _polygons(camera, cardbox_patches(body, posture)), key=lambda part: part[0] in _PART_BGR
-    )
+    parts = sorted(_polygons(camera, patches), key=lambda part: part[0] in _PART_BGR)
     for name, polygon in parts:
         colour = _PART_BGR.get(name, _TORSO_BGR)
         cv2.fillConvexPoly(tint, _subpixels(polygon), colour, cv2.LINE_AA, _SHIFT)
     cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
     thickness = max(1, round(camera.width / 400))
-    draw_outline(canvas, camera, cardbox_patches(body, posture), outline_bgr, thickness)
-    _draw_skeleton(canvas, body, camera, posture, thickness)
+    draw_outline(canvas, camera, patches, outline_bgr, thickness)
+    _draw_skeleton(canvas, frames, camera, thickness)
 
 
 def draw_outline(
@@ -135,10 +143,7 @@ def draw_outline(
     cv2.polylines(canvas, outlines, True, colour, width, cv2.LINE_AA, OUTLINE_SHIFT)
 
 
-def _draw_skeleton(
-    canvas: ImageArray, body: BodyModel, camera: Camera, posture: FloatArray, thickness: int
-) -> None:
-    frames = forward_kinematics(body, posture)
+def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thickness: int) -> None:
     chains = [
         [frames.hip, frames.neck, frames.head],
         [frames.neck, *frames.left[:3]],

@@ -13,8 +13,18 @@ from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
-from cardbox_tracker.outputs import JointValues, Markers, OutputStream, Points, Text, Value
+from cardbox_tracker.outputs import (
+    JointValues,
+    Markers,
+    OutputStream,
+    Points,
+    Text,
+    Value,
+    joint_values,
+    positions_of,
+)
 from cardbox_tracker.recordings.bag_markers import write_markers
+from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import Frame
 
@@ -41,6 +51,7 @@ class ResultBag:
         With ``overwrite`` a recording of that name is replaced.
         """
         self._writer = None if path is None else result_writer(path, overwrite)
+        self._transforms = None if self._writer is None else BagTransforms(self._writer)
         self._frame_id = frame_id
         self._described: BodyModel | None = None
         self._outputs = OutputStream()
@@ -63,23 +74,35 @@ class ResultBag:
 
     def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
         """Write the outputs of one image."""
-        if self._writer is None:
+        if self._writer is None or self._transforms is None:
             return
-        self._write(self._writer, frame, estimate, tracker)
+        self._write(self._writer, self._transforms, frame, estimate, tracker)
 
-    def _write(self, bag: BagWriter, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def _write(
+        self,
+        bag: BagWriter,
+        transforms: BagTransforms,
+        frame: Frame,
+        estimate: Estimate,
+        tracker: Tracker,
+    ) -> None:
         stamp, optical = frame.stamp_ns, self._frame_id
         body, camera = tracker.body, tracker.camera
         if body is not self._described:
             bag.write_string("/body_model", stamp, dumps_body_model(body))
-            bag.write_string("/robot_description", stamp, urdf_from_body(body, optical or None))
+            urdf = urdf_from_body(body, optical or None)
+            bag.write_string("/robot_description", stamp, urdf)
+            transforms.describe(urdf)
         self._described = body
         bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
-        overlay = draw_overlay(frame.brightness, body, camera, estimate)
+        overlay = draw_overlay(frame.picture, body, camera, estimate)
         bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(estimate, tracker):
             _write_value(bag, f"/{output.topic}", stamp, optical, value)
+        joints = joint_values(estimate)
+        if joints is not None:
+            transforms.write(stamp, positions_of(joints))
 
 
 def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value: Value) -> None:

@@ -70,6 +70,11 @@ class Frame(NamedTuple):
     silhouette: NDArray[np.uint8]
     image: NDArray[np.uint8] | None = None
 
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """What to show a person: the image, or its brightness if that is all there is."""
+        return self.brightness if self.image is None else self.image
+
 
 class SilhouetteSource:
     """The images of one bag at the working resolution, after learning its background.

@@ -103,7 +103,7 @@ def track_recording(
             if draw is not None:
                 draw(
                     draw_overlay(
-                        frame.brightness, tracker.body, tracker.camera, estimate, _VIDEO_SCALE
+                        frame.picture, tracker.body, tracker.camera, estimate, _VIDEO_SCALE
                     )
                 )
             for observe in observers:

@@ -13,11 +13,16 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.serialization import serialize_message
 
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.demo.client import TOPICS, Client
+from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.outputs import JOINT_STATE_NAMES, OUTPUTS
 from cardbox_tracker.recordings.result_bag import result_writer
 
-NAMES = ("body_model", "robot_description", "silhouette", "silhouette/camera_info", "overlay")
+NAMES = (
+    *("body_model", "robot_description", "silhouette", "silhouette/camera_info", "overlay"),
+    "tf",
+)
 
 
 @pytest.fixture
@@ -34,6 +39,8 @@ def recorded(
                 if topic.startswith("joint_states"):
                     message.name = list(JOINT_STATE_NAMES)
                     message.position = [0.0] * len(JOINT_STATE_NAMES)
+                if topic == "robot_description":
+                    message.data = urdf_from_body(BodyModel())
                 client.recorder(topic, kind)(serialize_message(message))
         finally:
             client.close()

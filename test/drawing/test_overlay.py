@@ -10,6 +10,7 @@ import pytest
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.drawing.overlay import (
     JOINT_BGR,
     OUTLINE_BGR,
@@ -19,13 +20,15 @@ from cardbox_tracker.drawing.overlay import (
     draw_overlay,
     draw_text,
 )
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.tracker import Estimate
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel()
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)
 FRONT = reference_posture("front")
-FOUND = Estimate("tracking", FRONT, np.zeros(12), np.zeros((6, 3)), 1234, 0.87)
+FOUND = Estimate("tracking", FRONT, np.zeros(12), None, 1234, 0.87)
 GREY = np.full((240, 320), 90, np.uint8)
 
 
@@ -63,6 +66,24 @@ def test_the_person_is_drawn_where_the_estimate_is() -> None:
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
     assert np.any(overlay != draw_overlay(GREY, BODY, CAMERA, FOUND))
+
+
+def test_raised_arms_are_drawn_where_the_filter_has_them() -> None:
+    """It lifts the shoulders of raised arms; the posture alone does not."""
+    config = default_preset().whole_body.cost
+    state = np.zeros(14)
+    state[[4, 8]] = 2.0
+    lifted = WholeBodyCost(BODY, CAMERA, config).keypoints(state)
+    rigid = CAMERA.reference_to_optical(keypoints_m(BODY, state[:12]))
+    assert (rigid - lifted)[[0, 3], 1].min() > 0.03, "upwards, which is less of the optical y"
+    raised = replace(FOUND, posture=state[:12], keypoints_m=lifted)
+    overlay = draw_overlay(GREY, BODY, CAMERA, raised, 3)
+    view = CAMERA.scaled(960, 720)
+    for u, v in view.project(lifted).round().astype(int):
+        assert near(overlay, JOINT_BGR)[v, u]
+    skeleton = marker_shapes(BODY, CAMERA, state[:12], lifted)[1].points_m
+    for point in lifted:
+        assert np.linalg.norm(skeleton - point, axis=1).min() < 1e-9
 
 
 def test_what_may_be_wrong_is_amber() -> None:

@@ -15,6 +15,7 @@ import pytest
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.description.link_transforms import LinkTransforms
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
@@ -288,6 +289,7 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
             "robot_description": "std_msgs/msg/String",
             "joint_states": "sensor_msgs/msg/JointState",
             "keypoints": "geometry_msgs/msg/PoseArray",
+            "tf": "tf2_msgs/msg/TFMessage",
         }.items() <= {name.strip("/"): kind for name, kind in bag.topics.items()}.items()
         messages: dict[str, list[Any]] = {}
         for message in bag.messages():
@@ -306,6 +308,16 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
         np.testing.assert_allclose(state.position, expected, atol=5.1e-7)
         assert points.header.frame_id == source.frame_id
         assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x"]), abs=1e-6)
+    links = LinkTransforms(messages["robot_description"][0].data)
+    assert len(messages["tf"]) == len(rows)
+    for message, state in zip(messages["tf"], messages["joint_states"], strict=True):
+        expected = links.at(dict(zip(state.name, state.position, strict=True)))
+        for sent, link in zip(message.transforms, expected, strict=True):
+            assert sent.header.stamp == state.header.stamp
+            assert (sent.header.frame_id, sent.child_frame_id) == (link.parent, link.child)
+            turn, place = sent.transform.rotation, sent.transform.translation
+            assert (turn.x, turn.y, turn.z, turn.w) == link.rotation
+            assert (place.x, place.y, place.z) == link.translation_m
 
 
 def test_images_without_a_person_have_no_results(

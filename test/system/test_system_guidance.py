@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
-from cardbox_tracker.drawing.guidance import WANTED_BGR  # noqa: E402
+from cardbox_tracker.drawing.guidance import FIT_BGR  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
 from cardbox_tracker.ros.messages.measurement import mean_iou_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
@@ -32,6 +32,9 @@ class Person:
         lines = qos.copy_of(qos.LATCHED)
         lines.depth = 1000
         self.statuses = graph.collect(String, "initializer/status", lines)
+        sentences = qos.copy_of(qos.RESULT)
+        sentences.depth = 1000
+        self.said = graph.collect(String, "initializer/say", sentences)
         self.guiding = graph.collect(Bool, "initializer/guiding", lines)
         self.results = graph.collect(DiagnosticStatus, "initializer/result", lines)
         self.images = graph.node.create_publisher(Image, "silhouette", qos.SILHOUETTE)
@@ -113,8 +116,12 @@ def test_one_call_guides_captures_and_measures(person: Person) -> None:
     assert any(line.startswith("measuring") for line in lines)
     assert overlays, "nothing was drawn for the person"
     guides = [np.array(o.data).reshape(o.height, o.width, 3) for o in overlays if o.width == 640]
-    # The outline to stand in has a colour of its own.
-    assert any((guide == WANTED_BGR).all(axis=2).sum() > 500 for guide in guides)
+    # The outline to stand in is green once the person stands in it.
+    assert any((guide == FIT_BGR["fits"]).all(axis=2).sum() > 500 for guide in guides)
+    spoken = [message.data for message in person.said]
+    for words in ("Now turn left, arms as before", "Hold still", "Good."):
+        assert words in spoken, spoken
+    graph.wait(lambda: person.said[-1].data == "Thank you. Done.", "the last words")
 
 
 def test_no_guide_is_drawn_once_it_is_over(person: Person) -> None:
@@ -123,3 +130,18 @@ def test_no_guide_is_drawn_once_it_is_over(person: Person) -> None:
     graph.wait(lambda: not person.statuses[-1].data.startswith("measuring"), "the last line")
     graph.spin(1.0)
     assert not overlays
+
+
+def test_an_initialization_can_be_cancelled(person: Person) -> None:
+    graph = person.graph
+    client = graph.node.create_client(Trigger, "initializer/initialize")
+    graph.wait(client.service_is_ready, "initialize")
+    answer = client.call_async(Trigger.Request())
+    graph.wait(lambda: person.statuses[-1].data.startswith("front: face"), "the count-down")
+    assert graph.call("initializer/cancel").success
+    graph.wait(answer.done, "the answer")
+    assert not answer.result().success and "was cancelled" in answer.result().message
+    graph.wait(lambda: person.said[-1].data == "Stopped.", "the last words")
+    graph.wait(lambda: not person.guiding[-1].data, "the end of the guidance")
+    again = graph.call("initializer/cancel")
+    assert not again.success and "no initialization is running" in again.message

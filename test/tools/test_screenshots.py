@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.drawing.guidance import WANTED_BGR
+from cardbox_tracker.drawing.guidance import FIT_BGR
 from cardbox_tracker.drawing.overlay import OUTLINE_BGR
 from cardbox_tracker.errors import CardboxError
 from tools.screenshots import write_screenshots
@@ -36,7 +36,8 @@ def test_every_image_is_made_and_shows_what_it_is_about(images: dict[str, Path])
     assert sorted(images) == NAMES
     shown = {name: cv2.imread(str(path)) for name, path in images.items()}
     assert near(shown["tracking"], OUTLINE_BGR) > 1000
-    assert near(shown["guidance"], WANTED_BGR) > 1000
+    for colour in FIT_BGR.values():
+        assert near(shown["guidance"], colour) > 1000
     white = shown["steps"][:, shown["steps"].shape[1] // 3 : 2 * shown["steps"].shape[1] // 3]
     assert near(white, (255, 255, 255)) > 5000
 

@@ -30,7 +30,8 @@ Silhouette = NDArray[np.uint8]
 # at most with another one.
 LEAST_IOU, CLEARLY = 0.60, 0.10
 
-_STATURES_M = (1.3, 1.45, 1.6, 1.75, 1.9)
+STATURES_M = (1.3, 1.45, 1.6, 1.75, 1.9)
+"""Of the people whose outlines are compared."""
 
 
 def outline_ious(
@@ -46,7 +47,7 @@ def outline_ious(
     view = camera.with_pitch(config.camera_pitch_rad)
     seen = filled(silhouette) > 0
     ious = dict.fromkeys(REFERENCE_NAMES, 0.0)
-    for stature_m in _STATURES_M:
+    for stature_m in STATURES_M:
         body = BodyModel.of(
             sizes_of_stature(stature_m),
             distance_m=config.distance_m,
@@ -93,7 +94,8 @@ def check_asked(
         raise InitializationError(
             f"reference '{name}': it looks like '{likest}' (outline's IoU "
             f"{rounded_down(ious[name])} with '{name}', {rounded_down(ious[likest])} with "
-            f"'{likest}'); {POSTURE_TEXT[name]}"
+            f"'{likest}'); {POSTURE_TEXT[name]}",
+            "Not this posture",
         )
     if ious[name] < LEAST_IOU:
         return (

@@ -11,12 +11,20 @@ from typing import NamedTuple
 
 from cardbox_tracker.errors import InitializationError
 
+ASK, GOOD, BAD = "ask", "good", "bad"
+"""Whether a step asks for something, or says that it went well or did not."""
+
+HOLD_STILL = "Hold still"
+FINISHED, FAILED, CANCELLED = "Thank you. Done.", "That did not work. Sorry.", "Stopped."
+
 _TURN = {
     "left": "turn a quarter to your left",
     "right": "turn a quarter to your right",
 }
 _HOLD_S = 1.0
 _READ_S = 2.0
+# From here on the count is said aloud: who stands sideways does not see it.
+_SAID_COUNT = 3
 
 
 def instruction(name: str, side_turn: str) -> str:
@@ -28,29 +36,51 @@ def instruction(name: str, side_turn: str) -> str:
     }[name]
 
 
+def short_words(name: str, side_turn: str) -> str:
+    """Return the same in words that are read at two metres and heard in passing."""
+    return {
+        "front": "Face the camera, arms a little out",
+        "side": f"Now turn {side_turn}, arms as before",
+        "arms": "Face the camera, arms out sideways",
+    }[name]
+
+
 class Step(NamedTuple):
     """A moment of the guidance.
 
     Attributes:
         name: the reference, or ``measuring``.
-        words: what to do, or what happened.
+        words: what to do, or what happened, for the person: a few words.
         left_s: seconds of the count-down that are left; None while nothing is counted.
+        detail: the same for whoever runs the program; the words if there is no more to say.
+        mood: ``ask``, ``good`` or ``bad``.
     """
 
     name: str
     words: str
     left_s: int | None = None
+    detail: str = ""
+    mood: str = ASK
 
     @property
     def text(self) -> str:
-        """The step as a line for a person."""
+        """The step as a line for whoever runs the program."""
         count = "" if self.left_s is None else f": {self.left_s}"
-        return f"{self.name}: {self.words}{count}"
+        return f"{self.name}: {self.detail or self.words}{count}"
+
+
+def said(before: Step | None, step: Step) -> str:
+    """Return what is said aloud of ``step`` after the step ``before``; may be empty."""
+    if before is None or before.words != step.words or before.name != step.name:
+        return step.words
+    if step.left_s is not None and step.left_s != before.left_s and step.left_s <= _SAID_COUNT:
+        return str(step.left_s)
+    return ""
 
 
 def measuring(fraction: float) -> Step:
     """Return the step of the measurement after the last capture, done to ``fraction``."""
-    return Step("measuring", f"{100 * fraction:.0f} %")
+    return Step("measuring", "Good. Measuring, you may relax", detail=f"{100 * fraction:.0f} %")
 
 
 class Guidance:
@@ -78,19 +108,21 @@ class Guidance:
             InitializationError: a posture could not be captured in ``attempts`` tries.
         """
         for name in missing:
-            todo = instruction(name, side_turn)
+            words, detail = short_words(name, side_turn), instruction(name, side_turn)
             for attempt in range(1, attempts + 1):
                 for left in range(count_down_s, 0, -1):
-                    self._show(Step(name, todo, left))
+                    self._show(Step(name, words, left, detail))
                     self._wait(1.0)
-                self._show(Step(name, "hold still"))
+                self._show(Step(name, HOLD_STILL, detail="hold still"))
                 self._wait(_HOLD_S)
                 try:
-                    self._show(Step(name, self._capture(name)))
+                    done = self._capture(name)
+                    self._show(Step(name, "Good.", detail=done, mood=GOOD))
                     self._wait(_HOLD_S)
                     break
                 except InitializationError as error:
-                    self._show(Step(name, f"not captured: {error}"))
+                    failed = f"not captured: {error}"
+                    self._show(Step(name, error.words, detail=failed, mood=BAD))
                     if attempt == attempts:
                         raise
                     self._wait(_READ_S)

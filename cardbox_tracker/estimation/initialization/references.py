@@ -61,13 +61,15 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         raise InitializationError(
             f"reference '{name}': nobody is in the image ({rounded_down(100 * share, 1)} % "
             f"foreground, expected {100 * MIN_PERSON_FRACTION:.0f} % or more); step in front of "
-            f"the camera and {POSTURE_TEXT[name]}"
+            f"the camera and {POSTURE_TEXT[name]}",
+            "Step into the picture",
         )
     if share > MAX_PERSON_FRACTION:
         raise InitializationError(
             f"reference '{name}': {rounded_up(100 * share, 0)} % of the image are foreground, more "
             "than a person can be; the background was learned in another light or with somebody "
-            "in it: leave the image and learn it again (background/learn)"
+            "in it: leave the image and learn it again (background/learn)",
+            "Step out of the picture",
         )
     for border, pixels in (
         ("left", silhouette[:, 0]),
@@ -77,7 +79,8 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         if np.any(pixels):
             raise InitializationError(
                 f"reference '{name}': the person is cut off at the {border} border of the "
-                f"image; step back or to the middle, and {POSTURE_TEXT[name]}"
+                f"image; step back or to the middle, and {POSTURE_TEXT[name]}",
+                "Step back, please",
             )
 
 

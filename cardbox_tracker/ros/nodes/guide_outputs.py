@@ -2,77 +2,80 @@
 
 from __future__ import annotations
 
-import math
+import sys
 
 from sensor_msgs.msg import Image
 from std_msgs.msg import Bool, String
 
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
-from cardbox_tracker.drawing.guidance import draw_guidance
-from cardbox_tracker.drawing.overlay import draw_message
-from cardbox_tracker.estimation.initialization.guidance import Step
-from cardbox_tracker.estimation.initialization.standing import at_height_of
+from cardbox_tracker.drawing.guide import Guide
+from cardbox_tracker.estimation.initialization.guidance import ASK, Step, said
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.camera import Camera
 
-_SCALE = 2
-
 
 class GuideOutputs:
-    """Tells a person what to do next: in words on ``~/status``, drawn on ``overlay``.
+    """Tells a person what to do next: drawn on ``overlay``, in words to say aloud on ``~/say``.
 
-    ``~/guiding`` is true meanwhile: the tracker then leaves ``overlay`` to the guidance.
+    Whoever runs the program gets more of it on ``~/status``. ``~/guiding`` is true meanwhile: the
+    tracker then leaves ``overlay`` to the guidance.
     """
 
     def __init__(self, node: CardboxNode) -> None:
         """Advertise the topics for ``node``."""
         self._step: Step | None = None
+        self._guide: Guide | None = None
         self._status = node.advertise(String, "~/status", qos.LATCHED)
+        self._say = node.advertise(String, "~/say", qos.RESULT)
         self._guiding = node.advertise(Bool, "~/guiding", qos.LATCHED)
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._guiding.publish(Bool(data=False))
 
-    def show(self, step: Step) -> None:
-        """Show a step of the guidance."""
+    def show(self, step: Step, bell: bool = False) -> None:
+        """Show a step of the guidance; with ``bell``, ring the terminal's where it is a result."""
         if self._step is None:
             self._guiding.publish(Bool(data=True))
+        words = said(self._step, step)
+        if words:
+            self._say.publish(String(data=words))
+            if bell and step.mood != ASK:
+                # With the end of a line, at which 'ros2 launch' hands on what a node writes.
+                print("\a", file=sys.stderr, flush=True)
         self._step = step
         self._status.publish(String(data=step.text))
 
-    def end(self, text: str) -> None:
-        """End the guidance with a last line."""
+    def end(self, text: str, words: str) -> None:
+        """End the guidance with a last line, and ``words`` to say."""
         if self._step is not None:
+            self._say.publish(String(data=words))
             self._guiding.publish(Bool(data=False))
         self._step = None
         self._status.publish(String(data=text))
 
-    def draw(self, message: Image, camera: Camera | None, settings: InitializerParameters) -> None:
-        """Draw the present step over a silhouette, if there is one and somebody to see it."""
+    def draw(
+        self,
+        message: Image,
+        seen: Image | None,
+        camera: Camera | None,
+        settings: InitializerParameters,
+    ) -> None:
+        """Draw the present step over an image, if there is one and somebody to see it.
+
+        ``message`` is the silhouette, and ``seen`` what it is cut out of, if that came in time.
+        """
         step = self._step
         if step is None or camera is None or not self._overlay.get_subscription_count():
             return
         silhouette = conversions.silhouette_of(message)
         if silhouette.shape != (camera.height, camera.width):
             return
-        body = BodyModel.of(
-            distance_m=settings.person_distance_m,
-            camera_pitch_rad=math.radians(settings.camera_pitch_deg),
-            side_turn=settings.side_turn,
-        )
-        if step.name in REFERENCE_NAMES:
-            image = draw_guidance(
-                silhouette,
-                at_height_of(silhouette, body, camera),
-                camera.with_pitch(body.camera_pose.pitch_rad),
-                reference_posture(step.name, settings.side_turn),
-                step.words,
-                step.left_s,
-                _SCALE,
-            )
-        else:
-            image = draw_message(silhouette, step.text)
-        self._overlay.publish(conversions.image_message(message.header, image, "bgr8"))
+        config = settings.config()
+        if self._guide is None or (self._guide.camera, self._guide.config) != (camera, config):
+            self._guide = Guide(camera, config)
+        # Of another size it is another's: then the silhouette has to do.
+        fits = seen is not None and (seen.height, seen.width) == silhouette.shape
+        image = conversions.image_of(seen) if fits else None
+        picture = self._guide.draw(step, silhouette, image, settings.mirror)
+        self._overlay.publish(conversions.image_message(message.header, picture, "bgr8"))

@@ -18,14 +18,17 @@ from std_srvs.srv import Trigger
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
-from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
-from cardbox_tracker.estimation.initialization.config import InitializationResult, fit_text
-from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
+from cardbox_tracker.estimation.initialization.guidance import Guidance, Step, measuring
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
+from cardbox_tracker.ros.messages.measurement import (
+    answer_text,
+    measured_message,
+    refused_message,
+)
+from cardbox_tracker.ros.nodes.cancellation import Cancellation
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
@@ -49,8 +52,7 @@ class InitializerNode(CardboxNode):
         self._camera: Camera | None = None
         self._frame_id = ""
         self._body: BodyModel | None = None
-        self._busy = threading.Lock()
-        self._stop = threading.Event()
+        self._cancellation = Cancellation()
 
         self._model = self.advertise(String, "body_model", qos.LATCHED)
         self._description = self.advertise(String, "robot_description", qos.LATCHED)
@@ -64,6 +66,7 @@ class InitializerNode(CardboxNode):
         self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
+        self.offer("~/cancel", self._cancellation.cancel)
         # It answers when the measurement is done; a second call meanwhile is refused at once.
         self.create_service(
             Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
@@ -87,7 +90,8 @@ class InitializerNode(CardboxNode):
         if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
             return
         self._references.add(message)
-        self._guide.draw(message, self._camera, self.parameters.value)
+        seen = self._references.behind(message)
+        self._guide.draw(message, seen, self._camera, self.parameters.value)
         self.diagnostics.working(sent_ns)
         if message.header.frame_id != self._frame_id:
             self._frame_id = message.header.frame_id
@@ -100,7 +104,7 @@ class InitializerNode(CardboxNode):
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Measure in another thread, so that silhouettes and captures are still served."""
-        if not self._busy.acquire(blocking=False):
+        if not self._cancellation.begin():
             response.message = "an initialization is already running; wait for its answer"
             return response
         done: Future = Future()
@@ -114,10 +118,10 @@ class InitializerNode(CardboxNode):
             threading.Thread(target=work, name="initialize", daemon=True).start()
             response.success, response.message = await done
         finally:
-            self._busy.release()
+            words = self._cancellation.end(response.success)
         if not response.success:
             self._result.publish(refused_message(response.message))
-        self._guide.end(response.message)
+        self._guide.end(response.message, words)
         return response
 
     def _measure(self) -> str:
@@ -125,7 +129,7 @@ class InitializerNode(CardboxNode):
         references.check_running()
         before = dict(references.captured), dict(references.images)
         try:
-            Guidance(self._guide.show, self._capture, self._wait).run(
+            Guidance(self._show, self._capture, self._cancellation.wait).run(
                 references.missing, settings.side_turn, settings.count_down_s, settings.attempts
             )
             if (camera := self._camera) is None:
@@ -140,20 +144,19 @@ class InitializerNode(CardboxNode):
             # Those captured by service stay, to be replaced one by one.
             references.captured, references.images = before
             raise
-        answer = _answer(result)
+        answer = answer_text(result)
         self._result.publish(measured_message(result, answer))
         self._publish(result.body)
         answer += self._saved.save(result.body)
         references.captured, references.images = {}, {}
         return answer
 
-    def _wait(self, duration_s: float) -> None:
-        if self._stop.wait(duration_s):
-            raise InitializationError("the initializer was stopped")
+    def _show(self, step: Step) -> None:
+        self._guide.show(step, self.parameters.value.bell)
 
     def _progress(self, fraction: float) -> None:
-        self._wait(0.0)
-        self._guide.show(measuring(fraction))
+        self._cancellation.wait(0.0)
+        self._show(measuring(fraction))
 
     def _publish(self, body: BodyModel) -> None:
         self._body = body
@@ -170,20 +173,12 @@ class InitializerNode(CardboxNode):
         return {
             "captured": ", ".join(self._references.captured) or "none",
             "body model": "published" if self._body is not None else "none yet",
-            "initializing": str(self._busy.locked()),
+            "initializing": str(self._cancellation.is_running),
         }
 
     def close(self) -> None:
         """End a guidance that is still running."""
-        self._stop.set()
-
-
-def _answer(result: InitializationResult) -> str:
-    sizes = ", ".join(
-        f"{name} {100 * value:.1f}"
-        for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)
-    )
-    return f"measured; {fit_text(result)}; sizes in cm: {sizes}"
+        self._cancellation.stop()
 
 
 def main(args: list[str] | None = None) -> int:

@@ -126,6 +126,14 @@ class InitializerParameters(NodeParameters):
         limits=(1, 20),
         effect=_NEXT_GUIDANCE,
     )
+    mirror: bool = parameter(
+        True,
+        "the guidance shows the person as in a mirror; false: as the camera does",
+    )
+    bell: bool = parameter(
+        False,
+        "ring the terminal's bell when the guidance has captured a posture, or could not",
+    )
     model_file: str = parameter(
         "",
         "file to save the body model to; if it exists at the start, it is published; empty: none",

@@ -62,6 +62,12 @@ class ReferenceCapture:
         """Keep the image that a silhouette with the same stamp is cut out of."""
         self._recent_images.append(message)
 
+    def behind(self, message: Image) -> Image | None:
+        """Return the image that a silhouette is cut out of, if it is there already."""
+        stamp = stamp_ns(message.header.stamp)
+        images = reversed(self._recent_images)
+        return next((image for image in images if stamp_ns(image.header.stamp) == stamp), None)
+
     @property
     def missing(self) -> list[str]:
         """Names of the references still to be captured."""

@@ -135,7 +135,7 @@ class TrackerNode(CardboxNode):
             self._build("an image is older than the one before (a bag that loops?)")
         if self._tracker is None or self._body is None or self._camera is None:
             self._wait()
-            self._outputs.waiting(message, "no body model yet: call initializer/initialize")
+            self._outputs.waiting(message, seen, "no body model yet: call initializer/initialize")
             return
         silhouette = conversions.silhouette_of(message)
         height, width = silhouette.shape
@@ -149,7 +149,8 @@ class TrackerNode(CardboxNode):
         estimate = self._tracker.track(silhouette, image)
         if self._tracker.body is not before:
             self.get_logger().info(f"fitted to the person in the image:\n{self._tracker.body}")
-        self._outputs.publish(header, estimate, silhouette, self._tracker)
+        picture = silhouette if image is None else image
+        self._outputs.publish(header, estimate, picture, self._tracker)
         self._report.add(estimate)
         self.diagnostics.working(sent_ns)
 

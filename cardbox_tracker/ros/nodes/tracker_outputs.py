@@ -12,6 +12,7 @@ from cardbox_tracker.estimation.tracker import Estimate, Tracker
 from cardbox_tracker.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
+from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -21,7 +22,11 @@ class TrackerOutputs:
     """The tracker's topics; each message is made only while the topic has a subscriber."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Advertise the topics for ``node``, those of REP-155 if ``settings`` have its ID."""
+        """Advertise the topics for ``node``, those of REP-155 and TF if ``settings`` ask for them.
+
+        Raises:
+            CardboxError: they ask for TF, whose messages are not installed.
+        """
         topics = outputs(settings.torso_place)
         self._publishers = {
             output.topic: node.advertise(
@@ -32,6 +37,7 @@ class TrackerOutputs:
         self._stream = OutputStream(topics)
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._human = Rep155Outputs(node, settings) if settings.rep155_id else None
+        self._tf = TfOutputs(node, settings) if settings.publish_tf else None
         self._guided = False
         node.subscribe(Bool, "initializer/guiding", self._on_guiding, qos.LATCHED)
 
@@ -42,26 +48,33 @@ class TrackerOutputs:
         self,
         header: Header,
         estimate: Estimate,
-        silhouette: conversions.ImageArray,
+        picture: conversions.ImageArray,
         tracker: Tracker,
     ) -> None:
-        """Publish the outputs of an image; without a posture, no old one under its stamp."""
+        """Publish the outputs of an image; without a posture, no old one under its stamp.
+
+        ``picture`` is what the overlay is drawn on: the camera's image, or else the silhouette.
+        """
         for output, value in self._stream.values(estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)
+        if self._tf is not None:
+            self._tf.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
-            image = draw_overlay(silhouette, tracker.body, tracker.camera, estimate)
+            image = draw_overlay(picture, tracker.body, tracker.camera, estimate)
             self._overlay.publish(conversions.image_message(header, image, "bgr8"))
 
     def _is_wanted(self, output: Output) -> bool:
         return _wanted(self._publishers[output.topic])
 
-    def waiting(self, message: Image, text: str) -> None:
-        """Publish on ``overlay`` the silhouette and what the tracker waits for."""
+    def waiting(self, message: Image, seen: Image | None, text: str) -> None:
+        """Publish on ``overlay`` the image, or the silhouette, and what the tracker waits for."""
         if not _wanted(self._overlay) or self._guided:
             return
-        image = draw_message(conversions.silhouette_of(message), text)
+        silhouette = conversions.silhouette_of(message)
+        picture = conversions.image_behind(silhouette, seen)
+        image = draw_message(silhouette if picture is None else picture, text)
         self._overlay.publish(conversions.image_message(message.header, image, "bgr8"))
 
 

@@ -105,6 +105,17 @@ class TrackerParameters(NodeParameters):
         "that the body model has of them",
         read_only=True,
     )
+    publish_tf: bool = parameter(
+        False,
+        "also publish the links of robot_description on /tf, as robot_state_publisher would; not "
+        "beside it, and not with several trackers in one TF tree; needs the package tf2_msgs",
+        read_only=True,
+    )
+    optical_frame_in_tf: bool = parameter(
+        True,
+        "publish_tf also says where the camera's optical frame is; false if another node does",
+        read_only=True,
+    )
     rep155_id: str = parameter(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "

@@ -27,6 +27,8 @@ SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 # A queue of five lets the subscriber be late by some images; the publisher keeps only the latest.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+# As tf2's own broadcasters and listeners have it.
+TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # A recording may wait for a slow subscriber; no image is lost while 100 are queued.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # For a subscriber that records a replay and must not miss a message.

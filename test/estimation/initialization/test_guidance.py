@@ -6,10 +6,15 @@ import pytest
 
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.initialization.guidance import (
+    BAD,
+    GOOD,
+    HOLD_STILL,
     Guidance,
     Step,
     instruction,
     measuring,
+    said,
+    short_words,
 )
 
 
@@ -29,7 +34,7 @@ class Room:
     def capture(self, name: str) -> str:
         if self.failures:
             self.failures -= 1
-            raise InitializationError("nobody is in the image")
+            raise InitializationError("nobody is in the image", "Step into the picture")
         self.captured.append(name)
         return "captured"
 
@@ -54,6 +59,7 @@ def test_a_failed_capture_says_why_and_is_tried_again() -> None:
     room.guidance().run(["front"], "left", count_down_s=1, attempts=2)
     assert room.captured == ["front"]
     assert "front: not captured: nobody is in the image" in room.lines
+    assert ("Step into the picture", BAD) in [(step.words, step.mood) for step in room.steps]
 
 
 def test_it_gives_up_with_the_reason() -> None:
@@ -72,14 +78,31 @@ def test_steps_have_their_posture_words_and_count() -> None:
     room = Room()
     room.guidance().run(["front", "side", "arms"], "left", 3, 1)
     assert {step.name for step in room.steps} == {"front", "side", "arms"}
+    words = short_words("front", "left")
     assert room.steps[:5] == [
-        *(Step("front", instruction("front", "left"), left) for left in (3, 2, 1)),
-        Step("front", "hold still"),
-        Step("front", "captured"),
+        *(Step("front", words, left, instruction("front", "left")) for left in (3, 2, 1)),
+        Step("front", HOLD_STILL, detail="hold still"),
+        Step("front", "Good.", detail="captured", mood=GOOD),
     ]
 
 
 def test_steps_as_lines() -> None:
     assert Step("side", "turn", 2).text == "side: turn: 2"
     assert Step("side", "hold still").text == "side: hold still"
+    assert Step("side", "Good.", detail="captured 'side' from 5").text == (
+        "side: captured 'side' from 5"
+    )
     assert measuring(0.404).text == "measuring: 40 %"
+
+
+def test_what_is_said_is_short_and_said_once() -> None:
+    """Every sentence when it begins, and the last three seconds, for who looks aside."""
+    room = Room()
+    room.guidance().run(["front", "side"], "left", count_down_s=5, attempts=1)
+    steps = [*room.steps, measuring(0.1), measuring(0.2)]
+    spoken = [said(before, step) for before, step in zip([None, *steps], steps, strict=False)]
+    assert [words for words in spoken if words] == [
+        *("Face the camera, arms a little out", "3", "2", "1", "Hold still", "Good."),
+        *("Now turn left, arms as before", "3", "2", "1", "Hold still", "Good."),
+        "Good. Measuring, you may relax",
+    ]

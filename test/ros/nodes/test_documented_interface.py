@@ -18,8 +18,10 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
-from cardbox_tracker.body.posture import JOINT_NAMES  # noqa: E402
-from cardbox_tracker.description.urdf import ROOT_LINK  # noqa: E402
+from cardbox_tracker.body.model import BodyModel  # noqa: E402
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES  # noqa: E402
+from cardbox_tracker.description.link_transforms import LinkTransforms  # noqa: E402
+from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body  # noqa: E402
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
@@ -32,6 +34,7 @@ ROOT = Path(__file__).parents[3]
 NODES = ("camera", "play_bag", "background", "initializer", "tracker")
 # What rclpy adds to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 
@@ -203,6 +206,17 @@ def test_foxglove_shows_what_is_published() -> None:
     assert len(plotted) == 11
     for index, label in plotted:
         assert JOINT_NAMES[int(index)] == label
+
+
+def test_foxgloves_person_moves_with_the_transforms_of_a_recording() -> None:
+    """A URDF layer without a control mode follows the transforms: those of the bag's /tf."""
+    layout = json.loads((ROOT / "config" / "cardbox_foxglove.json").read_text(encoding="utf-8"))
+    panel = layout["configById"]["3D!person"]
+    layer = panel["layers"]["person"]
+    assert (layer["layerId"], layer["topic"]) == ("foxglove.Urdf", "/robot_description")
+    assert layer["framePrefix"] == "" and layer.get("controlMode", "auto") == "auto"
+    links = LinkTransforms(urdf_from_body(BodyModel(), "eye")).at(dict.fromkeys(ALL_NAMES, 0.0))
+    assert panel["followTf"] in {link.parent for link in links} - {link.child for link in links}
 
 
 PARAMETER = re.compile(r"-p (\w+):=")

@@ -83,6 +83,7 @@ class Graph:
         self._infos = self._probe.create_publisher(
             CameraInfo, "silhouette/camera_info", qos.SILHOUETTE
         )
+        self._images = self._probe.create_publisher(Image, "silhouette/image", qos.SILHOUETTE)
         self._stamp_s = 0
 
     def collect(self, kind: Any, topic: str, profile: Any = qos.RESULT) -> list[Any]:
@@ -100,25 +101,32 @@ class Graph:
             assert time.monotonic() < end, "it did not come"
         return value
 
-    def show(self, estimate: Estimate) -> None:
-        """Let the tracker find ``estimate`` in the next image."""
+    def show(self, estimate: Estimate, seen: np.ndarray | None = None) -> None:
+        """Let the tracker find ``estimate`` in the next image, which is ``seen``."""
         Told.says = estimate
         self._stamp_s += 1
         header = Header(frame_id="eye", stamp=Time(sec=self._stamp_s))
         self._infos.publish(camera_info_message(header, CAMERA))
+        if seen is not None:
+            self._images.publish(image_message(header, seen))
         image = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
         self._silhouettes.publish(image_message(header, image, "mono8"))
 
-    def show_until(self, estimate: Estimate, condition: Callable[[], Any]) -> None:
+    def show_until(
+        self,
+        estimate: Estimate,
+        condition: Callable[[], Any],
+        seen: np.ndarray | None = None,
+    ) -> None:
         """Show images until ``condition`` holds: subscribers are found one by one."""
 
-        def seen() -> Any:
+        def is_there() -> Any:
             value = condition()
             if not value:
-                self.show(estimate)
+                self.show(estimate, seen)
             return value
 
-        self.wait(seen)
+        self.wait(is_there)
 
     def close(self) -> None:
         self._executor.shutdown()
@@ -205,3 +213,19 @@ def test_every_image_has_its_state(make: Callable[..., Graph]) -> None:
         graph.show(Estimate(LOST))
         graph.wait(lambda count=count: [word.data for word in words].count(LOST) == count)
     assert words[-1].data == LOST
+
+
+def test_the_overlay_is_drawn_on_the_image_or_else_on_the_silhouette(
+    make: Callable[..., Graph],
+) -> None:
+    graph = make()
+    overlays = graph.collect(Image, "overlay", qos.SENSOR_DATA)
+    wall = np.full((CAMERA.height, CAMERA.width, 3), (30, 60, 90), np.uint8)
+
+    def corner() -> list[int]:
+        return list(overlays[-1].data[-3:]) if overlays else []
+
+    graph.show_until(found(TRACKING), lambda: corner() == [0, 0, 0])
+    graph.show_until(found(TRACKING), lambda: corner() == [30, 60, 90], wall)
+    # Without images again, as when the background node is another's.
+    graph.show_until(found(TRACKING), lambda: corner() == [0, 0, 0])

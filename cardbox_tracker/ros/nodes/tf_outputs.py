@@ -1,0 +1,76 @@
+"""What the tracker publishes on ``/tf``, for those without robot_state_publisher.
+
+The message is one of the package tf2_msgs, which may be missing: ROS has it, PyPI has not.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from std_msgs.msg import Header
+
+from cardbox_tracker.description.link_transforms import LinkTransform, LinkTransforms
+from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.outputs import joint_values, positions_of
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+
+
+class TfOutputs:
+    """The frames of the links of ``robot_description``, in the posture of each image."""
+
+    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
+        """Advertise ``/tf`` for ``node``.
+
+        Raises:
+            CardboxError: the package tf2_msgs is not installed.
+        """
+        self._kind = _tf_message()
+        self._publisher = node.advertise(self._kind, "/tf", qos.TF)
+        self._settings = settings
+        self._described: tuple[Any, str] | None = None
+        self._links: LinkTransforms | None = None
+
+    def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
+        """Publish the frames of an image; none without a posture."""
+        settings = self._settings
+        joints = joint_values(estimate, settings.torso_place)
+        if joints is None:
+            return
+        if self._links is None or self._described != (tracker.body, header.frame_id):
+            self._described = (tracker.body, header.frame_id)
+            optical = header.frame_id if settings.optical_frame_in_tf else ""
+            urdf = urdf_from_body(tracker.body, optical or None, torso_place=settings.torso_place)
+            self._links = LinkTransforms(urdf)
+        links = self._links.at(positions_of(joints))
+        transforms = [_stamped(header, link) for link in links]
+        self._publisher.publish(self._kind(transforms=transforms))
+
+
+def _stamped(header: Header, link: LinkTransform) -> TransformStamped:
+    x, y, z = link.translation_m
+    qx, qy, qz, qw = link.rotation
+    return TransformStamped(
+        header=Header(stamp=header.stamp, frame_id=link.parent),
+        child_frame_id=link.child,
+        transform=Transform(
+            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+        ),
+    )
+
+
+def _tf_message() -> Any:
+    try:
+        return importlib.import_module("tf2_msgs.msg").TFMessage
+    except ImportError:
+        raise CardboxError(
+            "publish_tf needs the package tf2_msgs, which is not installed; install it (sudo apt "
+            "install ros-jazzy-tf2-msgs; PyPI has none), or leave publish_tf off: "
+            "robot_state_publisher makes /tf from robot_description and joint_states, and the bag "
+            "of 'cardbox track --bag' has it"
+        ) from None

@@ -1,0 +1,44 @@
+"""The gate of docs/safety-slow-down.md stops the robot unless everything says otherwise."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from cardbox_tracker.estimation import tracker
+
+DOCUMENT = Path(__file__).parents[1] / "docs" / "safety-slow-down.md"
+
+
+@pytest.fixture(scope="module")
+def gate() -> dict[str, Any]:
+    (program,) = re.findall(r"(?ms)^```python\n(.*?)^```", DOCUMENT.read_text(encoding="utf-8"))
+    names: dict[str, Any] = {"__name__": "gate"}
+    exec(compile(program, str(DOCUMENT), "exec"), names)
+    return names
+
+
+def test_silence_of_either_is_a_stop(gate: dict[str, Any]) -> None:
+    override, old_s = gate["override"], gate["OLD_S"]
+    assert override(80, "tracking", 0.0) == override(80, "tracking", old_s) == 80
+    assert override(80, "tracking", 1.01 * old_s) == 0
+
+
+@pytest.mark.parametrize(
+    ("state", "most"),
+    [
+        (tracker.TRACKING, 100),
+        (tracker.UNCERTAIN, 20),
+        (tracker.LOST, 0),
+        (tracker.NO_PERSON, 0),
+        ("", 0),
+    ],
+)
+def test_the_state_limits_what_is_asked_for(gate: dict[str, Any], state: str, most: int) -> None:
+    found = [gate["override"](asked, state, 0.0) for asked in (-5, 0, 10, 100, 300)]
+    assert found == [0, 0, min(10, most), most, most]
