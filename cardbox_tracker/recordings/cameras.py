@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,9 +27,8 @@ from cardbox_tracker.vision.extrinsics_sources import (
     of_transforms,
     transforms_of,
 )
+from cardbox_tracker.vision.pairing import side_by_side
 from cardbox_tracker.vision.stereo import StereoDepth
-
-T = TypeVar("T")
 
 MOST_CAMERAS = 4
 STEREO = "stereo"
@@ -215,26 +214,6 @@ def open_recording(
     else:
         with BagReader(path) as bag:
             yield SilhouetteSource(bag, background, camera=next(iter(cameras), None))
-
-
-def side_by_side(
-    streams: Sequence[Iterator[T]], stamp_ns: Callable[[T], int], tolerance_ns: int
-) -> Iterator[tuple[T | None, ...]]:
-    """Pair what several streams have at the same time; each item is used once, in order.
-
-    An item that is more than ``tolerance_ns`` after the earliest one waits for the next turn.
-    """
-    heads = [next(stream, None) for stream in streams]
-    while any(head is not None for head in heads):
-        first_ns = min(stamp_ns(head) for head in heads if head is not None)
-        taken = tuple(
-            head if head is not None and stamp_ns(head) - first_ns <= tolerance_ns else None
-            for head in heads
-        )
-        yield taken
-        for number, item in enumerate(taken):
-            if item is not None:
-                heads[number] = next(streams[number], None)
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
