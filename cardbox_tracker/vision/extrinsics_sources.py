@@ -127,7 +127,7 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
         raise CameraError(
             f"nothing says where camera {other} stands against {first}: expected a rectified pair "
             "(P[0,3] of CameraInfo), a transform between their optical frames on /tf_static, or a "
-            "file; give --extrinsics FILE, from Kalibr or aniposelib"
+            "file from Kalibr or aniposelib; give --extrinsics FILE, or the nodes extrinsics_file"
         )
     for one in there[1:]:
         angle_rad, distance_m = there[0].difference(one)

@@ -11,7 +11,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Generic, TypeVar
 
+from cardbox_tracker.errors import CardboxError
+
 T = TypeVar("T")
+
+MOST_CAMERAS = 4
 
 # So many of another camera's images may wait for one: whatever its camera needs to send it.
 _WAITING = 2
@@ -19,6 +23,21 @@ _WAITING = 2
 _PATIENCE = 5
 # Further back than the network reorders messages: the source has started again, or another clock.
 _RESTART_NS = 1_000_000_000
+
+
+def camera_names(cameras: Sequence[str]) -> list[str]:
+    """Return the namespaces of cameras without slashes around them.
+
+    Raises:
+        CardboxError: there are too many, one twice, or one without a name.
+    """
+    names = [camera.strip("/") for camera in cameras]
+    if len(names) > MOST_CAMERAS or len(set(names)) < len(names) or not all(names):
+        raise CardboxError(
+            f"the cameras are {', '.join(names)}; expected one to {MOST_CAMERAS} "
+            "different namespaces"
+        )
+    return names
 
 
 def side_by_side(

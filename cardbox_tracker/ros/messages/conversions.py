@@ -140,10 +140,32 @@ def check_shape(
         )
 
 
-def camera_info_message(header: Header, camera: Camera) -> CameraInfo:
-    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size."""
+def camera_info_message(
+    header: Header, camera: Camera, source: CameraInfo | None = None
+) -> CameraInfo:
+    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size.
+
+    Of ``source``, the CameraInfo of the camera whose image it is, stays what R and P say of its
+    place in a stereo pair.
+    """
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
-    return _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+    message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+    if source is not None:
+        r, p = (np.array(values, np.float64) for values in (source.r, source.p))
+        if np.isfinite(r).all() and r.any():
+            message.r = r
+        if np.isfinite(p).all() and p[0] > 0 and p[5] > 0:
+            message.p[3], message.p[7] = camera.fx * p[3] / p[0], camera.fy * p[7] / p[5]
+    return message
+
+
+def depth_camera_of(message: CameraInfo) -> Camera | None:
+    """Return the pinhole camera of a rectified depth image; None if its CameraInfo says none."""
+    p = np.array(message.p, np.float64)
+    if not np.isfinite(p).all() or min(p[0], p[5], message.width, message.height) <= 0:
+        return None
+    fx, fy, cx, cy = (float(p[i]) for i in (0, 5, 2, 6))
+    return Camera(int(message.width), int(message.height), fx, fy, cx, cy)
 
 
 def calibration_message(header: Header, calibration: Calibration) -> CameraInfo:
