@@ -13,6 +13,7 @@ from cardbox_tracker.vision.camera import Camera
 
 DepthImage = NDArray[np.float32]
 
+_LONGEST_PX = 32_766
 _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 
 
@@ -73,8 +74,15 @@ def as_seen_by(depth_m: DepthImage, own: Camera, camera: Camera) -> DepthImage:
         depth_m: (H, W), of any size with the proportions of ``own``.
         own: the camera that measured it.
         camera: the camera whose pixels the result has.
+
+    Raises:
+        EncodingError: the image is longer than OpenCV can turn.
     """
     height, width = depth_m.shape
+    if max(height, width) > _LONGEST_PX:
+        raise EncodingError(
+            f"the depth image is {width}x{height}; expected sides of at most {_LONGEST_PX} px"
+        )
     own = own.scaled(width, height)
     across, down = own.fx / camera.fx, own.fy / camera.fy
     pixel_of = np.array(

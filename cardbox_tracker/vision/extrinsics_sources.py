@@ -42,6 +42,9 @@ def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
 
     Returns:
         None if the cameras are no rectified pair, so that both columns are zero.
+
+    Raises:
+        CameraError: R is no rotation.
     """
     at = []
     for info in (first, other):
@@ -56,7 +59,8 @@ def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
     if not np.any(np.abs(other_m - first_m) > 1e-6):
         return None
     moved = other_r.T @ (other_m - first_m)
-    return Extrinsics(other_r.T @ first_r, moved, f"P of {name}'s CameraInfo")
+    matrix = np.column_stack([other_r.T @ first_r, moved])
+    return Extrinsics.of(matrix, f"P and R of {name}'s CameraInfo")
 
 
 def of_transforms(

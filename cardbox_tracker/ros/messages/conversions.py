@@ -151,21 +151,23 @@ def camera_info_message(
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
     if source is not None:
-        r, p = (np.array(values, np.float64) for values in (source.r, source.p))
-        if np.isfinite(r).all() and r.any():
+        r, p = ([float(value) for value in values] for values in (source.r, source.p))
+        if np.isfinite(r).all() and any(r):
             message.r = r
-        if np.isfinite(p).all() and p[0] > 0 and p[5] > 0:
-            message.p[3], message.p[7] = camera.fx * p[3] / p[0], camera.fy * p[7] / p[5]
+        if min(p[0], p[5]) > 0:
+            at = camera.fx * (p[3] / p[0]), camera.fy * (p[7] / p[5])
+            if np.isfinite(at).all():
+                message.p[3], message.p[7] = at
     return message
 
 
 def depth_camera_of(message: CameraInfo) -> Camera | None:
     """Return the pinhole camera of a rectified depth image; None if its CameraInfo says none."""
-    p = np.array(message.p, np.float64)
-    if not np.isfinite(p).all() or min(p[0], p[5], message.width, message.height) <= 0:
+    p, width, height = np.array(message.p).reshape(3, 4), int(message.width), int(message.height)
+    if min(width, height) <= 0 or matrix_problem(p[:, :3], width, height):
         return None
-    fx, fy, cx, cy = (float(p[i]) for i in (0, 5, 2, 6))
-    return Camera(int(message.width), int(message.height), fx, fy, cx, cy)
+    fx, fy, cx, cy = (float(p[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    return Camera(width, height, fx, fy, cx, cy)
 
 
 def calibration_message(header: Header, calibration: Calibration) -> CameraInfo:

@@ -229,13 +229,15 @@ class CameraViews:
         source = self._sources[-1]
         try:
             depth_m = depth_from_image(seen[0].message)
+            if source.camera is None:
+                depth_m = at_size(depth_m, camera.width, camera.height)
+            else:
+                depth_m = as_seen_by(depth_m, source.camera, camera)
         except CardboxError as error:
             source.problem = str(error)
             return None
         source.problem = ""
-        if source.camera is None:
-            return at_size(depth_m, camera.width, camera.height)
-        return as_seen_by(depth_m, source.camera, camera)
+        return depth_m
 
     def values(self, ious: Sequence[float | None]) -> dict[str, str]:
         """Return rate, age and fit of each camera, for the diagnostics."""
