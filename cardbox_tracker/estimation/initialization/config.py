@@ -8,7 +8,6 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, SIDE_TURNS
-from cardbox_tracker.body.sizes import SIZE_NAMES
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.initialization.wording import rounded_down
 from cardbox_tracker.settings import check, setting
@@ -146,12 +145,3 @@ def check_fit(result: InitializationResult, config: InitializationConfig) -> Non
             f"the model fits {names} poorly (IoU {fits}; expected {config.least_iou:.2f} or more "
             f"of each); capture {names} again in the posture asked for, or {advice}"
         )
-
-
-def answer_text(result: InitializationResult) -> str:
-    """Return fit and sizes in one line, for a person."""
-    sizes = ", ".join(
-        f"{name} {100 * value:.1f}"
-        for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)
-    )
-    return f"measured; {fit_text(result)}; sizes in cm: {sizes}"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from cardbox_tracker.estimation.initialization.config import InitializationResult
+from cardbox_tracker.body.sizes import SIZE_NAMES
+from cardbox_tracker.estimation.initialization.config import InitializationResult, fit_text
 
 _NAME = "initialization"
 _HARDWARE_ID = "cardbox_tracker"
@@ -41,3 +42,12 @@ def mean_iou_of(message: DiagnosticStatus) -> float:
     if _MEAN_IOU not in values:
         raise ValueError(message.message)
     return float(values[_MEAN_IOU])
+
+
+def answer_text(result: InitializationResult) -> str:
+    """Return the answer of the service: how well it fits, and the sizes in cm."""
+    sizes = ", ".join(
+        f"{name} {100 * value:.1f}"
+        for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)
+    )
+    return f"measured; {fit_text(result)}; sizes in cm: {sizes}"

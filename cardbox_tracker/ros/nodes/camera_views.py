@@ -55,8 +55,9 @@ class Views:
 
     @property
     def picture(self) -> ImageArray:
-        """The first camera's silhouette; black if it has none."""
-        return self.nothing if self.silhouettes[0] is None else self.silhouettes[0]
+        """The first camera's image, or else its silhouette; black if it has neither."""
+        seen = self.silhouettes[0] if self.images[0] is None else self.images[0]
+        return self.nothing if seen is None else seen
 
 
 @dataclass(frozen=True)

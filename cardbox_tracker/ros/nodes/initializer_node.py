@@ -20,10 +20,13 @@ from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
-from cardbox_tracker.estimation.initialization.config import answer_text
 from cardbox_tracker.estimation.initialization.guidance import Guidance, measuring
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.measurement import measured_message, refused_message
+from cardbox_tracker.ros.messages.measurement import (
+    answer_text,
+    measured_message,
+    refused_message,
+)
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
@@ -62,8 +65,7 @@ class InitializerNode(CardboxNode):
         self._second = SecondCamera(self, self.parameters.value) if len(cameras) > 1 else None
         self._references = ReferenceCapture(self._topic)
         self.subscribe(CameraInfo, f"{topic}/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
-        add_image = self._references.add_image
-        self.subscribe(Image, f"{topic}/image", add_image, qos.SILHOUETTE_INPUT)
+        self.subscribe(Image, f"{topic}/image", self._references.add_image, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, topic, self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
@@ -141,8 +143,7 @@ class InitializerNode(CardboxNode):
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
                     "silhouettes from the background node, which publishes it"
                 )
-            config = settings.config()
-            result = measured(references, second, camera, config, self._progress)
+            result = measured(references, second, camera, settings.config(), self._progress)
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
             references.captured, references.images = before
