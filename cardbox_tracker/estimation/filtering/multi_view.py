@@ -176,7 +176,7 @@ class MultiViewFilter(WholeBodyFilter):
             state = self._views.to_views[number](self._output)
             _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
             both_px = float(cost.silhouette_px + drawn_px)
-            found.append((both_px - differ_px) / (both_px + differ_px))
+            found.append(float((both_px - differ_px) / (both_px + differ_px)))
         return found
 
     def forget(self) -> None:
