@@ -30,6 +30,8 @@ from cardbox_tracker.vision.extrinsics_sources import (
 )
 
 _STATIC_TOPIC = "/tf_static"
+# A robot has some hundred; anybody may send more.
+_MOST_TRANSFORMS = 1000
 # Two extrinsics that differ by less are the same, read again.
 _SAME_RAD, _SAME_M = 1e-5, 1e-5
 
@@ -106,7 +108,9 @@ class CameraPoses:
 
     def _on_transforms(self, message: Any, _: int) -> None:
         for transform in transforms_of(message):
-            self._transforms[transform.parent, transform.child] = transform
+            ends = transform.parent, transform.child
+            if ends in self._transforms or len(self._transforms) < _MOST_TRANSFORMS:
+                self._transforms[ends] = transform
         self._find(is_new=False)
 
     def _find(self, is_new: bool) -> None:
