@@ -64,6 +64,14 @@ ARGUMENTS = {
     "rep155_id": Argument(
         "", "also publish /humans/bodies/ID/... after REP-155, for this ID", name=True
     ),
+    "cameras": Argument(
+        *("", "several cameras of one person by namespace, the first one first: [left, right]"),
+        kind=list,
+        name=True,
+    ),
+    "extrinsics_file": Argument("", "where the cameras stand, of Kalibr or aniposelib", Path),
+    "measure_distance": Argument("true", "with two cameras, they measure person_distance_m", bool),
+    "depth": Argument("", "topic of depth images of the (first) camera"),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),
@@ -71,8 +79,11 @@ ARGUMENTS = {
 # Parameters that are launch arguments too, by node.
 GIVEN = {
     "background": ("image_transport", "background_file"),
-    "initializer": ("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
-    "tracker": ("preset", "rep155_id"),
+    "initializer": (
+        *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
+        *("cameras", "extrinsics_file", "measure_distance"),
+    ),
+    "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth"),
 }
 LAYOUT_TOPICS = ("robot_description", "markers", "keypoints", "overlay", "silhouette")
 # Nobody until somebody is measured: robot_state_publisher does not start without a description.
@@ -103,7 +114,12 @@ def generate_launch_description() -> LaunchDescription:
 
 def _check(context: LaunchContext) -> list[object]:
     given = context.launch_configurations
-    values(ARGUMENTS, given)
+    typed = values(ARGUMENTS, given)
+    if typed["cameras"] and typed["single_process"]:
+        raise ValueError(
+            "launch argument single_process is true, but cameras are given; expected one of them: "
+            "several cameras need more than the one core of a process"
+        )
     if not Path(given["config_dir"]).is_dir():
         raise ValueError(
             f"launch argument config_dir is '{given['config_dir']}'; expected a folder with the "
@@ -121,17 +137,22 @@ def _nodes(context: LaunchContext) -> list[object]:
     ]
     if _wanted(context, "single_process"):
         return [_single_process(context, remappings)]
+    cameras = values(ARGUMENTS, given)["cameras"] or [""]
     return [
         Node(
             package="cardbox_tracker",
             executable=name,
             name=name,
-            namespace=LaunchConfiguration("namespace"),
-            parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], own],
+            namespace=[LaunchConfiguration("namespace"), *(["/", below] if below else [])],
+            parameters=[
+                [LaunchConfiguration("config_dir"), f"/{name}.yaml"],
+                _exact(_typed(given, name, below)),
+            ],
             remappings=remappings if name == "background" else [],
             output="screen",
         )
-        for name, own in ((name, _exact(_typed(given, name))) for name in GIVEN)
+        for name in GIVEN
+        for below in (cameras if name == "background" else [""])
     ]
 
 
@@ -143,10 +164,16 @@ def _exact(parameters: dict[str, object]) -> dict[str, object]:
     }
 
 
-def _typed(given: dict[str, str], node: str) -> dict[str, object]:
+def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, object]:
     """The launch arguments that are parameters of ``node``, as its types."""
     typed = values(ARGUMENTS, given)
-    return {name: typed[name] for name in GIVEN[node]}
+    kept = typed["background_file"]
+    if camera and isinstance(kept, str) and kept:
+        # Each camera has a background of its own.
+        path = Path(kept)
+        typed["background_file"] = str(path.with_name(f"{path.stem}_{camera}{path.suffix}"))
+    # ROS has no empty list of a known type.
+    return {name: typed[name] for name in GIVEN[node] if typed[name] != []}
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:

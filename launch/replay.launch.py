@@ -2,7 +2,8 @@
 
     ros2 launch cardbox_tracker replay.launch.py bag:=BAG person_distance_m:=2.0
 
-The bag's image and CameraInfo topics are found by themselves where it has one of each. With
+The bag's image and CameraInfo topics are found by themselves where it has one of each, and with
+cameras:="[left, right]" they are those below the namespaces. With
 pause_at:="[6.5, 9.5, 12.5]" the recording stands still at those times, so that a reference posture
 can be captured (initializer/capture_front) before play_bag/resume.
 """
@@ -72,7 +73,8 @@ def _find_topics(context: LaunchContext) -> list[object]:
     """
     given = context.launch_configurations
     wanted = [name for name in ("image", "camera_info") if name not in given]
-    if not wanted:
+    # Those of several cameras are below their namespaces.
+    if not wanted or given.get("cameras", "").strip(" []"):
         return []
     program = Path(get_package_prefix("cardbox_tracker")) / "lib" / "cardbox_tracker" / "play_bag"
     found = subprocess.run(

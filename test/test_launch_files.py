@@ -18,7 +18,6 @@ import pytest
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 ROOT = Path(__file__).resolve().parents[1]
-NAMES = ("nodes", "live", "replay")
 # What only the virtual environment has.
 NOT_THERE = ("rosbags", "numpy", "cv2", "numba", "matplotlib", "tqdm", "lz4")
 NODES = ["background", "initializer", "tracker"]
@@ -178,6 +177,11 @@ def test_replay_says_why_a_bag_cannot_be_played(launch: Callable[..., Any]) -> N
     assert RUNNING == []
 
 
+def test_topics_of_several_cameras_are_not_looked_for(launch: Callable[..., Any]) -> None:
+    nodes = launch("replay", bag="/nowhere", cameras="[left, right]", publish_tf="false")
+    assert executables(nodes) == ["background", *NODES, "play_bag"]
+
+
 def test_topics_that_are_given_are_not_looked_for(launch: Callable[..., Any]) -> None:
     nodes = launch("replay", bag="/nowhere", image="/i", camera_info="/c", publish_tf="false")
     assert dict(nodes[0].options["remappings"])["image_raw"] == "/i"
@@ -188,6 +192,91 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
     assert executables(nodes) == [*NODES, "camera"]
     parameters = nodes[-1].options["parameters"][1]
     assert (parameters["width"], parameters["loop"]) == (320, True)
+
+
+def namespaces(nodes: list[Action]) -> list[str]:
+    """The part of each node's namespace below that of all."""
+    parts = [node.options["namespace"] for node in nodes]
+    return [
+        "".join(p for p in part if isinstance(p, str)) if type(part) is list else ""
+        for part in parts
+    ]
+
+
+def parameters_of(node: Action) -> dict[str, Any]:
+    own = node.options["parameters"][1]
+    return {k: v.words[0] if isinstance(v, Action) else v for k, v in own.items()}
+
+
+def test_several_cameras_have_a_background_each(launch: Callable[..., Any]) -> None:
+    given = {"cameras": "[cam0, /cam1/]", "background_file": "/tmp/empty.npz"}
+    nodes = launch("nodes", **given, depth="depth", publish_tf="false")
+    assert executables(nodes) == ["background", *NODES]
+    assert namespaces(nodes) == ["/cam0", "/cam1", "", ""]
+    kept = [parameters_of(node)["background_file"] for node in nodes[:2]]
+    assert kept == ["/tmp/empty_cam0.npz", "/tmp/empty_cam1.npz"]
+    for node in nodes[2:]:
+        assert parameters_of(node)["cameras"] == ["cam0", "cam1"]
+    assert parameters_of(nodes[3])["depth"] == "depth"
+
+
+def test_one_camera_is_told_nothing_of_several(launch: Callable[..., Any]) -> None:
+    nodes = launch("nodes", publish_tf="false")
+    assert executables(nodes) == NODES
+    assert namespaces(nodes) == ["", "", ""]
+    assert all("cameras" not in parameters_of(node) for node in nodes)
+
+
+def test_two_cameras_are_started_with_their_own_devices(
+    launch: Callable[..., Any], tmp_path: Path
+) -> None:
+    calibration = tmp_path / "second.yaml"
+    calibration.touch()
+    nodes = launch(
+        *("two_cameras",),
+        first_device="/dev/video0",
+        second_device="/dev/video2",
+        width="320",
+        second_calibration_file=str(calibration),
+        publish_tf="false",
+    )
+    assert executables(nodes) == ["background", *NODES, "camera", "camera"]
+    assert namespaces(nodes)[-2:] == ["/cam0", "/cam1"]
+    first, second = (parameters_of(node) for node in nodes[-2:])
+    assert (first["device"], second["device"]) == ("/dev/video0", "/dev/video2")
+    assert (first["calibration_file"], second["calibration_file"]) == ("", str(calibration))
+    assert (first["width"], second["frame_id"]) == (320, "cam1_optical_frame")
+    own = launch("two_cameras", first="left", second="right", publish_tf="false")
+    assert executables(own) == ["background", *NODES]
+    assert namespaces(own)[:2] == ["/left", "/right"]
+
+
+def test_a_stereo_pair_has_depth_unless_it_is_not_wanted(launch: Callable[..., Any]) -> None:
+    nodes = launch("stereo", right="r", publish_tf="false")
+    assert executables(nodes) == ["background", *NODES, "stereo_depth"]
+    assert dict(nodes[-1].options["remappings"])["right/image_raw"] == "r/image_raw"
+    assert parameters_of(nodes[3])["depth"] == "depth"
+    without = launch("stereo", stereo_depth="false", publish_tf="false")
+    assert executables(without) == ["background", *NODES]
+    assert parameters_of(without[3])["depth"] == ""
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"first": ""}, "expected two different namespaces"),
+        ({"second": "cam0"}, "expected two different namespaces"),
+        ({"first_device": "/dev/video0"}, "expected two different devices, or none"),
+        ({"single_process": "true"}, "but cameras are given"),
+        ({"extrinsics_file": "/nowhere.yaml"}, "expected a file that exists"),
+    ],
+)
+def test_what_two_cameras_cannot_be_is_said_before_anything_runs(
+    given: dict[str, str], expected: str, launch: Callable[..., Any]
+) -> None:
+    with pytest.raises(Exception, match=expected):
+        launch("two_cameras", **given)
+    assert RUNNING == []
 
 
 @pytest.mark.parametrize(
@@ -206,6 +295,10 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
         ("nodes", "rep155_id", "1st", "a letter, then"),
         ("nodes", "person_distance_m", "-1", "a number from 0.3 to 20"),
         ("nodes", "image_transport", "jpeg", "raw or compressed"),
+        ("nodes", "cameras", "[cam 0, cam1]", "a list of different names"),
+        ("nodes", "cameras", "[a, a]", "a list of different names"),
+        ("stereo", "left", "1st", "a letter, then"),
+        ("two_cameras", "width", "5", "a whole number from 32 to 8192"),
         ("replay", "pause_at", "[1, x]", "a list of numbers"),
         ("replay", "rate", "fast", "a number from 0.01 to 100"),
     ],

@@ -20,7 +20,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette, Term
-from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
@@ -181,6 +181,20 @@ class Tracker:
         else:
             self._filter.configure(config)
         return is_new_start
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """How the further cameras see the body."""
+        return tuple(further.view for further in self._further)
+
+    def camera_ious(self) -> list[float | None]:
+        """Return how well the last estimate fits what each of several cameras saw.
+
+        Returns:
+            IoU by camera, the first camera's first; None of one that saw nobody. Empty of one
+            camera, of which the estimate has it.
+        """
+        return self._filter.ious() if isinstance(self._filter, MultiViewFilter) else []
 
     def _person_in(self, silhouette: Silhouette, image: Image | None) -> Silhouette:
         """Return what of a silhouette can be the person; raises ValueError for a wrong size."""

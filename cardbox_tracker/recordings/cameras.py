@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import DepthImage, at_size, decode_depth
+from cardbox_tracker.vision.depth_image import DepthImage, at_size, depth_from_image
 from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 from cardbox_tracker.vision.extrinsics_sources import (
@@ -27,11 +27,9 @@ from cardbox_tracker.vision.extrinsics_sources import (
     of_transforms,
     transforms_of,
 )
+from cardbox_tracker.vision.pairing import camera_names, side_by_side
 from cardbox_tracker.vision.stereo import StereoDepth
 
-T = TypeVar("T")
-
-MOST_CAMERAS = 4
 STEREO = "stereo"
 """In place of a topic: the depth is measured in the rectified pair of the first two cameras."""
 _STATIC_TOPIC = "/tf_static"
@@ -87,12 +85,7 @@ class CameraSources:
         Raises:
             CardboxError: there are too many cameras, or one twice.
         """
-        self.cameras = [camera.strip("/") for camera in cameras]
-        if len(self.cameras) > MOST_CAMERAS or len(set(self.cameras)) < len(self.cameras):
-            raise CardboxError(
-                f"the cameras are {', '.join(self.cameras)}; expected one to {MOST_CAMERAS} "
-                "different namespaces"
-            )
+        self.cameras = camera_names(cameras)
         self._path, self._file, self._depth = path, extrinsics, depth
         self._background, self._config = background, config
         self._stack = ExitStack()
@@ -169,14 +162,7 @@ class CameraSources:
             for message in bag.messages([self._depth]):
                 image = bag.deserialize(message)
                 stamp = image.header.stamp
-                depth_m = decode_depth(
-                    image.data,
-                    image.height,
-                    image.width,
-                    image.step,
-                    image.encoding,
-                    bool(image.is_bigendian),
-                )
+                depth_m = depth_from_image(image)
                 yield (
                     stamp.sec * 10**9 + stamp.nanosec,
                     at_size(depth_m, camera.width, camera.height),
@@ -215,26 +201,6 @@ def open_recording(
     else:
         with BagReader(path) as bag:
             yield SilhouetteSource(bag, background, camera=next(iter(cameras), None))
-
-
-def side_by_side(
-    streams: Sequence[Iterator[T]], stamp_ns: Callable[[T], int], tolerance_ns: int
-) -> Iterator[tuple[T | None, ...]]:
-    """Pair what several streams have at the same time; each item is used once, in order.
-
-    An item that is more than ``tolerance_ns`` after the earliest one waits for the next turn.
-    """
-    heads = [next(stream, None) for stream in streams]
-    while any(head is not None for head in heads):
-        first_ns = min(stamp_ns(head) for head in heads if head is not None)
-        taken = tuple(
-            head if head is not None and stamp_ns(head) - first_ns <= tolerance_ns else None
-            for head in heads
-        )
-        yield taken
-        for number, item in enumerate(taken):
-            if item is not None:
-                heads[number] = next(streams[number], None)
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
@@ -12,7 +11,10 @@ from cardbox_tracker.estimation.initialization.config import (
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
-from cardbox_tracker.estimation.initialization.scale import measured_scale
+from cardbox_tracker.estimation.initialization.scale import (
+    SECOND_REFERENCES,
+    measured_with_second,
+)
 from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
@@ -57,16 +59,16 @@ def initialize_from_cameras(
         InitializationError: as :func:`initialize_from_recording`, or the second camera does not
             show that person.
     """
-    guessed = initialize_from_recording(sources.first, spans, config).body
-    second = {
-        name: average_silhouette([f.silhouette for f in sources.sources[1].held(spans[name], name)])
-        for name in ("front", "arms")
+    first, second = sources.sources[:2]
+    references = {
+        name: average_silhouette([frame.silhouette for frame in second.held(spans[name], name)])
+        for name in SECOND_REFERENCES
     }
-    camera = sources.first.camera.with_pitch(config.camera_pitch_rad)
-    scale = measured_scale(guessed, camera, sources.others[0], second)
-    # Again, since what no outline shows is taken from the proportions of people of that size.
-    measured = replace(config, distance_m=scale * config.distance_m)
-    return initialize_from_recording(sources.first, spans, measured, progress)
+
+    def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
+        return initialize_from_recording(first, spans, at, progress if is_last else None)
+
+    return measured_with_second(measure, config, first.camera, sources.others[0], references)
 
 
 def describe(result: InitializationResult) -> str:

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.vision.camera import Camera
 
 DepthImage = NDArray[np.float32]
 
+_LONGEST_PX = 32_766
 _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 
 
@@ -41,9 +43,59 @@ def decode_depth(
     return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
 
 
+def depth_from_image(message: Any) -> DepthImage:
+    """Return the depth (H, W), metres, in a sensor_msgs/Image, of rclpy or of a recording.
+
+    Raises:
+        EncodingError: as :func:`decode_depth`.
+    """
+    return decode_depth(
+        message.data,
+        message.height,
+        message.width,
+        message.step,
+        message.encoding,
+        bool(message.is_bigendian),
+    )
+
+
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
     """Return a depth image of that size; each pixel is one that was measured, not a mean."""
     if depth_m.shape == (height, width):
         return depth_m
     resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(resized, np.float32)
+
+
+def as_seen_by(depth_m: DepthImage, own: Camera, camera: Camera) -> DepthImage:
+    """Return a depth image as another pinhole camera at the same place has it; 0 beside its view.
+
+    Args:
+        depth_m: (H, W), of any size with the proportions of ``own``.
+        own: the camera that measured it.
+        camera: the camera whose pixels the result has.
+
+    Raises:
+        EncodingError: the image is longer than OpenCV can turn.
+    """
+    height, width = depth_m.shape
+    if max(height, width) > _LONGEST_PX:
+        raise EncodingError(
+            f"the depth image is {width}x{height}; expected sides of at most {_LONGEST_PX} px"
+        )
+    own = own.scaled(width, height)
+    across, down = own.fx / camera.fx, own.fy / camera.fy
+    pixel_of = np.array(
+        [
+            (across, 0.0, own.cx - across * camera.cx),
+            (0.0, down, own.cy - down * camera.cy),
+        ]
+    )
+    seen = cv2.warpAffine(
+        depth_m,
+        pixel_of,
+        (camera.width, camera.height),
+        flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
+        borderValue=0,
+    )
+    return np.asarray(seen, np.float32)

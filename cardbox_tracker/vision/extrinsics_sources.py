@@ -42,6 +42,9 @@ def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
 
     Returns:
         None if the cameras are no rectified pair, so that both columns are zero.
+
+    Raises:
+        CameraError: R is no rotation.
     """
     at = []
     for info in (first, other):
@@ -56,7 +59,8 @@ def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
     if not np.any(np.abs(other_m - first_m) > 1e-6):
         return None
     moved = other_r.T @ (other_m - first_m)
-    return Extrinsics(other_r.T @ first_r, moved, f"P of {name}'s CameraInfo")
+    matrix = np.column_stack([other_r.T @ first_r, moved])
+    return Extrinsics.of(matrix, f"P and R of {name}'s CameraInfo")
 
 
 def of_transforms(
@@ -127,7 +131,7 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
         raise CameraError(
             f"nothing says where camera {other} stands against {first}: expected a rectified pair "
             "(P[0,3] of CameraInfo), a transform between their optical frames on /tf_static, or a "
-            "file; give --extrinsics FILE, from Kalibr or aniposelib"
+            "file from Kalibr or aniposelib; give --extrinsics FILE, or the nodes extrinsics_file"
         )
     for one in there[1:]:
         angle_rad, distance_m = there[0].difference(one)

@@ -75,7 +75,13 @@ def test_another_camera_sees_the_same_points(roll_rad: float, rng: np.random.Gen
     for state in rng.normal(0.0, 0.2, (4, 14)):
         there = FIRST.keypoints(state) @ other.extrinsics.rotation.T
         expected = other.camera.project(there + other.extrinsics.translation_m)
-        found = view.camera.project(cost.keypoints(view.states(state)))
+        keypoints_m = cost.keypoints(view.states(state))
+        first_m = CAMERA.with_pitch(BODY.camera_pose.pitch_rad).optical_to_reference(
+            FIRST.keypoints(state)
+        )
+        moved_m = view.camera.reference_to_optical(view.points(first_m))
+        np.testing.assert_allclose(moved_m, keypoints_m, atol=1e-6)
+        found = view.camera.project(keypoints_m)
         if view.turn is None:
             np.testing.assert_allclose(found, expected, atol=1e-6)
             continue
@@ -146,10 +152,16 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
         estimate = track(tracker, state, seeing)
         errors.append(error_cm(estimate, state))
         states.append(estimate.state)
+        ious = tracker.camera_ious()
+        assert [n for n, iou in enumerate(ious) if iou is not None] == list(seeing)
+        if len(seeing) == 1:
+            assert ious[seeing[0]] == pytest.approx(estimate.iou)
+    assert min(iou for iou in ious if iou is not None) > 0.8
     assert set(states[4:]) <= {TRACKING, UNCERTAIN}
     assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
     assert max(errors[4:]) < 20.0
     assert track(tracker, state_of(0.0), ()).state == NO_PERSON
+    assert tracker.camera_ious() == [None, None]
 
 
 def test_of_a_tracker_with_one_camera_nothing_is_different() -> None:
@@ -160,6 +172,7 @@ def test_of_a_tracker_with_one_camera_nothing_is_different() -> None:
         assert first.keypoints_m is not None
         assert second.keypoints_m is not None
         assert first.keypoints_m.tobytes() == second.keypoints_m.tobytes()
+    assert one.camera_ious() == []
 
 
 def test_what_does_not_fit_several_cameras_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""Several cameras of one recording: pairing by stamps, and topics below namespaces."""
+"""Several cameras of one recording, whose topics are below namespaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import yaml
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.cameras import CameraSources, open_recording, side_by_side
+from cardbox_tracker.recordings.cameras import CameraSources, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 
@@ -20,28 +20,6 @@ PERIOD_NS = 100_000_000
 LATER_NS = 8_000_000
 EMPTY = TimeSpan(0.0, 0.55)
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-
-
-def paired(*streams: list[int], tolerance: int = 5) -> list[tuple[int | None, ...]]:
-    return list(side_by_side([iter(s) for s in streams], int, tolerance))
-
-
-def test_what_is_near_belongs_together_and_nothing_is_used_twice() -> None:
-    assert paired([10, 20, 30], [11, 21, 31]) == [(10, 11), (20, 21), (30, 31)]
-    # One begins earlier, is silent for a while, and ends earlier.
-    assert paired([20, 30, 40, 50], [11, 21, 41]) == [
-        (None, 11),
-        (20, 21),
-        (30, None),
-        (40, 41),
-        (50, None),
-    ]
-    assert paired([10, 30], [12, 22, 32], [29]) == [
-        (10, 12, None),
-        (None, 22, None),
-        (30, 32, 29),
-    ]
-    assert paired([], [1]) == [(None, 1)]
 
 
 @pytest.fixture(scope="module")

@@ -105,6 +105,8 @@ def test_a_rectified_pair_has_its_baseline_in_p(rng: np.random.Generator) -> Non
     np.testing.assert_allclose(found.centre_m, [0.12, 0.0, 0.0], atol=1e-12)
     np.testing.assert_array_equal(found.rotation, np.eye(3))
     assert of_rectified_pair(info(), info(), "right") is None
+    with pytest.raises(CameraError, match=r"P and R of right's CameraInfo: .* no rotation"):
+        of_rectified_pair(info(), info(0.12, np.full((3, 3), 7.0)), "right")
     # Images that are not rectified stand as R says.
     left, right = (random_pose(rng).rotation for _ in range(2))
     found = of_rectified_pair(info(turn=left), info(0.12, right), "right")

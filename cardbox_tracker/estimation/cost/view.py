@@ -118,6 +118,11 @@ class View:
         moved: FloatArray = states @ self.turned + self.moved
         return moved
 
+    def points(self, points_m: FloatArray) -> FloatArray:
+        """Return points (..., 3) of the first camera's level frame in that of this one, metres."""
+        moved: FloatArray = points_m @ _about_vertical(self.yaw_rad).T + self.offset_m
+        return moved
+
     def upright(self, image: ImageArray, is_mask: bool = False) -> ImageArray:
         """Return an image (H, W) or (H, W, 3) of the camera turned upright."""
         if self.turn is None:

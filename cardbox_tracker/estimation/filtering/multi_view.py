@@ -161,6 +161,24 @@ class MultiViewFilter(WholeBodyFilter):
             ]
         )
 
+    def ious(self) -> list[float | None]:
+        """Return how well the last result covers each camera's silhouette of that frame.
+
+        Intersection over union; None of a camera that saw nobody, or before the first result.
+        """
+        if self._output is None:
+            return [None] * len(self._views.costs)
+        found: list[float | None] = []
+        for number, cost in enumerate(self._views.costs):
+            if number not in self._seeing:
+                found.append(None)
+                continue
+            state = self._views.to_views[number](self._output)
+            _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
+            both_px = float(cost.silhouette_px + drawn_px)
+            found.append(float((both_px - differ_px) / (both_px + differ_px)))
+        return found
+
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
         super().forget()

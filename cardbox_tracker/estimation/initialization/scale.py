@@ -7,7 +7,8 @@ camera's; where it fits there, it has its true size.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,45 @@ from cardbox_tracker.errors import BodyModelError, CameraError, InitializationEr
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.initialization.config import (
+    InitializationConfig,
+    InitializationResult,
+)
 from cardbox_tracker.vision.camera import Camera
 
 _LEAST, _MOST, _STEP = 0.5, 2.0, 0.005
 # A silhouette that differs from the body by more than this share of its pixels is another posture.
 _LARGEST_SHARE = 0.5
+
+SECOND_REFERENCES = ("front", "arms")
+"""Reference postures of which the second camera's silhouettes are needed."""
+
+
+def measured_with_second(
+    measure: Callable[[InitializationConfig, bool], InitializationResult],
+    config: InitializationConfig,
+    camera: Camera,
+    other: OtherCamera,
+    references: Mapping[str, NDArray[np.uint8]],
+) -> InitializationResult:
+    """Measure a person with one camera, and how far away they are with another.
+
+    Args:
+        measure: measures them with the first camera at the distance of the settings it is given;
+            called with False, then with True at the distance found.
+        config: settings; their distance is only where the search begins.
+        camera: the first camera, whatever its pitch.
+        other: the other camera.
+        references: its silhouettes, as for :func:`measured_scale`.
+
+    Raises:
+        InitializationError: as ``measure``, or the second camera does not show that person.
+    """
+    guessed = measure(config, False).body
+    pitched = camera.with_pitch(config.camera_pitch_rad)
+    scale = measured_scale(guessed, pitched, other, references)
+    # Again, since what no outline shows is taken from the proportions of people of that size.
+    return measure(replace(config, distance_m=scale * config.distance_m), True)
 
 
 def measured_scale(

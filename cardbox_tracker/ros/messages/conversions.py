@@ -140,10 +140,34 @@ def check_shape(
         )
 
 
-def camera_info_message(header: Header, camera: Camera) -> CameraInfo:
-    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size."""
+def camera_info_message(
+    header: Header, camera: Camera, source: CameraInfo | None = None
+) -> CameraInfo:
+    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size.
+
+    Of ``source``, the CameraInfo of the camera whose image it is, stays what R and P say of its
+    place in a stereo pair.
+    """
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
-    return _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+    message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+    if source is not None:
+        r, p = ([float(value) for value in values] for values in (source.r, source.p))
+        if np.isfinite(r).all() and any(r):
+            message.r = r
+        if min(p[0], p[5]) > 0:
+            at = camera.fx * (p[3] / p[0]), camera.fy * (p[7] / p[5])
+            if np.isfinite(at).all():
+                message.p[3], message.p[7] = at
+    return message
+
+
+def depth_camera_of(message: CameraInfo) -> Camera | None:
+    """Return the pinhole camera of a rectified depth image; None if its CameraInfo says none."""
+    p, width, height = np.array(message.p).reshape(3, 4), int(message.width), int(message.height)
+    if min(width, height) <= 0 or matrix_problem(p[:, :3], width, height):
+        return None
+    fx, fy, cx, cy = (float(p[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    return Camera(width, height, fx, fy, cx, cy)
 
 
 def calibration_message(header: Header, calibration: Calibration) -> CameraInfo:

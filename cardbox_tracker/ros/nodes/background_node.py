@@ -43,6 +43,7 @@ class BackgroundNode(CardboxNode):
         self._image: conversions.ImageArray | None = None
         self._image_bytes = 0
         self._covered = 0.0
+        self._info: CameraInfo | None = None
 
         self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
         self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
@@ -95,7 +96,7 @@ class BackgroundNode(CardboxNode):
                 f"the CameraInfo on {self._info_topic} has changed for good, to {calibration}"
             )
             self._kept.carry_over(self._pipeline.model)
-        self._image = None
+        self._image, self._info = None, message
         self._pipeline = SilhouettePipeline(
             calibration,
             (settings.width, settings.height),
@@ -157,7 +158,7 @@ class BackgroundNode(CardboxNode):
         # The silhouette first, so that the tracker does not wait for a CameraInfo that rarely
         # changes.
         self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
-        self._infos.publish(conversions.camera_info_message(header, pipeline.camera))
+        self._infos.publish(conversions.camera_info_message(header, pipeline.camera, self._info))
         self._covered = np.count_nonzero(silhouette) / silhouette.size
 
     def _values(self) -> dict[str, str]:

@@ -21,18 +21,19 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
 from cardbox_tracker.estimation.initialization.guidance import Guidance, Step, measuring
-from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import (
     answer_text,
     measured_message,
     refused_message,
 )
+from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.nodes.cancellation import Cancellation
 from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
 from cardbox_tracker.ros.nodes.saved_model import SavedModel
+from cardbox_tracker.ros.nodes.second_camera import SecondCamera, measured
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -58,12 +59,14 @@ class InitializerNode(CardboxNode):
         self._description = self.advertise(String, "robot_description", qos.LATCHED)
         self._result = self.advertise(DiagnosticStatus, "~/result", qos.LATCHED)
         self._guide = GuideOutputs(self)
-        self._topic = self.resolve("silhouette")
+        cameras = self.parameters.value.cameras
+        topic = silhouettes_of(cameras or [""])[0]
+        self._topic = self.resolve(topic)
+        self._second = SecondCamera(self, self.parameters.value) if len(cameras) > 1 else None
         self._references = ReferenceCapture(self._topic)
-        self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
-        add_image = self._references.add_image
-        self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
-        self.subscribe(Image, "silhouette", self._on_silhouette, qos.SILHOUETTE_INPUT)
+        self.subscribe(CameraInfo, f"{topic}/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
+        self.subscribe(Image, f"{topic}/image", self._references.add_image, qos.SILHOUETTE_INPUT)
+        self.subscribe(Image, topic, self._on_silhouette, qos.SILHOUETTE_INPUT)
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
         self.offer("~/cancel", self._cancellation.cancel)
@@ -100,6 +103,8 @@ class InitializerNode(CardboxNode):
 
     def _capture(self, name: str) -> str:
         given = self.parameters.value
+        if self._second is not None and given.measure_distance:
+            self._second.capture(name, given.capture_frames, self._references.latest_ns)
         return self._references.capture(name, given.capture_frames, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -126,7 +131,10 @@ class InitializerNode(CardboxNode):
 
     def _measure(self) -> str:
         settings, references = self.parameters.value, self._references
+        second = self._second if settings.measure_distance else None
         references.check_running()
+        if second is not None:
+            second.check()
         before = dict(references.captured), dict(references.images)
         try:
             Guidance(self._show, self._capture, self._cancellation.wait).run(
@@ -137,9 +145,7 @@ class InitializerNode(CardboxNode):
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
                     "silhouettes from the background node, which publishes it"
                 )
-            result = initialize_body(
-                references.captured, camera, settings.config(), self._progress, references.images
-            )
+            result = measured(references, second, camera, settings.config(), self._progress)
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
             references.captured, references.images = before

@@ -12,6 +12,7 @@ from cardbox_tracker.estimation.initialization.config import (
     MAX_PITCH_RAD,
     InitializationConfig,
 )
+from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.nodes.input_parameters import CameraParameters, PlayBagParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
@@ -19,6 +20,7 @@ from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.encodings import MOST_PIXELS
 from cardbox_tracker.vision.learning import WAYS
+from cardbox_tracker.vision.pairing import camera_names
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
 _NEXT_LEARNING = "next learning"
@@ -151,6 +153,19 @@ class InitializerParameters(NodeParameters):
         "torso_place",
         effect=_NEXT_MEASUREMENT,
     )
+
+    cameras: list[str] = cameras_parameter()
+    extrinsics_file: str = extrinsics_parameter()
+    measure_distance: bool = parameter(
+        True,
+        "with two cameras or more, the second one measures how far away the person is; false: "
+        "person_distance_m is that",
+        effect=_NEXT_MEASUREMENT,
+    )
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        camera_names(self.cameras)
 
     def config(self) -> InitializationConfig:
         """Return the settings of the core."""

@@ -24,11 +24,27 @@ from cardbox_tracker.ros.messages.conversions import (
 from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Camera
 
-# As many as the parameter capture_frames allows.
-_KEPT = 30
-# Older silhouettes may show the posture before.
-_ONE_POSTURE_NS = 1_000_000_000
+KEPT = 30
+"""Silhouettes that are kept: as many as the parameter capture_frames allows."""
+ONE_POSTURE_NS = 1_000_000_000
+"""Older silhouettes may show the posture before."""
 _OLD_S = 2.0
+
+
+def alike_of(recent: RecentImages, frames: int) -> list[Image]:
+    """Return those of the latest ``frames`` that show the posture, and have the size, of the last.
+
+    At least one is there.
+    """
+    messages = list(recent)[-frames:]
+    latest = messages[-1]
+    now_ns = stamp_ns(latest.header.stamp)
+    return [
+        message
+        for message in messages
+        if (message.width, message.height) == (latest.width, latest.height)
+        and 0 <= now_ns - stamp_ns(message.header.stamp) <= ONE_POSTURE_NS
+    ]
 
 
 class ReferenceCapture:
@@ -44,8 +60,8 @@ class ReferenceCapture:
         self.captured: dict[str, Silhouette] = {}
         self.images: dict[str, list[ImageArray]] = {}
         self._topic = topic
-        self._recent = RecentImages(_KEPT)
-        self._recent_images = RecentImages(_KEPT)
+        self._recent = RecentImages(KEPT)
+        self._recent_images = RecentImages(KEPT)
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
@@ -67,6 +83,12 @@ class ReferenceCapture:
         stamp = stamp_ns(message.header.stamp)
         images = reversed(self._recent_images)
         return next((image for image in images if stamp_ns(image.header.stamp) == stamp), None)
+
+    @property
+    def latest_ns(self) -> int | None:
+        """Stamp of the latest silhouette; None before the first one."""
+        latest = next(reversed(self._recent), None)
+        return None if latest is None else stamp_ns(latest.header.stamp)
 
     @property
     def missing(self) -> list[str]:
@@ -96,15 +118,7 @@ class ReferenceCapture:
                 another of the postures.
         """
         self.check_running()
-        messages = list(self._recent)[-frames:]
-        latest = messages[-1]
-        now_ns = stamp_ns(latest.header.stamp)
-        alike = [
-            message
-            for message in messages
-            if (message.width, message.height) == (latest.width, latest.height)
-            and 0 <= now_ns - stamp_ns(message.header.stamp) <= _ONE_POSTURE_NS
-        ]
+        alike = alike_of(self._recent, frames)
         silhouettes = [silhouette_of(message) for message in alike]
         silhouette = average_silhouette(silhouettes)
         check_reference(name, silhouette)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,14 @@ from std_msgs.msg import String
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.camera_views import Seen
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
+from cardbox_tracker.ros.nodes.several_cameras import SeveralCameras
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
@@ -44,22 +48,30 @@ class TrackerNode(CardboxNode):
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._tracker: Tracker | None = None
+        self._others: Sequence[OtherCamera] = ()
+        self._several: SeveralCameras | None = None
 
         self._outputs = TrackerOutputs(self, self.parameters.value)
         self._model_topic = self.resolve("body_model")
-        self._silhouette_topic = self.resolve("silhouette")
-        self._info_topic = self.resolve("silhouette/camera_info")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
-        self.subscribe(CameraInfo, "silhouette/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
-        self._pairing = ImagePairing(self._on_silhouette)
-        if self.parameters.value.use_image:
-            add_image = self._pairing.add_image
-            self.subscribe(Image, "silhouette/image", add_image, qos.SILHOUETTE_INPUT)
-        add_silhouette = self._pairing.add_silhouette
-        self.subscribe(Image, "silhouette", add_silhouette, qos.SILHOUETTE_INPUT)
+        self._pairing: ImagePairing | SeveralCameras
+        settings = self.parameters.value
+        if settings.cameras or settings.depth:
+            several = SeveralCameras(self, settings, self._on_cameras, self._on_views)
+            self._pairing = self._several = several
+            self._silhouette_topic, self._info_topic = several.source, several.missing
+        else:
+            info = "silhouette/camera_info"
+            self._silhouette_topic, self._info_topic = map(self.resolve, ("silhouette", info))
+            self.subscribe(CameraInfo, info, self._on_info, qos.SILHOUETTE_INPUT)
+            self._pairing = pairing = ImagePairing(self._on_silhouette)
+            if settings.use_image:
+                image = "silhouette/image"
+                self.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
+            self.subscribe(Image, "silhouette", pairing.add_silhouette, qos.SILHOUETTE_INPUT)
         self.offer("~/reset", self._reset)
         self.diagnostics.source = f"silhouettes on {self._silhouette_topic}"
-        self._report = TrackerReport(self)
+        self._report = TrackerReport(self, self._several)
         if self.parameters.value.model_file:
             self._use(load_body_model(user_path(self.parameters.value.model_file)))
         self._wait()
@@ -71,9 +83,10 @@ class TrackerNode(CardboxNode):
                 "model_file)"
             )
         elif self._camera is None:
+            info_topic = self._info_topic if self._several is None else self._several.missing
             self.diagnostics.wait_for(
                 f"silhouettes on {self._silhouette_topic} and their CameraInfo on "
-                f"{self._info_topic} (is the background node running, and has it learned?)"
+                f"{info_topic} (is the background node running, and has it learned?)"
             )
 
     def _changed(self, settings: TrackerParameters) -> None:
@@ -104,6 +117,11 @@ class TrackerNode(CardboxNode):
             self._camera = camera
             self._build("new camera")
 
+    def _on_cameras(self, first: Camera | None, others: Sequence[OtherCamera]) -> None:
+        self._camera, self._others = first, others
+        self._tracker = None
+        self._build("new cameras")
+
     def _build(self, reason: str) -> None:
         """Set the tracker up for the body, the camera and the parameters of now.
 
@@ -113,8 +131,10 @@ class TrackerNode(CardboxNode):
             return
         settings = self.parameters.value
         rng = np.random.default_rng(settings.seed)
-        self._tracker = Tracker(self._body, self._camera, settings.config(), rng)
-        self._report.start()
+        self._tracker = Tracker(
+            self._body, self._camera, settings.config(), rng, others=self._others
+        )
+        self._report.start(self._body)
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
@@ -126,13 +146,16 @@ class TrackerNode(CardboxNode):
         self._build("reset")
         return "tracking starts again from the front reference posture"
 
-    def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
-        header = message.header
-        step = self.diagnostics.input.add(conversions.stamp_ns(header.stamp))
-        if not step.is_usable:
-            return
+    def _is_next(self, message: Image) -> bool:
+        """Return whether a silhouette can be used; one of a time before starts tracking anew."""
+        step = self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
         if step is Step.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
+        return step.is_usable
+
+    def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
+        if not self._is_next(message):
+            return
         if self._tracker is None or self._body is None or self._camera is None:
             self._wait()
             self._outputs.waiting(message, seen, "no body model yet: call initializer/initialize")
@@ -145,14 +168,27 @@ class TrackerNode(CardboxNode):
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
         image = conversions.image_behind(silhouette, seen)
-        before = self._tracker.body
         estimate = self._tracker.track(silhouette, image)
-        if self._tracker.body is not before:
-            self.get_logger().info(f"fitted to the person in the image:\n{self._tracker.body}")
         picture = silhouette if image is None else image
-        self._outputs.publish(header, estimate, picture, self._tracker)
-        self._report.add(estimate)
+        self._outputs.publish(message.header, estimate, picture, self._tracker)
+        self._report.add(estimate, self._tracker.body)
         self.diagnostics.working(sent_ns)
+
+    def _on_views(self, lead: Image, seen: Sequence[Seen | None]) -> None:
+        assert self._several is not None
+        if not self._is_next(lead):
+            return
+        if self._tracker is None:
+            self._several.check()
+            self._wait()
+            self._outputs.waiting(lead, None, "no body model yet: call initializer/initialize")
+            return
+        views = self._several.views(seen)
+        estimate = self._tracker.track_views(views.silhouettes, views.images, views.depth_m)
+        self._outputs.publish(views.header, estimate, views.picture, self._tracker)
+        self._report.add(estimate, self._tracker.body)
+        self._several.done(views, estimate, self._tracker)
+        self.diagnostics.working(views.sent_ns)
 
 
 def main(args: list[str] | None = None) -> int:

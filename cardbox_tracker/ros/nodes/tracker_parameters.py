@@ -7,7 +7,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
+from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
     RESTARTS,
     NodeParameters,
@@ -15,6 +17,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     shared,
 )
 from cardbox_tracker.settings import settings_of
+from cardbox_tracker.vision.pairing import camera_names
 
 _NEXT_START = "next start of tracking"
 
@@ -123,9 +126,20 @@ class TrackerParameters(NodeParameters):
         read_only=True,
     )
 
+    cameras: list[str] = cameras_parameter()
+    extrinsics_file: str = extrinsics_parameter()
+    depth: str = parameter(
+        "",
+        "topic of depth images (16UC1 or 32FC1) from where the first camera is, of its view or "
+        "with a CameraInfo on TOPIC/camera_info; empty: none",
+        read_only=True,
+    )
+
     def config(self) -> TrackerConfig:
         """Return the settings of the core; raises ValueError where they do not go together."""
         base = PRESETS[self.preset]()
+        if self.depth:
+            base = replace(base, terms=(*base.terms, Depth()))
         if self.particles:
             base = base.with_particles(self.particles)
         return replace(
@@ -152,6 +166,12 @@ class TrackerParameters(NodeParameters):
     def check(self) -> None:
         """Raise ValueError where values do not go together."""
         config = self.config()
+        if (len(self.cameras) > 1 or self.depth) and config.filter != "whole_body":
+            raise ValueError(
+                f"several cameras and depth need the preset default, but it is {self.preset}, "
+                "which has one outline"
+            )
+        camera_names(self.cameras)
         most = max(config.torso.particles, config.arm.particles)
         if most * config.cycles > MOST_MOVES:
             raise ValueError(

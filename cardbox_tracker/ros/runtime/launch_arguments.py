@@ -14,7 +14,7 @@ from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError, quoted
 
-Value = bool | int | float | str | list[float]
+Value = bool | int | float | str | list[float] | list[str]
 
 _EXPECTED = {
     bool: "true or false",
@@ -35,7 +35,8 @@ class Argument:
         kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
         choices: the texts that are allowed; empty: any.
         limits: lowest and highest number that is allowed.
-        name: True if its value must be a letter, then letters, digits and underscores, or empty.
+        name: True if its value must be a letter, then letters, digits and underscores, or empty;
+            of a list, each of them, and all different.
     """
 
     default: str | None
@@ -55,6 +56,8 @@ class Argument:
         lowest, highest = self.limits or (-math.inf, math.inf)
         if self.limits is not None:
             expected += f" from {lowest:g} to {highest:g}"
+        if self.name and self.kind is list:
+            return _names(text)
         if self.name:
             expected = "a letter, then letters, digits and underscores, or nothing"
         found = _parsed(self.kind, text.strip())
@@ -104,6 +107,16 @@ def _parsed(kind: type, text: str) -> Value | None:
         except ValueError:
             return None
     return text
+
+
+def _names(text: str) -> list[str]:
+    """Return the names in a list such as [left, right]; raise ValueError if it is none."""
+    words = text.strip().removeprefix("[").removesuffix("]").split(",")
+    names = [word.strip().strip("/") for word in words if word.strip()]
+    wrong = [name for name in names if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII)]
+    if wrong or len(set(names)) < len(names):
+        raise ValueError("a list of different names such as [left, right], or nothing")
+    return names
 
 
 def _number(text: str) -> float | None:

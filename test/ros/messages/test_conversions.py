@@ -53,6 +53,37 @@ def test_an_image_is_not_much_larger_than_its_camera_info_says() -> None:
         conversions.image_of(raw, 2000)
 
 
+def test_a_working_camera_keeps_its_place_in_a_stereo_pair() -> None:
+    turned = [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    source = conversions.camera_info_message(HEADER, CAMERA.scaled(640, 480))
+    source.p[3], source.r = -0.12 * source.p[0], turned
+    message = conversions.camera_info_message(HEADER, CAMERA, source)
+    assert message.p[3] / message.p[0] == pytest.approx(-0.12)
+    assert list(message.r) == turned
+    assert conversions.camera_of(message) == CAMERA
+
+
+@pytest.mark.parametrize("place", [(0.0, 1.0), (1e-300, 1e300), (1.0, np.nan), (np.inf, 1.0)])
+def test_what_is_no_stereo_pair_changes_nothing(place: tuple[float, float]) -> None:
+    source = info()
+    source.p[0], source.p[3] = place
+    source.r[4] = np.nan
+    message = conversions.camera_info_message(HEADER, CAMERA, source)
+    assert np.isfinite(message.p).all()
+    assert np.isfinite(message.r).all()
+    if not np.isfinite(source.p).all() or source.p[0] < 1e-9:
+        assert message == info()
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 1e-300, 1e300])
+def test_a_depth_camera_is_one_or_none(value: float) -> None:
+    message = info()
+    assert conversions.depth_camera_of(message) == CAMERA
+    message.p[5] = value
+    assert conversions.depth_camera_of(message) is None
+    assert conversions.depth_camera_of(CameraInfo(p=info().p)) is None
+
+
 def test_silhouette_goes_and_comes_back_without_a_copy() -> None:
     silhouette = np.zeros((240, 320), np.uint8)
     silhouette[50:200, 100:150] = 255

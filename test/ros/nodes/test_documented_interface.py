@@ -122,8 +122,11 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
             bag.write_camera_info(BAG_TOPIC, 1, "camera", session_camera())
         return [make(PlayBagNode, bag=str(folder / "bag"))]
     if name == "tracker":
-        return [make(TrackerNode, rep155_id="ID")]
-    return [make(InitializerNode)]
+        return [
+            make(TrackerNode, rep155_id="ID"),
+            make(TrackerNode, cameras=["CAMERA"], depth="DEPTH"),
+        ]
+    return [make(InitializerNode), make(InitializerNode, cameras=["CAMERA"])]
 
 
 @pytest.mark.parametrize("name", NODES)

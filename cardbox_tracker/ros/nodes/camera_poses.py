@@ -1,0 +1,183 @@
+"""Working cameras and where they stand, from what arrives: CameraInfo, /tf_static, and a file.
+
+The package tf2_msgs may be missing: then ``/tf_static`` is not read, and the texts say so.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from sensor_msgs.msg import CameraInfo
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.files import user_path
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.extrinsics_files import load_extrinsics
+from cardbox_tracker.vision.extrinsics_sources import (
+    FrameTransform,
+    choose,
+    of_rectified_pair,
+    of_transforms,
+    transforms_of,
+)
+
+_STATIC_TOPIC = "/tf_static"
+# A robot has some hundred; anybody may send more.
+_MOST_TRANSFORMS = 1000
+# Two extrinsics that differ by less are the same, read again.
+_SAME_RAD, _SAME_M = 1e-5, 1e-5
+
+
+def silhouettes_of(cameras: Sequence[str]) -> list[str]:
+    """Return the topic of each camera's silhouettes; that of the node's own namespace for ""."""
+    return [f"{camera.rstrip('/')}/silhouette" if camera else "silhouette" for camera in cameras]
+
+
+class CameraPoses:
+    """The cameras of one person, the first one first.
+
+    Attributes:
+        names: their namespaces.
+        others: the further cameras; empty until everything is known.
+        frame_id: the first camera's optical frame.
+    """
+
+    def __init__(
+        self, node: CardboxNode, cameras: Sequence[str], file: str, changed: Callable[[], None]
+    ) -> None:
+        """Listen with ``node``, and call ``changed`` when cameras are known or others than before.
+
+        Raises:
+            CardboxError: ``file`` is no extrinsics of these cameras, or a name no namespace.
+        """
+        self.names = [camera.strip("/") for camera in cameras]
+        self.others: list[OtherCamera] = []
+        self._changed = changed
+        self._cameras: list[Camera | None] = [None] * len(self.names)
+        self._infos: list[CameraInfo | None] = [None] * len(self.names)
+        self._transforms: dict[tuple[str, str], FrameTransform] = {}
+        self._of_file = load_extrinsics(user_path(file), self.names) if file else {}
+        self._problem = ""
+        self._topics = [node.resolve(f"{topic}/camera_info") for topic in silhouettes_of(cameras)]
+        for number, topic in enumerate(self._topics):
+            node.subscribe(CameraInfo, topic, partial(self._on_info, number), qos.SILHOUETTE_INPUT)
+        self._reads_transforms = True
+        if len(self.names) > 1:
+            kind = _transforms_message()
+            self._reads_transforms = kind is not None
+            if kind is not None:
+                node.subscribe(kind, _STATIC_TOPIC, self._on_transforms, qos.STATIC_TRANSFORMS)
+
+    @property
+    def first(self) -> Camera | None:
+        """The first camera, once all are known and where they stand."""
+        is_known = len(self.others) == len(self.names) - 1
+        return self._cameras[0] if is_known else None
+
+    @property
+    def frame_id(self) -> str:
+        """Name of the first camera's optical frame; empty before it is known."""
+        return "" if self._infos[0] is None else str(self._infos[0].header.frame_id)
+
+    @property
+    def missing(self) -> list[str]:
+        """Topics of CameraInfo on which nothing was received yet."""
+        pairs = zip(self._topics, self._cameras, strict=True)
+        return [topic for topic, camera in pairs if camera is None]
+
+    def check(self) -> None:
+        """Raise CameraError if all cameras are there, but not where they stand."""
+        if self._problem:
+            raise CameraError(self._problem)
+
+    def _on_info(self, number: int, message: CameraInfo, _: int) -> None:
+        before = self._infos[number]
+        if before is not None and _is_same(before, message):
+            return
+        self._cameras[number] = conversions.camera_of(message)
+        self._infos[number] = message
+        self._find(is_new=True)
+
+    def _on_transforms(self, message: Any, _: int) -> None:
+        for transform in transforms_of(message):
+            ends = transform.parent, transform.child
+            if ends in self._transforms or len(self._transforms) < _MOST_TRANSFORMS:
+                self._transforms[ends] = transform
+        self._find(is_new=False)
+
+    def _find(self, is_new: bool) -> None:
+        """Find where the cameras stand; ``is_new``: one of them is another than before."""
+        if None in self._cameras:
+            return
+        try:
+            found = self._extrinsics()
+        except CameraError as error:
+            self._problem, self.others = str(error), []
+            self._changed()
+            return
+        self._problem = ""
+        before = [other.extrinsics for other in self.others]
+        if not is_new and len(before) == len(found) and all(map(_are_same, before, found)):
+            return
+        self.others = [
+            OtherCamera(camera, extrinsics)
+            for camera, extrinsics in zip(self._cameras[1:], found, strict=True)
+            if camera is not None
+        ]
+        self._changed()
+
+    def _extrinsics(self) -> list[Extrinsics]:
+        first, *others = (info for info in self._infos if info is not None)
+        transforms = list(self._transforms.values())
+        frames = [str(info.header.frame_id).lstrip("/") for info in (first, *others)]
+        try:
+            return [
+                choose(
+                    [
+                        of_rectified_pair(first, info, name),
+                        of_transforms(transforms, frames[0], frame),
+                        self._of_file.get(name),
+                    ],
+                    self.names[0],
+                    name,
+                )
+                for name, info, frame in zip(self.names[1:], others, frames[1:], strict=True)
+            ]
+        except CameraError as error:
+            if self._reads_transforms:
+                raise
+            raise CameraError(
+                f"{error} ({_STATIC_TOPIC} is not read: the package tf2_msgs is not installed)"
+            ) from None
+
+
+def _is_same(one: CameraInfo, other: CameraInfo) -> bool:
+    """Whether two CameraInfo of a silhouette say the same, at whatever time."""
+    return (one.width, one.height, one.header.frame_id) == (
+        other.width,
+        other.height,
+        other.header.frame_id,
+    ) and all(
+        list(getattr(one, name)) == list(getattr(other, name)) for name in ("k", "d", "r", "p")
+    )
+
+
+def _are_same(one: Extrinsics, other: Extrinsics) -> bool:
+    angle_rad, distance_m = one.difference(other)
+    return angle_rad < _SAME_RAD and distance_m < _SAME_M
+
+
+def _transforms_message() -> Any:
+    """Return the message class of transforms, or None where it is not installed."""
+    try:
+        return importlib.import_module("tf2_msgs.msg").TFMessage
+    except ImportError:
+        return None

@@ -1,0 +1,144 @@
+"""What a second camera adds to a measurement: how far away the person is, and so their size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sensor_msgs.msg import Image
+
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.config import (
+    InitializationConfig,
+    InitializationResult,
+)
+from cardbox_tracker.estimation.initialization.measure import initialize_body
+from cardbox_tracker.estimation.initialization.references import Silhouette, average_silhouette
+from cardbox_tracker.estimation.initialization.scale import (
+    SECOND_REFERENCES,
+    measured_with_second,
+)
+from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
+from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
+from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.reference_capture import (
+    KEPT,
+    ONE_POSTURE_NS,
+    ReferenceCapture,
+    alike_of,
+)
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.ros.runtime.recent import RecentImages
+from cardbox_tracker.vision.camera import Camera
+
+Progress = Callable[[float], None]
+"""Takes the fraction of a measurement that is done."""
+
+Measure = Callable[[InitializationConfig, Progress], InitializationResult]
+
+
+class SecondCamera:
+    """Captures the reference postures as the second of several cameras sees them."""
+
+    def __init__(self, node: CardboxNode, settings: InitializerParameters) -> None:
+        """Subscribe with ``node``, the initializer, to the first two of its ``cameras``.
+
+        Raises:
+            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+        """
+        cameras = settings.cameras[:2]
+        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, lambda: None)
+        self._recent = RecentImages(KEPT)
+        self._captured: dict[str, Silhouette] = {}
+        topic = silhouettes_of(cameras)[1]
+        self._topic = node.resolve(topic)
+        node.subscribe(Image, topic, self._add, qos.SILHOUETTE_INPUT)
+
+    def _add(self, message: Image, _: int) -> None:
+        silhouette_of(message)
+        self._recent.append(message)
+
+    def check(self) -> None:
+        """Check that it can measure, before anybody poses.
+
+        Raises:
+            CameraError: nothing says where the cameras stand, or two sources disagree.
+            InitializationError: a camera is not there.
+        """
+        self._poses.check()
+        if self._poses.first is None or not self._recent:
+            raise InitializationError(
+                f"no silhouette was received yet on {self._topic}, or no CameraInfo of a camera; "
+                "with two cameras the second one measures how far away the person is: start its "
+                "background node, or give person_distance_m and set measure_distance to false"
+            )
+
+    def capture(self, name: str, frames: int, now_ns: int | None) -> None:
+        """Keep what this camera saw of the reference ``name``, if it is needed.
+
+        Args:
+            name: of the reference.
+            frames: silhouettes to combine at most.
+            now_ns: stamp of the first camera's latest silhouette.
+
+        Raises:
+            InitializationError: this camera has nothing of that time.
+        """
+        if name not in SECOND_REFERENCES or now_ns is None:
+            return
+        alike = alike_of(self._recent, frames) if self._recent else []
+        if not alike or abs(stamp_ns(alike[-1].header.stamp) - now_ns) > ONE_POSTURE_NS:
+            raise InitializationError(
+                f"reference '{name}': nothing has come on {self._topic} at the time of the first "
+                "camera's silhouettes; is the second camera running, and its background node?"
+            )
+        self._captured[name] = average_silhouette([silhouette_of(message) for message in alike])
+
+    def measure(
+        self, measure: Measure, config: InitializationConfig, progress: Progress
+    ) -> InitializationResult:
+        """Measure a person with the first camera, and their distance with this one.
+
+        Args:
+            measure: measures at the distance of the settings it is given.
+            config: settings; the search begins at their distance.
+            progress: called with the fraction that is done.
+
+        Raises:
+            InitializationError: as ``measure``, or this camera does not show that person.
+        """
+        self.check()
+        first = self._poses.first
+        assert first is not None
+        missing = [name for name in SECOND_REFERENCES if name not in self._captured]
+        if missing:
+            raise InitializationError(
+                f"the second camera has no reference {', '.join(missing)}: it was captured while "
+                "measure_distance was false; capture it again"
+            )
+
+        def half(at: InitializationConfig, is_last: bool) -> InitializationResult:
+            return measure(at, lambda fraction: progress(0.5 * (fraction + is_last)))
+
+        return measured_with_second(half, config, first, self._poses.others[0], self._captured)
+
+
+def measured(
+    references: ReferenceCapture,
+    second: SecondCamera | None,
+    camera: Camera,
+    config: InitializationConfig,
+    progress: Progress,
+) -> InitializationResult:
+    """Measure the person of ``references`` with the first ``camera``, and with ``second`` if any.
+
+    Raises:
+        InitializationError: they are unusable, or the model does not fit them.
+    """
+
+    def measure(at: InitializationConfig, done: Progress) -> InitializationResult:
+        return initialize_body(references.captured, camera, at, done, references.images)
+
+    if second is None:
+        return measure(config, progress)
+    return second.measure(measure, config, progress)

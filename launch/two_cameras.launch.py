@@ -1,0 +1,108 @@
+"""Two cameras that see one person: from their images to joint states, TF and markers.
+
+    ros2 launch cardbox_tracker two_cameras.launch.py \
+        first_device:=/dev/video0 first_calibration_file:=$HOME/first.yaml \
+        second_device:=/dev/video2 second_calibration_file:=$HOME/second.yaml \
+        extrinsics_file:=$HOME/camchain.yaml
+
+The person faces the first one for the reference postures. Without devices the cameras are drivers
+of your own, which publish cam0/image_raw, cam0/camera_info and the same of cam1. A recording of
+both is played with replay.launch.py and cameras:="[cam0, cam1]".
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    SetLaunchConfiguration,
+)
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+
+SHARE = Path(get_package_share_directory("cardbox_tracker"))
+ORDER = ("first", "second")
+ARGUMENTS = {
+    "first": Argument("cam0", "namespace of the camera that the person faces", name=True),
+    "second": Argument("cam1", "namespace of the other one", name=True),
+    "first_device": Argument("", "its V4L2 device; empty: a driver of your own"),
+    "second_device": Argument("", "the same of the second camera"),
+    "first_calibration_file": Argument("", "its YAML file of camera_calibration", Path),
+    "second_calibration_file": Argument("", "the same of the second camera", Path),
+    "width": Argument("640", "width to ask the devices for, px", int, limits=(32, 8192)),
+    "height": Argument("480", "height to ask the devices for, px", int, limits=(32, 8192)),
+    "rate_hz": Argument("15.0", "images a second", float, limits=(0.0, 240.0)),
+}
+# The camera node's parameters of the same names.
+OF_BOTH = ("width", "height", "rate_hz")
+
+
+def generate_launch_description() -> LaunchDescription:
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
+                for name, a in ARGUMENTS.items()
+            ),
+            # What is wrong has to be found before the first node runs.
+            OpaqueFunction(function=_check),
+            # First, since it sets the environment and declares what the others use as well.
+            IncludeLaunchDescription(
+                PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
+            ),
+            OpaqueFunction(function=_cameras),
+        ]
+    )
+
+
+def _check(context: LaunchContext) -> list[object]:
+    given = context.launch_configurations
+    typed = values(ARGUMENTS, given)
+    names = [str(typed[one]) for one in ORDER]
+    if not all(names) or len(set(names)) < len(names):
+        raise ValueError(
+            f"launch arguments first and second are '{names[0]}' and '{names[1]}'; expected two "
+            "different namespaces"
+        )
+    devices = [typed[f"{one}_device"] for one in ORDER]
+    if any(devices) and (devices[0] == devices[1] or not all(devices)):
+        raise ValueError(
+            f"launch arguments first_device and second_device are '{devices[0]}' and "
+            f"'{devices[1]}'; expected two different devices, or none"
+        )
+    return [SetLaunchConfiguration("cameras", f"[{', '.join(names)}]")]
+
+
+def _cameras(context: LaunchContext) -> list[object]:
+    typed = values(ARGUMENTS, context.launch_configurations)
+    return [
+        Node(
+            package="cardbox_tracker",
+            executable="camera",
+            name="camera",
+            namespace=[LaunchConfiguration("namespace"), "/", str(typed[one])],
+            parameters=[
+                [LaunchConfiguration("config_dir"), "/camera.yaml"],
+                {name: typed[name] for name in OF_BOTH}
+                | {
+                    # Keeps launch from reading a text as a number or as nothing.
+                    name: ParameterValue(text, value_type=str)
+                    for name, text in (
+                        ("device", typed[f"{one}_device"]),
+                        ("calibration_file", typed[f"{one}_calibration_file"]),
+                        ("frame_id", f"{typed[one]}_optical_frame"),
+                    )
+                },
+            ],
+            output="screen",
+        )
+        for one in ORDER
+        if typed[f"{one}_device"]
+    ]
