@@ -46,11 +46,15 @@ class Nodes:
         self._logs = logs
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, name: str, *arguments: str) -> None:
-        """Start the executable ``name`` of this package, see ``start.NODES``."""
+    def start(self, name: str, *arguments: str, called: str = "") -> None:
+        """Start the executable ``name`` of this package, see ``start.NODES``.
+
+        Several of one name need different names here, which ``called`` gives them.
+        """
         # -P: in a checkout, too, the installed package is run, whose kernels are compiled already.
-        with (self._logs / f"{name}.log").open("wb") as log:
-            self._processes[name] = subprocess.Popen(
+        called = called or name
+        with (self._logs / f"{called}.log").open("wb") as log:
+            self._processes[called] = subprocess.Popen(
                 [sys.executable, "-P", "-m", "cardbox_tracker.start", name, *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
