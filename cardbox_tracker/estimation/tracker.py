@@ -16,6 +16,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
@@ -78,7 +79,11 @@ class Estimate:
 
 
 class Tracker:
-    """Tracks one measured person before one camera (paper, algorithm "Online Motion Tracking")."""
+    """Tracks one measured person (paper, algorithm "Online Motion Tracking").
+
+    Attributes:
+        agreement: whether several cameras stand where their extrinsics say; None of one camera.
+    """
 
     def __init__(
         self,
@@ -126,6 +131,8 @@ class Tracker:
         self._further = [
             FurtherCamera(body, self.camera, other, self.config) for other in self._others
         ]
+        views = [further.view for further in self._further]
+        self.agreement = CameraAgreement(body, self.camera, views) if views else None
         self.reset()
 
     def _built(self, config: TrackerConfig) -> list[Term]:
@@ -254,6 +261,9 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
+        if self.agreement is not None and fit.offset_m is not None:
+            seen = [other.silhouette for other in self._others_now]
+            self.agreement.see(self._before, frame.silhouette, seen)
         return Estimate(
             UNCERTAIN if fit.is_uncertain else TRACKING,
             fit.posture,
