@@ -66,15 +66,19 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the recording or a span cannot be used, no pose fits, or the file cannot be
             written.
     """
+    from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.calibrate import calibrate_recording
     from cardbox_tracker.vision.extrinsics_files import save_camchain
 
     check_outputs((options.output,), options.force, inputs=(options.recording,))
+    pitch_rad = math.radians(options.camera_pitch_deg)
+    # An impossible distance or pitch is refused by its own name.
+    BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
     config = InitializationConfig(
         distance_m=options.distance,
-        camera_pitch_rad=math.radians(options.camera_pitch_deg),
+        camera_pitch_rad=pitch_rad,
         side_turn=options.side_turn,
         seed=options.seed,
     )
