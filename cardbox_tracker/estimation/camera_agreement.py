@@ -31,6 +31,8 @@ DOUBTFUL_DEG = 0.85
 # Every so many frames one is kept, so many make a window: 12 s at 15 images a second. The first one
 # is checked, then every fourth.
 _EVERY, _WINDOW, _AGAIN = 12, 15, 60
+# Frames of which a short recording is judged.
+_LEAST = 8
 _STEPS = 4
 # Windows of whose results the median is said.
 _REMEMBERED = 3
@@ -74,10 +76,16 @@ class CameraAgreement:
         """Whether a window of new frames is there for :meth:`check`."""
         return any(count <= 0 for count in self._missing)
 
-    def check(self) -> None:
-        """Estimate how the cameras are turned that have a new window."""
+    def check(self, is_last: bool = False) -> None:
+        """Estimate how the cameras are turned that have a new window.
+
+        Args:
+            is_last: no more frames come, so that a camera without a window is judged by the frames
+                that there are, if they are not too few.
+        """
         for number, view in enumerate(self._views):
-            if self._missing[number] > 0:
+            is_enough = is_last and not self._found[number] and len(self._kept[number]) >= _LEAST
+            if self._missing[number] > 0 and not is_enough:
                 continue
             self._missing[number] = _AGAIN
             self._found[number].append(self._turn_of(view, list(self._kept[number])))

@@ -119,6 +119,7 @@ def track_recording(
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks: list[str] = []
     if isinstance(source, CameraSources) and tracker.agreement is not None:
+        tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(source.cameras[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
 

@@ -108,7 +108,13 @@ def test_nothing_is_said_of_a_camera_before_a_window_of_frames() -> None:
     asked = agreement(TRUE, 5)
     assert not asked.is_due
     asked.check()
+    asked.check(is_last=True)
     assert asked.turned_deg == [None]
+    short = agreement(TRUE, 8)
+    short.check()
+    assert short.turned_deg == [None]
+    short.check(is_last=True)
+    assert short.turned_deg != [None]
     # One that never sees the person is not waited for.
     asked.see(waving(1)[0], np.full((240, 320), 255, np.uint8), [None])
     assert not asked.is_due
