@@ -27,6 +27,7 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
@@ -125,6 +126,7 @@ def running(folder: Path, domain: int | None = None) -> Iterator[tuple[Any, tupl
         BackgroundNode: {},
         InitializerNode: {},
         TrackerNode: {},
+        StereoDepthNode: {},
     }
     make: Any = Parameter
     made = []

@@ -5,11 +5,20 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+
+
+REFERENCES = {
+    "front": "faces the camera, arms hanging 20 degrees away from the body",
+    "side": "stands the same, turned by 90 degrees",
+    "arms": "faces the camera, both arms stretched sideways, hands open",
+}
+"""Names of the reference postures, and what the person does in them."""
 
 
 def add_recording(parser: argparse.ArgumentParser) -> None:
@@ -24,9 +33,29 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def print_remarks(source: SilhouetteSource) -> None:
-    """Tell what is odd about a recording on the standard error."""
-    for remark in source.remarks:
+def add_references(parser: argparse.ArgumentParser) -> None:
+    """Add the spans of the reference postures, and ``--side-turn``."""
+    from cardbox_tracker.body.posture import SIDE_TURNS
+
+    for name, posture in REFERENCES.items():
+        parser.add_argument(
+            f"--{name}",
+            type=span,
+            required=True,
+            metavar="T0:T1",
+            help=f"seconds during which the person {posture}",
+        )
+    parser.add_argument(
+        "--side-turn",
+        choices=SIDE_TURNS,
+        default="left",
+        help="which way the person turns for --side, as they see it",
+    )
+
+
+def print_remarks(source: SilhouetteSource, more: Iterable[str] = ()) -> None:
+    """Tell what is odd about a recording on the standard error, and ``more``."""
+    for remark in (*source.remarks, *more):
         print(f"cardbox: {remark}", file=sys.stderr)
 
 

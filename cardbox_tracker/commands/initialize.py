@@ -7,12 +7,13 @@ import math
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
+    REFERENCES,
     add_camera_pitch,
     add_cameras,
     add_recording,
+    add_references,
     add_seed,
     print_remarks,
-    span,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.errors import CardboxError
@@ -22,27 +23,13 @@ HELP = "measure the person in a recording"
 
 # Where the search for the distance begins when two cameras measure it.
 _GUESSED_M = 2.0
-_REFERENCES = {
-    "front": "faces the camera, arms hanging 20 degrees away from the body",
-    "side": "stands the same, turned by 90 degrees",
-    "arms": "faces the camera, both arms stretched sideways, hands open",
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    from cardbox_tracker.body.posture import SIDE_TURNS
-
     add_recording(parser)
     add_cameras(parser)
-    for name, posture in _REFERENCES.items():
-        parser.add_argument(
-            f"--{name}",
-            type=span,
-            required=True,
-            metavar="T0:T1",
-            help=f"seconds during which the person {posture}",
-        )
+    add_references(parser)
     parser.add_argument(
         "--distance",
         type=float,
@@ -50,12 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="M",
         help="from the camera to the person, metres along the floor; all sizes are proportional "
         "to it; not needed with two or more --cameras, which measure it",
-    )
-    parser.add_argument(
-        "--side-turn",
-        choices=SIDE_TURNS,
-        default="left",
-        help="which way the person turns for --side, as they see it",
     )
     add_camera_pitch(parser)
     add_seed(parser, "the hypotheses")
@@ -100,7 +81,7 @@ def run(options: argparse.Namespace) -> None:
     )
     inputs = options.recording, options.extrinsics
     check_outputs((options.output,), options.force, inputs=inputs)
-    spans = {name: getattr(options, name) for name in _REFERENCES}
+    spans = {name: getattr(options, name) for name in REFERENCES}
     with (
         open_recording(
             options.recording, options.background, options.cameras, options.extrinsics

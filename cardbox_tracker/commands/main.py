@@ -11,6 +11,7 @@ from cardbox_tracker import __version__
 from cardbox_tracker.commands import (
     benchmark,
     body,
+    calibrate_extrinsics,
     call,
     demo,
     evaluate,
@@ -30,6 +31,7 @@ COMMANDS: tuple[Command, ...] = (
     synthesize,
     initialize,
     body,
+    calibrate_extrinsics,
     track,
     benchmark,
     urdf,

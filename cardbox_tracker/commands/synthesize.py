@@ -33,6 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--compressed", action="store_true", help="write JPEG images instead of raw ones"
     )
+    parser.add_argument(
+        "--cameras",
+        type=int,
+        choices=range(1, 5),
+        default=1,
+        metavar="N",
+        help="1 to 4; several are cam0, cam1, ..., and BAG/extrinsics.yaml says where they stand",
+    )
     add_force(parser)
 
 
@@ -53,6 +61,7 @@ def run(options: argparse.Namespace) -> None:
             seed=options.seed,
             storage=options.storage,
             compressed=options.compressed,
+            cameras=options.cameras,
             overwrite=options.force,
             progress=show,
         )

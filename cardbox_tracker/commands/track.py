@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> None:
         f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
-    print_remarks(source.first)
+    print_remarks(source.first, summary.remarks)
     for path in (options.csv, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")

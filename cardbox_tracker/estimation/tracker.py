@@ -16,6 +16,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
@@ -79,7 +80,11 @@ class Estimate:
 
 
 class Tracker:
-    """Tracks one measured person before one camera (paper, algorithm "Online Motion Tracking")."""
+    """Tracks one measured person (paper, algorithm "Online Motion Tracking").
+
+    Attributes:
+        agreement: whether several cameras stand where their extrinsics say; None of one camera.
+    """
 
     def __init__(
         self,
@@ -129,14 +134,15 @@ class Tracker:
         self._further = [
             FurtherCamera(body, self.camera, other, self.config) for other in self._others
         ]
+        views = [further.view for further in self._further]
+        self.agreement = CameraAgreement(body, self.camera, views) if views else None
         self.reset()
 
     def _refine(self) -> None:
         """Let the last frame, which was sure, say what it does of the sizes."""
         if self._refinement is None or not isinstance(self._filter, WholeBodyFilter):
             return
-        body = self._refinement.add(*self._filter.best())
-        if body is not None:
+        if (body := self._refinement.add(*self._filter.best())) is not None:
             self.body, self._silhouette = body, CompiledSilhouette(body, self.camera)
             self._terms = self._built(self.config)
             self._filter.use_body(self._silhouette)
@@ -289,6 +295,9 @@ class Tracker:
             return Estimate(LOST)
         if not fit.is_uncertain and not fit.is_poor:
             self._refine()
+        if self.agreement is not None and fit.offset_m is not None:
+            seen = [other.silhouette for other in self._others_now]
+            self.agreement.see(self._before, frame.silhouette, seen)
         return Estimate(
             UNCERTAIN if fit.is_uncertain else TRACKING,
             fit.posture,

@@ -28,7 +28,7 @@ from cardbox_tracker.vision.extrinsics_sources import (
     transforms_of,
 )
 from cardbox_tracker.vision.pairing import camera_names, side_by_side
-from cardbox_tracker.vision.stereo import StereoDepth
+from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
 
 STEREO = "stereo"
 """In place of a topic: the depth is measured in the rectified pair of the first two cameras."""
@@ -211,16 +211,7 @@ def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
     """
     if not others:
         raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
-    right, where = others[0].camera, others[0].extrinsics
-    x, *rest = where.translation_m.tolist()
-    one, other = ((c.fx, c.fy, c.cx, c.cy) for c in (left, right))
-    is_parallel = np.allclose(where.rotation, np.eye(3), atol=1e-3) and max(map(abs, rest)) < 0.01
-    if not (is_parallel and np.allclose(one, other, atol=0.5)):
-        raise CameraError(
-            f"the first two cameras are no rectified pair: {where}; expected equal focal lengths "
-            "and principal points, cameras beside each other. Rectify them with stereo_image_proc"
-        )
-    return StereoDepth(left.fx, -x)
+    return stereo_of_pair(left, others[0].camera, others[0].extrinsics)
 
 
 def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> list[Extrinsics]:

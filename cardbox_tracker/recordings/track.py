@@ -40,7 +40,8 @@ _VIDEO_SCALE = 2
 class TrackSummary:
     """What a run did: images seen and tracked, and means over the tracked ones.
 
-    ``frames_uncertain`` of the tracked ones have a posture that may be wrong.
+    ``frames_uncertain`` of the tracked ones have a posture that may be wrong; ``remarks`` are about
+    extrinsics that seem to be wrong.
     """
 
     frames: int
@@ -48,6 +49,7 @@ class TrackSummary:
     mean_cost_px: float
     mean_iou: float
     frames_uncertain: int = 0
+    remarks: tuple[str, ...] = ()
 
 
 def track_recording(
@@ -108,12 +110,18 @@ def track_recording(
                 )
             for observe in observers:
                 observe(frame, estimate, tracker)
+            if tracker.agreement is not None and tracker.agreement.is_due:
+                tracker.agreement.check()
         if frames == 0:
             raise CardboxError(
                 f"no image lies after --start {start_s:g} s; give seconds from the bag's start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
-    return TrackSummary(frames, len(costs), *mean, frames_uncertain)
+    remarks: list[str] = []
+    if isinstance(source, CameraSources) and tracker.agreement is not None:
+        tracker.agreement.check(is_last=True)
+        remarks = tracker.agreement.remarks(source.cameras[1:])
+    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
 
 
 def _estimates(

@@ -21,16 +21,19 @@ from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.simulation.cameras import (
+    FRAME_ID,
+    SyntheticCamera,
+    synthetic_cameras,
+)
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.person import person_frames, person_keypoints_m
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics_files import save_camchain
 
 START_NS = 1_700_000_000_000_000_000
-IMAGE_TOPIC = "/camera/image_raw"
-CAMERA_INFO_TOPIC = "/camera/camera_info"
 TRUTH_TOPIC = "/ground_truth/joint_states"
-FRAME_ID = "camera_optical_frame"
 
 _ENCODINGS = ("mono8", "rgb8", "bgr8")
 _SWAY_M = 0.003
@@ -55,6 +58,7 @@ def synthesize_session(
     compressed: bool = False,
     encoding: str = "mono8",
     scene: Scene | None = None,
+    cameras: int = 1,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
@@ -72,6 +76,8 @@ def synthesize_session(
         compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
         encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw images.
         scene: wall and sensor.
+        cameras: how many see the person, 1 to 4. Several are ``cam0``, ``cam1``, ... below
+            namespaces of these names; ``extrinsics.yaml`` in the folder says where they stand.
         overwrite: replace a recording of that name.
         progress: called with the finished fraction.
 
@@ -86,10 +92,14 @@ def synthesize_session(
     segments = timeline(motion, body.side_turn)
     camera = session_camera(width, height).with_pitch(body.camera_pose.pitch_rad)
     rng = np.random.default_rng(seed)
-    renderer = Renderer(camera, scene or Scene(), rng.spawn(1)[0])
+    views = synthetic_cameras(body, camera, cameras)
+    renderers = [
+        Renderer(view.camera, scene or Scene(), own)
+        for view, own in zip(views, rng.spawn(cameras), strict=True)
+    ]
     count = round(segments[-1].end_s * fps)
     truth: list[dict[str, Any]] = []
-    masks = np.zeros((count, height * width), np.uint8)
+    masks = np.zeros((cameras, count, height * width), np.uint8)
     sway = 0.0
     with BagWriter(output, storage, overwrite) as bag:
         for number in range(count):
@@ -102,42 +112,61 @@ def synthesize_session(
                 "segment": segment.name,
                 "segment_index": index,
             }
-            if segment.pose is None:
-                image, mask = renderer.image()
-            else:
+            posture = None
+            if segment.pose is not None:
                 # People sway a little: a slow random walk that is pulled back to its centre.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
                 posture[0] += body.placement.lateral_m + sway
-                image, mask = renderer.image(body, posture)
-                entry |= _truth(body, camera, posture, mask)
-                bag.write_joint_state(TRUTH_TOPIC, stamp_ns, FRAME_ID, JOINT_NAMES, posture)
+            seen = [
+                renderer.image() if posture is None else renderer.image(*view.seen(body, posture))
+                for renderer, view in zip(renderers, views, strict=True)
+            ]
+            if posture is not None:
+                entry |= _truth(body, camera, posture, seen[0][1])
+                frame_id = views[0].frame_id
+                bag.write_joint_state(TRUTH_TOPIC, stamp_ns, frame_id, JOINT_NAMES, posture)
             truth.append(entry)
-            masks[number] = (mask > 0).ravel()
-            bag.write_camera_info(CAMERA_INFO_TOPIC, stamp_ns, FRAME_ID, camera)
-            _write_image(bag, stamp_ns, image, compressed, encoding)
+            for view, (image, mask), of_view in zip(views, seen, masks, strict=True):
+                of_view[number] = (mask > 0).ravel()
+                bag.write_camera_info(view.info_topic, stamp_ns, view.frame_id, view.camera)
+                _write_image(bag, view, stamp_ns, image, compressed, encoding)
             if progress is not None:
                 progress((number + 1) / count)
         session = _session(body, camera, fps, segments, truth, seed)
+        shape = np.array([count, height, width])
+        packed = {"packed": np.packbits(masks[0], axis=1), "shape": shape}
+        if cameras > 1:
+            session["camera"]["frame_id"] = views[0].frame_id
+            session["cameras"] = [view.truth() for view in views]
+            for view, of_view in zip(views, masks, strict=True):
+                packed[f"packed_{view.name}"] = np.packbits(of_view, axis=1)
+                packed[f"shape_{view.name}"] = shape
+            save_camchain(
+                bag.folder / "extrinsics.yaml",
+                {view.name: view.camera for view in views},
+                {view.name: view.extrinsics for view in views[1:]},
+            )
         (bag.folder / "ground_truth.json").write_text(json.dumps(session), encoding="utf-8")
-        np.savez_compressed(
-            bag.folder / "masks.npz",
-            packed=np.packbits(masks, axis=1),
-            shape=np.array([count, height, width]),
-        )
+        np.savez_compressed(bag.folder / "masks.npz", **packed)  # type: ignore[arg-type]
     return session
 
 
 def _write_image(
-    bag: BagWriter, stamp_ns: int, image: NDArray[np.uint8], compressed: bool, encoding: str
+    bag: BagWriter,
+    view: SyntheticCamera,
+    stamp_ns: int,
+    image: NDArray[np.uint8],
+    compressed: bool,
+    encoding: str,
 ) -> None:
     if compressed:
         jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
-        bag.write_compressed(f"{IMAGE_TOPIC}/compressed", stamp_ns, FRAME_ID, jpeg)
+        bag.write_compressed(f"{view.image_topic}/compressed", stamp_ns, view.frame_id, jpeg)
         return
     if encoding != "mono8":
         image = np.repeat(image[..., None], 3, axis=2)
-    bag.write_image(IMAGE_TOPIC, stamp_ns, FRAME_ID, image, encoding)
+    bag.write_image(view.image_topic, stamp_ns, view.frame_id, image, encoding)
 
 
 def _truth(

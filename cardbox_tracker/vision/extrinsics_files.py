@@ -8,9 +8,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import yaml
 
 from cardbox_tracker.errors import CameraError, cut
+from cardbox_tracker.files import atomic_path
 from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
@@ -59,6 +62,46 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
         )
     back = poses[cameras[0].strip("/")].inverse()
     return {camera: poses[camera.strip("/")].after(back) for camera in cameras[1:]}
+
+
+def save_camchain(
+    path: str | os.PathLike[str],
+    cameras: Mapping[str, Camera],
+    extrinsics: Mapping[str, Extrinsics],
+) -> None:
+    """Write a camchain as Kalibr does, which :func:`load_extrinsics` reads.
+
+    Args:
+        path: written atomically.
+        cameras: by their namespaces, the first camera first; without lens distortion.
+        extrinsics: of each further camera against the first one, by its namespace.
+
+    Raises:
+        FileWriteError: the file cannot be written.
+    """
+    chain: dict[str, Any] = {}
+    before = Extrinsics(np.eye(3), np.zeros(3))
+    for number, (name, camera) in enumerate(cameras.items()):
+        entry: dict[str, Any] = {}
+        if number:
+            step = extrinsics[name].after(before.inverse())
+            rows = np.column_stack([step.rotation, step.translation_m])
+            matrix = np.vstack([rows, [0.0, 0.0, 0.0, 1.0]])
+            entry["T_cn_cnm1"] = [[round(float(v), 9) for v in row] for row in matrix]
+            before = extrinsics[name]
+        entry |= {
+            "camera_model": "pinhole",
+            "distortion_coeffs": [0.0, 0.0, 0.0, 0.0],
+            "distortion_model": "radtan",
+            "intrinsics": [
+                round(float(v), 4) for v in (camera.fx, camera.fy, camera.cx, camera.cy)
+            ],
+            "resolution": [camera.width, camera.height],
+            "rostopic": f"/{name.strip('/')}/image_raw",
+        }
+        chain[f"cam{number}"] = entry
+    with atomic_path(path) as temporary:
+        temporary.write_text(yaml.safe_dump(chain, default_flow_style=None), encoding="utf-8")
 
 
 def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:

@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.vision.background import brightness_of
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 
 DepthImage = NDArray[np.float32]
+
+NEAREST_M = 0.8
+"""Nearer things are not found, metres."""
 
 # As OpenCV's documentation has them: penalties of 8 and 32 times the pixels of a block, disparities
 # in sixteenths of a pixel, and a number of them that 16 divides.
@@ -24,7 +29,7 @@ _SPECKLE_PX, _SPECKLE_RANGE = 60, 2
 class StereoDepth:
     """Measures depth in the left one of two rectified images."""
 
-    def __init__(self, fx: float, baseline_m: float, nearest_m: float = 0.8) -> None:
+    def __init__(self, fx: float, baseline_m: float, nearest_m: float = NEAREST_M) -> None:
         """Prepare.
 
         Args:
@@ -68,3 +73,28 @@ class StereoDepth:
         depth = np.zeros_like(disparity)
         np.divide(np.float32(self._scale), disparity, out=depth, where=disparity > 0)
         return depth
+
+
+def stereo_of_pair(
+    left: Camera, right: Camera, where: Extrinsics, nearest_m: float = NEAREST_M
+) -> StereoDepth:
+    """Return what measures depth in a rectified pair.
+
+    Args:
+        left: camera of the left images.
+        right: camera of the right images, of the same size.
+        where: the right camera stands against the left one.
+        nearest_m: see :class:`StereoDepth`.
+
+    Raises:
+        CameraError: they are no rectified pair with the left camera first.
+    """
+    x, *rest = where.translation_m.tolist()
+    one, other = ((c.fx, c.fy, c.cx, c.cy) for c in (left, right))
+    is_parallel = np.allclose(where.rotation, np.eye(3), atol=1e-3) and max(map(abs, rest)) < 0.01
+    if not (is_parallel and np.allclose(one, other, atol=0.5)):
+        raise CameraError(
+            f"the first two cameras are no rectified pair: {where}; expected equal focal lengths "
+            "and principal points, cameras beside each other. Rectify them with stereo_image_proc"
+        )
+    return StereoDepth(left.fx, -x, nearest_m)

@@ -15,6 +15,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.simulation.person import person_frames
 from cardbox_tracker.simulation.session import START_NS, TRUTH_TOPIC, synthesize_session
+from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 
 SMALL: dict[str, Any] = {"fps": 2.0, "width": 160, "height": 120, "motion": "bow"}
 
@@ -144,3 +145,30 @@ def test_what_cannot_be_synthesized_is_refused_and_nothing_written(
     with pytest.raises(CardboxError, match="expected"):
         synthesize_session(tmp_path / "bag", **(SMALL | options))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_several_cameras_see_the_same_person(tmp_path: Path) -> None:
+    truth = synthesize_session(tmp_path / "bag", **SMALL, cameras=3)
+    names = [camera["name"] for camera in truth["cameras"]]
+    assert names == ["cam0", "cam1", "cam2"]
+    found = load_extrinsics(tmp_path / "bag" / "extrinsics.yaml", names)
+    masks = np.load(tmp_path / "bag" / "masks.npz")
+    with BagReader(tmp_path / "bag") as bag:
+        for name, camera in zip(names, truth["cameras"], strict=True):
+            assert len(list(bag.images(bag.image_topic(name)))) == len(truth["frames"])
+            seen_by = bag.calibration(name).camera(160, 120)
+            where = np.array(camera["from_first"])
+            if name in found:
+                np.testing.assert_allclose(found[name].rotation, where[:3, :3], atol=1e-6)
+            _, height, width = masks[f"shape_{name}"]
+            packed = masks[f"packed_{name}"]
+            of_camera = np.unpackbits(packed, axis=1, count=height * width)
+            for frame, mask in zip(truth["frames"], of_camera, strict=True):
+                if frame["segment"] not in ("front", "arms"):
+                    continue
+                for joint in ("hips", "head", "left_elbow", "right_elbow"):
+                    point = where[:3, :3] @ frame["joints_m"][joint] + where[:3, 3]
+                    u, v = np.rint(seen_by.project(point)).astype(int)
+                    assert mask.reshape(height, width)[v, u], (name, joint)
+    with pytest.raises(CardboxError, match="5 cameras; expected 1 to 4"):
+        synthesize_session(tmp_path / "more", **SMALL, cameras=5)

@@ -13,8 +13,9 @@ import pytest
 import yaml
 
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.extrinsics_files import load_extrinsics
+from cardbox_tracker.vision.extrinsics_files import load_extrinsics, save_camchain
 from cardbox_tracker.vision.extrinsics_sources import (
     choose,
     of_rectified_pair,
@@ -166,3 +167,14 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "chain.yaml")
     with pytest.raises(CameraError, match="it is no file"):
         load_extrinsics(tmp_path / "chain.yaml", ["cam0", "cam1"])
+
+
+def test_a_camchain_that_is_written_is_read(tmp_path: Path, rng: np.random.Generator) -> None:
+    camera = Camera(320, 240, 300.0, 301.0, 160.0, 119.0)
+    names = ["cam0", "/left/colour", "cam9"]
+    poses = {name: random_pose(rng) for name in names[1:]}
+    file = tmp_path / "extrinsics.yaml"
+    save_camchain(file, dict.fromkeys(names, camera), poses)
+    found = load_extrinsics(file, names)
+    for name in names[1:]:
+        assert_same(found[name], poses[name])

@@ -132,6 +132,13 @@ class View:
         turned = cv2.remap(image, self.turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
         return np.asarray(turned, np.uint8)
 
+    def level_axes(self) -> FloatArray:
+        """Return the rotation (3, 3) from the first level frame into the upright optical frame."""
+        axes: FloatArray = self.camera.reference_to_optical_rotation() @ _about_vertical(
+            self.yaw_rad
+        )
+        return axes
+
     def line_of_sight(self, sight: float) -> tuple[FloatArray, FloatArray]:
         """Return the camera's place and the level direction (x, y) of ``sight``, each (2,).
 

@@ -211,6 +211,13 @@ class WholeBodyCost:
         kernels.corners_of_body(state, *self._figure, corners_m)
         return corners_m
 
+    def corners_before(self, state: FloatArray, body: BodyModel, camera: Camera) -> FloatArray:
+        """Return :meth:`corners` of the same person, placed as ``body``, before another camera."""
+        corners_m = np.empty((kernels.BODY_PATCHES, 4, 3))
+        figure = self.parts, self._drawn, self.girdle, place_of(body), view_of(camera)
+        kernels.corners_of_body(state, *figure, corners_m)
+        return corners_m
+
     @property
     def rows(self) -> int:
         """Rows of the present silhouette that count, from the top."""

@@ -1,10 +1,12 @@
-"""The parameters of the nodes that feed the others: ``camera`` and ``play_bag``."""
+"""The parameters of the nodes that feed the others: ``camera``, ``play_bag``, ``stereo_depth``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.vision.encodings import MOST_PIXELS
+from cardbox_tracker.vision.stereo import NEAREST_M
 
 
 @dataclass(frozen=True)
@@ -108,3 +110,35 @@ class PlayBagParameters(NodeParameters):
         """Raise ValueError where values do not go together."""
         if not self.bag:
             raise ValueError("no bag is given; run 'play_bag BAG' or set the parameter 'bag'")
+
+
+@dataclass(frozen=True)
+class StereoDepthParameters(NodeParameters):
+    """Measure depth in a rectified pair of cameras."""
+
+    image_transport: str = parameter(
+        "raw",
+        "raw subscribes to image_raw, compressed to image_raw/compressed",
+        choices=("raw", "compressed"),
+        read_only=True,
+    )
+    width: int = parameter(
+        320, "width at which depth is measured", unit="px", limits=(32, 4096), read_only=True
+    )
+    nearest_m: float = parameter(
+        NEAREST_M,
+        "nearer things are not found; the time grows with what this costs",
+        unit="m",
+        limits=(0.1, 20.0),
+    )
+    tolerance_s: float = parameter(
+        0.005,
+        "a left and a right image whose stamps differ by no more are a pair",
+        unit="s",
+        limits=(0.0, 1.0),
+    )
+    max_megapixels: float = parameter(
+        round(MOST_PIXELS / 1e6, 1),
+        "images with more million pixels are refused before they are decoded",
+        limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
+    )

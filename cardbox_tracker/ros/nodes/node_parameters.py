@@ -13,7 +13,11 @@ from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
 )
 from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
-from cardbox_tracker.ros.nodes.input_parameters import CameraParameters, PlayBagParameters
+from cardbox_tracker.ros.nodes.input_parameters import (
+    CameraParameters,
+    PlayBagParameters,
+    StereoDepthParameters,
+)
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
@@ -187,5 +191,6 @@ NODES: dict[str, type[NodeParameters]] = {
     "tracker": TrackerParameters,
     "camera": CameraParameters,
     "play_bag": PlayBagParameters,
+    "stereo_depth": StereoDepthParameters,
 }
 """Node name to its parameters."""

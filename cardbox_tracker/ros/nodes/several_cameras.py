@@ -8,6 +8,7 @@ from sensor_msgs.msg import Image
 
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch
 from cardbox_tracker.ros.nodes.camera_overlays import CameraOverlays
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses
 from cardbox_tracker.ros.nodes.camera_views import CameraViews, Seen, Views
@@ -44,6 +45,7 @@ class SeveralCameras:
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         self._views = CameraViews(node, cameras, settings.depth, settings.use_image, deliver)
         self._overlays = CameraOverlays(node, cameras)
+        self._agreement = AgreementWatch([name.strip("/") for name in cameras])
         self._tracker: Tracker | None = None
 
     @property
@@ -84,14 +86,16 @@ class SeveralCameras:
         """Publish the overlay of each camera that somebody looks at, of what ``tracker`` found."""
         self._tracker = tracker
         self._overlays.publish(views, estimate, tracker)
+        self._agreement.see(tracker.agreement)
 
     def values(self) -> dict[str, str]:
         """Return rate, age and fit of each camera, for the diagnostics."""
-        return self._views.values([] if self._tracker is None else self._tracker.camera_ious())
+        ious = [] if self._tracker is None else self._tracker.camera_ious()
+        return self._views.values(ious) | self._agreement.values()
 
     def warnings(self) -> dict[str, str]:
         """Return what is wrong with single cameras, by kind."""
-        return self._views.warnings()
+        return self._views.warnings() | self._agreement.warnings()
 
     def _on_poses(self) -> None:
         self._changed(self._poses.first, self._poses.others)

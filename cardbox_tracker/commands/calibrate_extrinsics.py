@@ -1,0 +1,100 @@
+"""``cardbox calibrate-extrinsics``: where the cameras of a recording stand."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from cardbox_tracker.commands.arguments import (
+    add_camera_pitch,
+    add_recording,
+    add_references,
+    add_seed,
+    span,
+)
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
+
+NAME = "calibrate-extrinsics"
+HELP = "find where several cameras stand, from the person in a recording, without a board"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox calibrate-extrinsics``."""
+    add_recording(parser)
+    parser.add_argument(
+        "--cameras",
+        nargs="+",
+        required=True,
+        metavar="NAMESPACE",
+        help="cameras of the recording that see the person, such as cam0 cam1, the one that the "
+        "person faced first",
+    )
+    add_references(parser)
+    parser.add_argument(
+        "--motion",
+        type=span,
+        required=True,
+        metavar="T0:T1",
+        help="seconds in which the person moves, at first standing as for --front; 10 s or more "
+        "in which the arms are raised and the person turns and steps about",
+    )
+    parser.add_argument(
+        "--distance",
+        type=float,
+        required=True,
+        metavar="M",
+        help="from the first camera to the person, metres along the floor; distances between the "
+        "cameras are proportional to it",
+    )
+    add_camera_pitch(parser)
+    add_seed(parser, "the hypotheses and the filter")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="EXTRINSICS.yaml",
+        help="camchain as of Kalibr to write, for --extrinsics",
+    )
+    add_force(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Find the poses, write them and print how sure they are.
+
+    Raises:
+        CardboxError: the recording or a span cannot be used, no pose fits, or the file cannot be
+            written.
+    """
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.estimation.initialization.config import InitializationConfig
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.recordings.calibrate import calibrate_recording
+    from cardbox_tracker.vision.extrinsics_files import save_camchain
+
+    check_outputs((options.output,), options.force, inputs=(options.recording,))
+    pitch_rad = math.radians(options.camera_pitch_deg)
+    # An impossible distance or pitch is refused by its own name.
+    BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
+    config = InitializationConfig(
+        distance_m=options.distance,
+        camera_pitch_rad=pitch_rad,
+        side_turn=options.side_turn,
+        seed=options.seed,
+    )
+    references = {name: getattr(options, name) for name in ("front", "side", "arms")}
+    with progress_bar("calibrate") as show:
+        result = calibrate_recording(
+            options.recording,
+            options.cameras,
+            options.background,
+            references,
+            options.motion,
+            config,
+            show,
+        )
+    found = {name: camera.extrinsics for name, camera in result.found.items()}
+    save_camchain(options.output, result.cameras, found)
+    for name, camera in result.found.items():
+        print(f"{name}: {camera}")
+    print(f"wrote {options.output}")

@@ -1,0 +1,156 @@
+"""Where a further camera stands, from a person in reference postures who then moves.
+
+The first guess is of the reference postures alone (:mod:`.camera_guess`). With it both cameras
+track the person, and pose and postures are improved together (:mod:`.camera_pose`); that is done
+twice. The person's sizes and distance are the first camera's, so lengths are as right as the
+distance that was given for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CameraError, InitializationError
+from cardbox_tracker.estimation.camera_guess import guessed_extrinsics, reference_states
+from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
+from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.terms import Image, Silhouette
+from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+_PASSES, _SIGHTINGS, _STEPS, _HALF_STEPS = 2, 30, 6, 4
+_LEAST_SIGHTINGS = 8
+
+Pair = tuple[Silhouette, Silhouette]
+
+
+class MovingFrame(NamedTuple):
+    """What both cameras saw at one time.
+
+    Attributes:
+        silhouettes: (H, W), 0 or 255, of the first and of the further camera.
+        images: (H, W) or (H, W, 3) of the same, or None.
+    """
+
+    silhouettes: Pair
+    images: tuple[Image | None, Image | None]
+
+
+class CalibratedCamera(NamedTuple):
+    """Where a further camera stands, and how sure that is.
+
+    Attributes:
+        extrinsics: against the first camera.
+        halves_deg: by how much the poses differ that each half of the frames gives, degrees.
+        halves_m: the same of the camera's place, metres.
+        iou: mean intersection over union of model and silhouettes while both cameras tracked.
+        frames: of which the pose is.
+    """
+
+    extrinsics: Extrinsics
+    halves_deg: float
+    halves_m: float
+    iou: float
+    frames: int
+
+    def __str__(self) -> str:
+        """Return the pose and its uncertainty as text."""
+        return (
+            f"{self.extrinsics}; two halves of {self.frames} frames differ by "
+            f"{self.halves_deg:.1f} degrees and {100 * self.halves_m:.1f} cm; mean IoU of both "
+            f"cameras {self.iou:.3f}"
+        )
+
+
+def calibrated_camera(
+    body: BodyModel,
+    first: Camera,
+    other: Camera,
+    references: Mapping[str, Pair],
+    moving: Sequence[MovingFrame],
+    side_turn: str = "left",
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> CalibratedCamera:
+    """Return where a further camera stands.
+
+    Args:
+        body: the person, measured by the first camera.
+        first: the first camera.
+        other: the further camera, without its pitch.
+        references: silhouettes of both cameras by the names of the reference postures.
+        moving: what follows them, from the front reference posture on.
+        side_turn: the way the person turned for ``side``.
+        seed: of the tracker.
+        progress: called with the finished fraction.
+
+    Raises:
+        InitializationError: the silhouettes do not show one person, or too few frames do.
+    """
+    states = reference_states(body, side_turn)
+    still = [Sighting(states[name], *pair) for name, pair in references.items()]
+    pose = guessed_extrinsics(body, first, other, references, side_turn)
+    iou = float("nan")
+    try:
+        for number in range(_PASSES):
+            tracked, iou = _tracked(body, first, OtherCamera(other, pose), moving, seed)
+            if progress is not None:
+                progress((number + 0.8) / _PASSES)
+            if len(tracked) < _LEAST_SIGHTINGS:
+                raise InitializationError(
+                    f"both cameras track the person in {len(tracked)} frames of {len(moving)}; "
+                    f"expected {_LEAST_SIGHTINGS} or more: let the person move for ten seconds or "
+                    "longer after the reference postures, in sight of both cameras"
+                )
+            sightings = [*still, *tracked]
+            pose = _improved(body, first, other, pose, sightings, _STEPS)
+        halves = [
+            _improved(body, first, other, pose, sightings[start::2], _HALF_STEPS)
+            for start in (0, 1)
+        ]
+    except (CameraError, np.linalg.LinAlgError) as error:
+        raise InitializationError(
+            f"the further camera's pose cannot be found from these frames: {error}; expected one "
+            "person whom both cameras see from the hips to the head"
+        ) from None
+    angle_rad, away_m = halves[0].difference(halves[1])
+    if progress is not None:
+        progress(1.0)
+    return CalibratedCamera(pose, float(np.degrees(angle_rad)), away_m, iou, len(sightings))
+
+
+def _tracked(
+    body: BodyModel, first: Camera, other: OtherCamera, moving: Sequence[MovingFrame], seed: int
+) -> tuple[list[Sighting], float]:
+    """Return some of the frames with the postures that both cameras show, and the mean IoU."""
+    tracker = Tracker(body, first, default_preset(), np.random.default_rng(seed), others=[other])
+    found, ious = [], []
+    for silhouettes, images in moving:
+        estimate = tracker.track_views(silhouettes, images)
+        if estimate.posture is None or estimate.offset_m is None or estimate.iou is None:
+            continue
+        state = np.concatenate([estimate.posture, estimate.offset_m])
+        found.append(Sighting(state, *silhouettes))
+        ious.append(estimate.iou)
+    every = max(1, len(found) // _SIGHTINGS)
+    return found[every - 1 :: every], float(np.mean(ious)) if ious else float("nan")
+
+
+def _improved(
+    body: BodyModel,
+    first: Camera,
+    other: Camera,
+    pose: Extrinsics,
+    sightings: Sequence[Sighting],
+    steps: int,
+) -> Extrinsics:
+    problem = PoseProblem(body, first, other, pose, sightings)
+    for _ in range(steps):
+        pose = problem.step(pose).extrinsics
+    return pose

@@ -1,0 +1,272 @@
+"""Where a further camera stands, from the person whom both cameras see: a bundle adjustment.
+
+Unknown are the pose of the further camera, the same in all frames, and the state of the person in
+each, which begins at what was tracked. The outline of the body is to agree with the silhouettes of
+both cameras (:mod:`cardbox_tracker.estimation.outline_distances`). A step solves the normal
+equations: Gauss-Newton with the states eliminated by the Schur complement (Triggs et al., "Bundle
+Adjustment -- A Modern Synthesis", 2000), and with weights as of Geman and McClure, so that hair and
+clothes, which the model lacks, weigh little.
+
+A change of the pose is six numbers: a rotation vector about the camera's own axes, rad, and a
+translation along them, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.terms import Silhouette
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
+from cardbox_tracker.estimation.outline_distances import SeenOutline, comparing
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+N_POSE = 6
+ROTATION = (0, 1, 2)
+"""Of a change, what turns the camera where it stands."""
+
+WITHOUT_ROLL = (0, 1, 3, 4, 5)
+"""All but the turn about the camera's own axis, of which outlines say next to nothing."""
+
+# A distance that weighs a quarter, and the standard deviation of one, px.
+_HALF_PX, _POINT_PX = 5.0, 4.0
+# How far a state may be from the tracked one: standard deviations.
+_STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
+# Steps of the central differences: about 2 px, since an outline is drawn in whole ones.
+_STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * 8, 0.04, 0.02])
+_POSE_STEP = np.array([0.015, 0.015, 0.015, 0.03, 0.03, 0.03])
+# Derivatives over whole pixels are too steep, so a plain step is too short.
+_RELAXATION = 1.6
+_MOST_STATE_CHANGE, _MOST_POSE_CHANGE = 0.25, 0.1
+# Of a state's step, what is tried.
+_SHARES = (1.0, 0.5, 0.2, 0.0)
+
+
+class Sighting(NamedTuple):
+    """One person at one time.
+
+    Attributes:
+        state: of the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
+        first: silhouette of the first camera, (H, W), 0 or 255.
+        other: silhouette of the further camera.
+    """
+
+    state: FloatArray
+    first: Silhouette
+    other: Silhouette
+
+
+class Step(NamedTuple):
+    """What one step found.
+
+    Attributes:
+        extrinsics: the better ones.
+        change: by which they differ from those before, (6,).
+        covariance: of the change, from the scatter of the sightings, (6, 6).
+        cost: mean weighted squares of the distances of a sighting, before.
+    """
+
+    extrinsics: Extrinsics
+    change: FloatArray
+    covariance: FloatArray
+    cost: float
+
+
+class _Equations(NamedTuple):
+    """What a sighting says: ``matrix`` (6, 6) times the change of the pose is -``right`` (6,).
+
+    The state then changes by -(``alone`` + ``by_pose`` times the change).
+    """
+
+    matrix: FloatArray
+    right: FloatArray
+    alone: FloatArray
+    by_pose: FloatArray
+    cost: float
+
+
+class PoseProblem:
+    """The sightings of one further camera, and the states that fit them so far.
+
+    Attributes:
+        states: one (14,) for each sighting.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        first: Camera,
+        other: Camera,
+        extrinsics: Extrinsics,
+        sightings: Sequence[Sighting],
+    ) -> None:
+        """Begin at the states of ``sightings``.
+
+        Args:
+            body: the person before the first camera, whose distance is trusted.
+            first: the first camera.
+            other: the further camera, without its pitch.
+            extrinsics: about where the further camera stands.
+            sightings: of both cameras; those in which one of them shows nobody are left out.
+
+        Raises:
+            CameraError: the person's place is not in front of the further camera.
+        """
+        self._body = body
+        self._first = comparing(first.with_pitch(body.camera_pose.pitch_rad))
+        self._other = comparing(other.with_pitch(0.0))
+        self._cost = WholeBodyCost(body, self._first, WholeBodyCostConfig())
+        self.states: list[FloatArray] = []
+        self._seen: list[tuple[SeenOutline, SeenOutline]] = []
+        for state, seen, seen_there in sightings:
+            hips_m = self._hips(state)
+            there_m = extrinsics.rotation @ hips_m + extrinsics.translation_m
+            pair = (
+                SeenOutline(seen, self._first, hips_m),
+                SeenOutline(seen_there, self._other, there_m),
+            )
+            if not (pair[0].is_empty or pair[1].is_empty):
+                self.states.append(state.copy())
+                self._seen.append(pair)
+        self._tracked = [state.copy() for state in self.states]
+
+    def step(self, extrinsics: Extrinsics, free: Sequence[int] = WITHOUT_ROLL) -> Step:
+        """Improve pose and states once.
+
+        Args:
+            extrinsics: the pose so far.
+            free: which numbers of the change are not 0.
+
+        Raises:
+            CameraError: the person's place is not in front of the further camera.
+        """
+        here, beside = self._drawer(extrinsics), {}
+        for i in free:
+            step = np.zeros(N_POSE)
+            step[i] = _POSE_STEP[i]
+            beside[i] = (
+                self._drawer(moved_by(extrinsics, step)),
+                self._drawer(moved_by(extrinsics, -step)),
+            )
+        said = [self._equations(number, here, beside) for number in range(len(self.states))]
+        index = np.array(list(free))
+        square = np.ix_(index, index)
+        matrix = np.sum([one.matrix for one in said], axis=0)[square]
+        right = np.sum([one.right for one in said], axis=0)[index]
+        inverse = np.linalg.inv(matrix)
+        change = np.zeros(N_POSE)
+        change[index] = -_RELAXATION * inverse @ right
+        change *= min(1.0, _MOST_POSE_CHANGE / max(float(np.abs(change).max()), 1e-9))
+        left = np.array([(one.right + one.matrix @ change)[index] for one in said])
+        covariance = np.zeros((N_POSE, N_POSE))
+        covariance[square] = inverse @ (left.T @ left) @ inverse
+        better = moved_by(extrinsics, change)
+        there = self._drawer(better)
+        for number, one in enumerate(said):
+            moved = np.clip(
+                one.alone + one.by_pose @ change, -_MOST_STATE_CHANGE, _MOST_STATE_CHANGE
+            )
+            tried = [self.states[number] - share * moved for share in _SHARES]
+            costs = [self._robust_cost(number, state, there) for state in tried]
+            self.states[number] = tried[int(np.argmin(costs))]
+        return Step(better, change, covariance, float(np.mean([one.cost for one in said])))
+
+    def _equations(
+        self, number: int, here: _Drawer, beside: dict[int, tuple[_Drawer, _Drawer]]
+    ) -> _Equations:
+        state, tracked = self.states[number], self._tracked[number]
+        first, other = self._seen[number]
+        residual = self._residual(number, state, here)
+        count = len(first.distances)
+        jacobian = np.zeros((len(residual), N_STATE + N_POSE))
+        for i, step in enumerate(_STATE_STEP.tolist()):
+            more, less = state.copy(), state.copy()
+            more[i] += step
+            less[i] -= step
+            change = self._residual(number, more, here) - self._residual(number, less, here)
+            jacobian[:, i] = change / (2.0 * step)
+        for i, (more_there, less_there) in beside.items():
+            change = other.drawn(more_there(state)) - other.drawn(less_there(state))
+            jacobian[count:, N_STATE + i] = change / (2.0 * _POSE_STEP[i])
+        weights = 1.0 / (_POINT_PX * (1.0 + (residual / _HALF_PX) ** 2)) ** 2
+        weighted = jacobian * weights[:, None]
+        matrix, right = jacobian.T @ weighted, weighted.T @ residual
+        own = np.arange(N_STATE)
+        matrix[own, own] += 1.0 / _STATE_STDDEV**2
+        right[own] += (state - tracked) / _STATE_STDDEV**2
+        across = matrix[:N_STATE, N_STATE:]
+        said = np.column_stack([across, right[:N_STATE]])
+        solved = np.asarray(np.linalg.solve(matrix[:N_STATE, :N_STATE], said), np.float64)
+        by_pose: FloatArray = solved[:, :-1]
+        alone: FloatArray = solved[:, -1]
+        return _Equations(
+            matrix[N_STATE:, N_STATE:] - across.T @ by_pose,
+            right[N_STATE:] - across.T @ alone,
+            alone,
+            by_pose,
+            float(weights @ residual**2),
+        )
+
+    def _residual(self, number: int, state: FloatArray, drawer: _Drawer) -> FloatArray:
+        first, other = self._seen[number]
+        return np.concatenate(
+            [
+                first.drawn(self._cost.corners(state)) - first.distances,
+                other.drawn(drawer(state)) - other.distances,
+            ]
+        )
+
+    def _robust_cost(self, number: int, state: FloatArray, drawer: _Drawer) -> float:
+        squares = self._residual(number, state, drawer) ** 2
+        fit = float(np.sum(squares / (1.0 + squares / _HALF_PX**2))) / _POINT_PX**2
+        return fit + float(np.sum(((state - self._tracked[number]) / _STATE_STDDEV) ** 2))
+
+    def _drawer(self, extrinsics: Extrinsics) -> _Drawer:
+        view = View.of(self._body, self._first, OtherCamera(self._other, extrinsics))
+        axes = extrinsics.rotation @ self._first.reference_to_optical_rotation()
+        return _Drawer(self._cost, view, axes)
+
+    def _hips(self, state: FloatArray) -> FloatArray:
+        place = self._body.placement
+        x_m, z_m = state[TORSO_X] - place.distance_m, place.hip_height_m + state[TORSO_Z]
+        return self._first.reference_to_optical(np.array([x_m, state[TORSO_Y], z_m]))
+
+
+class _Drawer:
+    """Places the body before the further camera, whose image is not turned upright."""
+
+    def __init__(self, cost: WholeBodyCost, view: View, axes: FloatArray) -> None:
+        self._cost, self._view = cost, view
+        self._roll = axes @ view.level_axes().T
+
+    def __call__(self, state: FloatArray) -> FloatArray:
+        """Return the patches (13, 4, 3) of a state (14,), metres in the camera's optical frame."""
+        view = self._view
+        corners_m = self._cost.corners_before(view.states(state), view.body, view.camera)
+        turned: FloatArray = corners_m @ self._roll.T
+        return turned
+
+
+def moved_by(extrinsics: Extrinsics, change: FloatArray) -> Extrinsics:
+    """Return the pose changed by a rotation vector and a translation of its own axes, (6,)."""
+    turn = np.asarray(cv2.Rodrigues(np.asarray(change[:3], np.float64))[0], np.float64)
+    return Extrinsics(
+        turn @ extrinsics.rotation,
+        turn @ extrinsics.translation_m + np.asarray(change[3:], np.float64),
+        extrinsics.source,
+    )
+
+
+def turned_by(before: Extrinsics, after: Extrinsics) -> FloatArray:
+    """Return the rotation vector (3,), rad, about the camera's axes from one pose to another."""
+    vector = np.asarray(cv2.Rodrigues(after.rotation @ before.rotation.T)[0], np.float64)
+    return vector.ravel()

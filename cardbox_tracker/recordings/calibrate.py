@@ -1,0 +1,118 @@
+"""``cardbox calibrate-extrinsics``: where the cameras of a recording stand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import NamedTuple
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.camera_calibration import (
+    CalibratedCamera,
+    MovingFrame,
+    calibrated_camera,
+)
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.estimation.initialization.references import average_silhouette
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.initialize import initialize_from_recording
+from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.pairing import MOST_CAMERAS, side_by_side
+
+# Stamps that are further apart are not of one time.
+_TOLERANCE_NS = 50_000_000
+
+
+class CalibratedCameras(NamedTuple):
+    """What a recording says of its cameras.
+
+    Attributes:
+        body: the person, as the first camera measured them.
+        cameras: working cameras by their names, the first camera first.
+        found: of each further camera, by its name.
+    """
+
+    body: BodyModel
+    cameras: dict[str, Camera]
+    found: dict[str, CalibratedCamera]
+
+
+def calibrate_recording(
+    path: str | os.PathLike[str],
+    cameras: Sequence[str],
+    background: TimeSpan,
+    references: Mapping[str, TimeSpan],
+    motion: TimeSpan,
+    config: InitializationConfig,
+    progress: Callable[[float], None] | None = None,
+) -> CalibratedCameras:
+    """Find where the further cameras of a recording stand against the first one.
+
+    Args:
+        path: a recording as :class:`BagReader` takes it.
+        cameras: namespaces, the first camera first: the person faced it.
+        background: when nobody is in any image.
+        references: when the person holds ``front``, ``side`` and ``arms``.
+        motion: when the person moves, beginning as in ``front``.
+        config: how the first camera measures the person.
+        progress: called with the finished fraction.
+
+    Raises:
+        CardboxError: the recording or a span cannot be used, or no pose fits.
+    """
+    names = [camera.strip("/") for camera in cameras]
+    if not 2 <= len(set(names)) == len(names) <= MOST_CAMERAS:
+        raise CardboxError(
+            f"the cameras are {', '.join(names) or 'none'}; expected two to {MOST_CAMERAS} "
+            "different namespaces, such as cam0 cam1"
+        )
+    with ExitStack() as stack:
+        sources = [
+            SilhouetteSource(stack.enter_context(BagReader(path)), background, camera=name)
+            for name in names
+        ]
+        first = sources[0]
+        body = initialize_from_recording(first, references, config).body
+        found = {}
+        for number, (name, other) in enumerate(zip(names[1:], sources[1:], strict=True)):
+            pairs = {
+                what: (
+                    average_silhouette([f.silhouette for f in first.held(span, what)]),
+                    average_silhouette([f.silhouette for f in other.held(span, what)]),
+                )
+                for what, span in references.items()
+            }
+            done = number / len(names[1:])
+            found[name] = calibrated_camera(
+                body,
+                first.camera,
+                other.camera,
+                pairs,
+                _moving(first, other, motion),
+                config.side_turn,
+                config.seed,
+                None if progress is None else partial(_part, progress, done, len(names[1:])),
+            )
+    return CalibratedCameras(
+        body, dict(zip(names, (s.camera for s in sources), strict=True)), found
+    )
+
+
+def _part(progress: Callable[[float], None], done: float, parts: int, fraction: float) -> None:
+    progress(done + fraction / parts)
+
+
+def _moving(first: SilhouetteSource, other: SilhouetteSource, span: TimeSpan) -> list[MovingFrame]:
+    def stamp_ns(frame: Frame) -> int:
+        return frame.stamp_ns
+
+    moving = []
+    streams = [first.frames(*span), other.frames(*span)]
+    for one, two in side_by_side(streams, stamp_ns, _TOLERANCE_NS):
+        if one is not None and two is not None:
+            moving.append(MovingFrame((one.silhouette, two.silhouette), (one.image, two.image)))
+    return moving

@@ -1,0 +1,50 @@
+"""Asks now and then, beside the tracking, whether several cameras are where they are said to be."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+from cardbox_tracker.estimation.camera_agreement import CameraAgreement
+
+
+class AgreementWatch:
+    """Checks the extrinsics in a thread of its own, one window of images after the other."""
+
+    def __init__(self, cameras: Sequence[str]) -> None:
+        """Watch the further ones of ``cameras``, by name, the first camera first."""
+        self._names = list(cameras)[1:]
+        self._thread: threading.Thread | None = None
+        self._agreement: CameraAgreement | None = None
+
+    def see(self, agreement: CameraAgreement | None) -> None:
+        """Start a check if one is due and none is running."""
+        self._agreement = agreement
+        if agreement is None or not agreement.is_due:
+            return
+        if self._thread is None or not self._thread.is_alive():
+            # It must not keep a node alive that is to end.
+            self._thread = threading.Thread(target=agreement.check, daemon=True)
+            self._thread.start()
+
+    def wait(self) -> None:
+        """Wait for a check that is running."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def values(self) -> dict[str, str]:
+        """Return by how much each further camera seems to be turned, for the diagnostics."""
+        if self._agreement is None:
+            return {}
+        return {
+            f"{name} turned (deg)": "not yet known" if degrees is None else f"{degrees:.1f}"
+            for name, degrees in zip(self._names, self._agreement.turned_deg, strict=True)
+        }
+
+    def warnings(self) -> dict[str, str]:
+        """Return a text for each camera whose extrinsics are doubtful, by kind."""
+        if self._agreement is None:
+            return {}
+        return {
+            f"extrinsics {i}": text for i, text in enumerate(self._agreement.remarks(self._names))
+        }

@@ -1,0 +1,147 @@
+"""The node ``stereo_depth``: two images of a rectified pair in, a depth image out."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.input_parameters import StereoDepthParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.recent import RecentImages
+from cardbox_tracker.vision.camera_info import calibration_from_info
+from cardbox_tracker.vision.extrinsics_sources import of_rectified_pair
+from cardbox_tracker.vision.resize import to_working_size
+from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
+
+_DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
+# Images of either side that wait for one of the other.
+_KEPT = 4
+
+
+class StereoDepthNode(CardboxNode):
+    """Pairs left and right images by their stamps and measures depth in the left one."""
+
+    def __init__(self, **options: Any) -> None:
+        """Subscribe to both cameras and wait for their images."""
+        super().__init__("stereo_depth", **options)
+        self.parameters = LiveParameters(self, StereoDepthParameters, self._changed)
+        settings = self.parameters.value
+        self._infos: dict[str, CameraInfo] = {}
+        self._stereo: StereoDepth | None = None
+        self._known = 0.0
+        self._depth = self.advertise(Image, "depth", qos.SILHOUETTE)
+        self._depth_info = self.advertise(CameraInfo, "depth/camera_info", qos.SILHOUETTE)
+        compressed = settings.image_transport == "compressed"
+        topic = "image_raw/compressed" if compressed else "image_raw"
+        kind = CompressedImage if compressed else Image
+        self._topics = {side: self.resolve(f"{side}/{topic}") for side in ("left", "right")}
+        self._kept = {side: RecentImages(_KEPT) for side in ("left", "right")}
+        self.subscribe(CameraInfo, "left/camera_info", self._on_left_info, qos.SENSOR_DATA)
+        self.subscribe(CameraInfo, "right/camera_info", self._on_right_info, qos.SENSOR_DATA)
+        self.subscribe(kind, f"left/{topic}", self._on_left, qos.SENSOR_DATA)
+        self.subscribe(kind, f"right/{topic}", self._on_right, qos.SENSOR_DATA)
+        self.diagnostics.extra = lambda: {"known (% of the image)": f"{100 * self._known:.1f}"}
+        self.diagnostics.source = f"images on {self._topics['left']}"
+        self.diagnostics.wait_for(
+            f"images on {self._topics['left']} and {self._topics['right']}, and the CameraInfo of "
+            "both"
+        )
+
+    def _changed(self, _: StereoDepthParameters) -> None:
+        self._stereo = None
+
+    def _on_left_info(self, message: CameraInfo, _: int) -> None:
+        self._on_info("left", message)
+
+    def _on_right_info(self, message: CameraInfo, _: int) -> None:
+        self._on_info("right", message)
+
+    def _on_info(self, side: str, message: CameraInfo) -> None:
+        before = self._infos.get(side)
+        self._infos[side] = message
+        if before is None or any(
+            not np.array_equal(getattr(before, name), getattr(message, name))
+            for name in ("k", "r", "p", "d", "width", "height")
+        ):
+            self._stereo = None
+
+    def _on_left(self, message: Image | CompressedImage, sent_ns: int) -> None:
+        if self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
+            self._kept["left"].append(message)
+            self._match(sent_ns)
+
+    def _on_right(self, message: Image | CompressedImage, sent_ns: int) -> None:
+        self._kept["right"].append(message)
+        self._match(sent_ns)
+
+    def _match(self, sent_ns: int) -> None:
+        """Measure the latest pair that belongs together; what is older is forgotten."""
+        tolerance_ns = 1e9 * self.parameters.value.tolerance_s
+        for left in reversed(self._kept["left"]):
+            stamp_ns = conversions.stamp_ns(left.header.stamp)
+            for right in reversed(self._kept["right"]):
+                if abs(conversions.stamp_ns(right.header.stamp) - stamp_ns) <= tolerance_ns:
+                    for side, message in (("left", left), ("right", right)):
+                        while self._kept[side].popleft() is not message:
+                            pass
+                    self._measure(left, right, sent_ns)
+                    return
+
+    def _measure(
+        self, left: Image | CompressedImage, right: Image | CompressedImage, sent_ns: int
+    ) -> None:
+        if len(self._infos) < len(self._topics):
+            missing = " and ".join(
+                self.resolve(f"{side}/camera_info")
+                for side in self._topics
+                if side not in self._infos
+            )
+            self.diagnostics.wait_for(f"the CameraInfo on {missing}")
+            return
+        settings = self.parameters.value
+        first, other = (
+            calibration_from_info(self._infos[side], topic, self.resolve(f"{side}/camera_info"))
+            for side, topic in self._topics.items()
+        )
+        height = round(settings.width * first.height / first.width)
+        camera = first.camera(settings.width, height)
+        if self._stereo is None:
+            where = of_rectified_pair(self._infos["left"], self._infos["right"], "the right camera")
+            if where is None:
+                raise CameraError(
+                    "the cameras are no rectified pair: expected P[0,3] = -fx B below 0 in "
+                    f"{self.resolve('right/camera_info')}; calibrate them together, and rectify "
+                    "the images with stereo_image_proc"
+                )
+            self._stereo = stereo_of_pair(
+                camera, other.camera(settings.width, height), where, settings.nearest_m
+            )
+        images = []
+        for message, calibration in ((left, first), (right, other)):
+            most = conversions.most_pixels_of(calibration, settings.max_megapixels)
+            image = to_working_size(conversions.image_of(message, most), settings.width, height)
+            rectifier = calibration.rectifier(settings.width, height)
+            images.append(image if rectifier is None else rectifier(image))
+        depth_m = self._stereo(images[0], images[1])
+        self._known = float(np.count_nonzero(depth_m) / depth_m.size)
+        depth_m[depth_m == 0.0] = np.nan
+        self._depth.publish(conversions.image_message(left.header, depth_m, "32FC1"))
+        self._depth_info.publish(conversions.camera_info_message(left.header, camera))
+        self.diagnostics.working(sent_ns)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    return run_node(StereoDepthNode, plain_command_line("stereo_depth", _DOES, args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""The cameras of a synthetic session: one, or several around the person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.pairing import MOST_CAMERAS
+
+IMAGE_TOPIC = "/camera/image_raw"
+CAMERA_INFO_TOPIC = "/camera/camera_info"
+FRAME_ID = "camera_optical_frame"
+
+# How far round to the person's left the cameras stand, degrees; all at the same distance.
+_ROUND_DEG = (0.0, 65.0, -55.0, 110.0)
+
+
+@dataclass(frozen=True)
+class SyntheticCamera:
+    """One camera of a session.
+
+    Attributes:
+        name: namespace of its topics.
+        camera: pitched as it stands.
+        extrinsics: against the first camera.
+        view: how a further camera sees the person; None of the first one.
+    """
+
+    name: str
+    camera: Camera
+    extrinsics: Extrinsics
+    view: View | None = None
+
+    @property
+    def image_topic(self) -> str:
+        """Where its images are."""
+        return f"/{self.name}/image_raw"
+
+    @property
+    def info_topic(self) -> str:
+        """Where its CameraInfo is."""
+        return f"/{self.name}/camera_info"
+
+    @property
+    def frame_id(self) -> str:
+        """Its optical frame."""
+        return f"{self.name}_optical_frame"
+
+    def seen(
+        self, body: BodyModel, posture: NDArray[np.float64]
+    ) -> tuple[BodyModel, NDArray[np.float64]]:
+        """Return the person in ``posture`` (12,) as they stand before this camera."""
+        if self.view is None:
+            return body, posture
+        there = self.view.states(np.append(posture, [0.0, 0.0]))
+        place = self.view.body.placement
+        x_m, z_m = there[12:].tolist()
+        moved = self.view.body.with_values(
+            distance_m=place.distance_m - x_m, hip_height_m=place.hip_height_m + z_m
+        )
+        return moved, there[:12]
+
+    def truth(self) -> dict[str, Any]:
+        """Return what ``ground_truth.json`` says of it."""
+        rows = np.column_stack([self.extrinsics.rotation, self.extrinsics.translation_m])
+        return {
+            "name": self.name,
+            "width": self.camera.width,
+            "height": self.camera.height,
+            "focal_px": self.camera.fx,
+            "cx": self.camera.cx,
+            "cy": self.camera.cy,
+            "frame_id": self.frame_id,
+            "image_topic": self.image_topic,
+            "info_topic": self.info_topic,
+            "from_first": [*rows.tolist(), [0.0, 0.0, 0.0, 1.0]],
+        }
+
+
+def synthetic_cameras(body: BodyModel, first: Camera, count: int) -> list[SyntheticCamera]:
+    """Return ``count`` cameras alike; the person, placed as ``body``, faces the first.
+
+    The further ones look at the person from where they stand, at the height of the first one.
+
+    Raises:
+        CardboxError: there are none or too many.
+    """
+    if not 1 <= count <= MOST_CAMERAS:
+        raise CardboxError(f"{count} cameras; expected 1 to {MOST_CAMERAS}")
+    alone = Extrinsics(np.eye(3), np.zeros(3))
+    if count == 1:
+        return [SyntheticCamera("camera", first, alone)]
+    cameras = [SyntheticCamera("cam0", first, alone)]
+    upright = first.reference_to_optical_rotation()
+    place = body.placement
+    middle = np.array([-place.distance_m, place.lateral_m, 0.0])
+    for number, angle in enumerate(np.radians(_ROUND_DEG[1:count]).tolist(), 1):
+        c, s = np.cos(angle), np.sin(angle)
+        # A level frame turned about the vertical through the person.
+        level = np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
+        centre = middle + level.T @ np.array([place.distance_m, 0.0, 0.0])
+        rotation = upright @ level @ upright.T
+        where = Extrinsics(rotation, -upright @ level @ centre)
+        view = View.of(body, first, OtherCamera(first.with_pitch(0.0), where))
+        cameras.append(SyntheticCamera(f"cam{number}", view.camera, where, view))
+    return cameras

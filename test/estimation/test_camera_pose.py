@@ -1,0 +1,155 @@
+"""Where a further camera stands, found from a person; and the doubt about wrong extrinsics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation import camera_calibration, camera_guess
+from cardbox_tracker.estimation.camera_agreement import CameraAgreement
+from cardbox_tracker.estimation.camera_calibration import MovingFrame, calibrated_camera
+from cardbox_tracker.estimation.camera_guess import guessed_extrinsics, reference_states
+from cardbox_tracker.estimation.camera_pose import (
+    ROTATION,
+    PoseProblem,
+    Sighting,
+    moved_by,
+    turned_by,
+)
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.simulation.renderer import Renderer, Scene
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+
+BODY = BodyModel.of(hip_height_m=-0.51)
+CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
+OTHER = Camera(320, 240, 310.0, 310.0, 150.0, 124.0)
+
+
+def aside(angle_rad: float = 1.0) -> Extrinsics:
+    """A camera as far from the person as the first one, round to their left."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    turn = np.array([(c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)])
+    centre = np.array([0.0, 0.0, 2.0]) + 2.0 * turn.T @ [0.0, -0.05, -1.0]
+    return Extrinsics(turn, -turn @ centre)
+
+
+TRUE = aside()
+
+
+def sightings(states: list[np.ndarray], body: BodyModel = BODY) -> list[Sighting]:
+    """A round person, who is not the model, as both cameras see them."""
+    view = View.of(body, CAMERA, OtherCamera(OTHER, TRUE))
+    scene, rng = Scene(), np.random.default_rng(0)
+    first, other = Renderer(CAMERA, scene, rng), Renderer(view.camera, scene, rng)
+    found = []
+    for state in states:
+        there = view.states(state)
+        x_m, z_m = there[12:].tolist()
+        place = view.body.placement
+        seen = view.body.with_values(
+            distance_m=place.distance_m - x_m, hip_height_m=place.hip_height_m + z_m
+        )
+        found.append(
+            Sighting(state, first.silhouette(body, state[:12]), other.silhouette(seen, there[:12]))
+        )
+    return found
+
+
+def waving(count: int, every_s: float = 0.5) -> list[np.ndarray]:
+    return [np.append(wave(1.0 + i * every_s), [0.0, 0.0]) for i in range(count)]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_turn_of_the_camera_is_found(axis: int) -> None:
+    change = np.zeros(6)
+    change[axis] = np.radians(3.0)
+    wrong = moved_by(TRUE, change)
+    np.testing.assert_allclose(turned_by(TRUE, wrong), change[:3], atol=1e-9)
+    problem = PoseProblem(BODY, CAMERA, OTHER, wrong, sightings(waving(6)))
+    found = wrong
+    for _ in range(5):
+        found = problem.step(found, ROTATION).extrinsics
+    left = np.degrees(turned_by(TRUE, found))
+    assert abs(left[axis]) < 1.5
+    assert np.linalg.norm(left[:2]) < 1.8
+
+
+def agreement(extrinsics: Extrinsics, count: int) -> CameraAgreement:
+    view = View.of(BODY, CAMERA, OtherCamera(OTHER, extrinsics))
+    asked = CameraAgreement(BODY, CAMERA, [view])
+    frames = sightings(waving(count))
+    for frame in frames:
+        for _ in range(12):
+            asked.see(frame.state, frame.first, [view.upright(frame.other, is_mask=True)])
+    return asked
+
+
+def test_wrong_extrinsics_are_told_and_right_ones_are_not() -> None:
+    right = agreement(TRUE, 15)
+    assert right.is_due
+    right.check()
+    assert not right.is_due
+    assert right.remarks(["cam1"]) == []
+    wrong = agreement(moved_by(TRUE, np.array([np.radians(4.0), *[0.0] * 5])), 15)
+    wrong.check()
+    (text,) = wrong.remarks(["cam1"])
+    assert "cam1" in text
+    assert "degrees" in text
+    assert right.turned_deg[0] is not None
+    assert wrong.turned_deg[0] is not None
+    assert wrong.turned_deg[0] > right.turned_deg[0] + 1.0
+
+
+def test_nothing_is_said_of_a_camera_before_a_window_of_frames() -> None:
+    asked = agreement(TRUE, 5)
+    assert not asked.is_due
+    asked.check()
+    asked.check(is_last=True)
+    assert asked.turned_deg == [None]
+    short = agreement(TRUE, 8)
+    short.check()
+    assert short.turned_deg == [None]
+    short.check(is_last=True)
+    assert short.turned_deg != [None]
+    # One that never sees the person is not waited for.
+    asked.see(waving(1)[0], np.full((240, 320), 255, np.uint8), [None])
+    assert not asked.is_due
+
+
+def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Less of everything than a recording deserves.
+    monkeypatch.setattr(camera_calibration, "_PASSES", 1)
+    monkeypatch.setattr(camera_calibration, "_SIGHTINGS", 8)
+    monkeypatch.setattr(camera_calibration, "_STEPS", 2)
+    monkeypatch.setattr(camera_calibration, "_HALF_STEPS", 1)
+    monkeypatch.setattr(camera_guess, "_BEST", 2)
+    monkeypatch.setattr(camera_guess, "_STEPS", 4)
+    states = reference_states(BODY, "left")
+    seen = sightings(list(states.values()))
+    references = {name: (one.first, one.other) for name, one in zip(states, seen, strict=True)}
+    guess = guessed_extrinsics(BODY, CAMERA, OTHER, references)
+    angle_rad, away_m = guess.difference(TRUE)
+    assert np.degrees(angle_rad) < 10.0
+    assert away_m < 0.4
+    moving = [
+        MovingFrame((one.first, one.other), (None, None)) for one in sightings(waving(16, 0.1))
+    ]
+    found = calibrated_camera(BODY, CAMERA, OTHER, references, moving)
+    angle_rad, away_m = found.extrinsics.difference(TRUE)
+    assert np.degrees(angle_rad) < 6.0
+    assert away_m < 0.25
+    assert found.halves_deg < 10.0
+    assert "degrees" in str(found)
+    with pytest.raises(InitializationError, match="ten seconds or longer"):
+        calibrated_camera(BODY, CAMERA, OTHER, references, moving[:3])
+
+
+def test_no_pose_is_guessed_where_nobody_is_seen() -> None:
+    nobody = np.zeros((240, 320), np.uint8)
+    references = dict.fromkeys(("front", "side", "arms"), (nobody, nobody))
+    with pytest.raises(InitializationError, match="do not show the person"):
+        guessed_extrinsics(BODY, CAMERA, OTHER, references)
