@@ -85,6 +85,7 @@ setup(
             f"tracker = {NAME}.start:tracker",
             f"camera = {NAME}.start:camera",
             f"play_bag = {NAME}.start:play_bag",
+            f"rula = {NAME}.start:rula",
             f"cardbox_nodes = {NAME}.start:cardbox_nodes",
         ],
     },

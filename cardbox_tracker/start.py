@@ -20,6 +20,7 @@ NODES: dict[str, str] = {
     "tracker": "cardbox_tracker.ros.nodes.tracker_node",
     "camera": "cardbox_tracker.ros.nodes.camera_node",
     "play_bag": "cardbox_tracker.ros.nodes.play_bag_node",
+    "rula": "cardbox_tracker.ros.nodes.rula_node",
     "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
 }
 """Module of each executable that ``ros2 run cardbox_tracker`` knows, besides ``cardbox``."""
@@ -75,6 +76,11 @@ def camera() -> int:
 def play_bag() -> int:
     """Run the node ``play_bag``."""
     return _node("play_bag")
+
+
+def rula() -> int:
+    """Run the node ``rula``."""
+    return _node("rula")
 
 
 def cardbox_nodes() -> int:

@@ -20,6 +20,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("body",),
     ("vision", "description"),
     ("estimation",),
+    ("ergonomics",),
     ("drawing",),
     ("outputs",),
     ("recordings",),

@@ -20,7 +20,7 @@ import cardbox_tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
-CORE = ("body", "vision", "estimation", "description", "drawing")
+CORE = ("body", "vision", "estimation", "description", "ergonomics", "drawing")
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
 OUTER = ("recordings", "ros", "simulation", "evaluation", "demo", "benchmarks", "commands")
 MESSAGES = (

@@ -27,6 +27,7 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.nodes.rula_node import RulaNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
@@ -81,7 +82,7 @@ def policy(nodes: dict[str, Access]) -> str:
     operator = Access(publish={"/rosout", "/parameter_events"}, subscribe={"/diagnostics"})
     for name, access in nodes.items():
         operator.request |= access.triggers
-        if name in ("initializer", "tracker"):
+        if name in ("initializer", "tracker", "rula"):
             operator.subscribe |= access.publish - set(_GLOBAL)
     root = ElementTree.Element("policy", version="0.2.0")
     root.append(ElementTree.Comment(_COMMENT))
@@ -125,6 +126,7 @@ def running(folder: Path, domain: int | None = None) -> Iterator[tuple[Any, tupl
         BackgroundNode: {},
         InitializerNode: {},
         TrackerNode: {},
+        RulaNode: {},
     }
     make: Any = Parameter
     made = []

@@ -33,6 +33,9 @@ CSV_HEADER = (
     *JOINT_STATE_NAMES[N_JOINTS:],
 )
 
+Observer = Callable[[Frame, Estimate, Tracker], None]
+"""Is told of each image and what was found in it."""
+
 _VIDEO_SCALE = 2
 
 
@@ -56,12 +59,12 @@ def track_recording(
     config: TrackerConfig,
     seed: int,
     start_s: float,
-    csv_path: Path,
+    csv_path: Path | None,
     video_path: Path | None = None,
     fps: float = 15.0,
-    observers: tuple[Callable[[Frame, Estimate, Tracker], None], ...] = (),
+    observers: tuple[Observer, ...] = (),
 ) -> TrackSummary:
-    """Track every image from ``start_s`` on and write one CSV row for each.
+    """Track every image from ``start_s`` on; write one CSV row for each.
 
     Args:
         source: the recording, or several cameras of it.
@@ -69,7 +72,7 @@ def track_recording(
         config: settings of the tracker.
         seed: the same recording and seed give the same bytes.
         start_s: when the person stands in the front reference posture, from the bag's start.
-        csv_path: written atomically.
+        csv_path: written atomically, if at all.
         video_path: where to write the overlay, if at all.
         fps: frames a second of the video.
         observers: called after each image, such as a progress bar or a bag writer.
@@ -84,11 +87,13 @@ def track_recording(
     ious: list[float] = []
     frames = frames_uncertain = 0
     with ExitStack() as stack:
-        table = stack.enter_context(
-            stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
-        )
-        rows = csv.writer(table, lineterminator="\n")
-        rows.writerow(CSV_HEADER)
+        rows = None
+        if csv_path is not None:
+            table = stack.enter_context(
+                stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
+            )
+            rows = csv.writer(table, lineterminator="\n")
+            rows.writerow(CSV_HEADER)
         draw = None
         if video_path is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
@@ -96,7 +101,8 @@ def track_recording(
         for frame, estimate in _estimates(source, tracker, start_s):
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
-            rows.writerow(csv_row(frame.stamp_ns, estimate))
+            if rows is not None:
+                rows.writerow(csv_row(frame.stamp_ns, estimate))
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)

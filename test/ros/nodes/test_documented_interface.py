@@ -27,11 +27,12 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E4
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
+from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.simulation.session import session_camera  # noqa: E402
 
 ROOT = Path(__file__).parents[3]
-NODES = ("camera", "play_bag", "background", "initializer", "tracker")
+NODES = ("camera", "play_bag", "background", "initializer", "tracker", "rula")
 # What rclpy adds to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
 ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
@@ -126,6 +127,8 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
             make(TrackerNode, rep155_id="ID"),
             make(TrackerNode, cameras=["CAMERA"], depth="DEPTH"),
         ]
+    if name == "rula":
+        return [make(RulaNode)]
     return [make(InitializerNode), make(InitializerNode, cameras=["CAMERA"])]
 
 
