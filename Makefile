@@ -72,8 +72,14 @@ lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# Optional libraries, 200 MB, for the tests of what needs them; 'make setup' does without.
+$(VENV)/extras: setup.py $(VENV)/package
+	$(PIP) install --quiet .[view]
+	@rm -rf build/lib build/bdist.* *.egg-info
+	@touch $@
+
 .PHONY: test
-test: lint
+test: lint $(VENV)/extras
 	$(BIN)/python -m pytest
 
 .PHONY: demo

@@ -24,6 +24,8 @@ TEST = [
     "types-tqdm",
     "yourdfpy>=0.0.56",
 ]
+# 170 MB, so only for those who want the viewer. Its interface changes with each minor version.
+VIEW = ["rerun-sdk>=0.41,<0.42"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
 
@@ -75,6 +77,7 @@ setup(
         "ros": ROS,
         "test": TEST,
         "colcon": COLCON,
+        "view": VIEW,
         "mediapipe": ["mediapipe==0.10.21"],
     },
     entry_points={

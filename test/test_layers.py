@@ -26,6 +26,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("recordings",),
     ("simulation",),
     ("evaluation",),
+    ("viewing",),
     ("ros",),
     ("demo",),
     ("benchmarks",),

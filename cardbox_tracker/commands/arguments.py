@@ -12,13 +12,19 @@ if TYPE_CHECKING:
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 
-def add_recording(parser: argparse.ArgumentParser) -> None:
+def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Add the recording to read and the span in which its background is learned."""
-    parser.add_argument("recording", type=Path, metavar="BAG", help="rosbag2 folder or file")
+    parser.add_argument(
+        "recording",
+        type=Path,
+        nargs=None if required else "?",
+        metavar="BAG",
+        help="rosbag2 folder or file",
+    )
     parser.add_argument(
         "--background",
         type=span,
-        required=True,
+        required=required,
         metavar="T0:T1",
         help="seconds during which nobody is in view",
     )

@@ -19,6 +19,7 @@ from cardbox_tracker.commands import (
     synthesize,
     track,
     urdf,
+    view,
 )
 from cardbox_tracker.commands.command import Command
 from cardbox_tracker.commands.signals import Terminated, ended_by_signals
@@ -32,6 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     initialize,
     body,
     track,
+    view,
     rula,
     benchmark,
     urdf,

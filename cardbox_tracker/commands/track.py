@@ -46,11 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
 
 
-def add_inputs(parser: argparse.ArgumentParser) -> None:
-    """Add what every subcommand asks that tracks a recording: it, the person, the settings."""
+def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Add what every subcommand asks that tracks a recording: it, the person, the settings.
+
+    Without ``required`` the recording may be missing, or one of results that needs no more.
+    """
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
-    add_recording(parser)
+    add_recording(parser, required)
     add_cameras(parser)
     parser.add_argument(
         "--depth",
@@ -62,14 +65,14 @@ def add_inputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        required=True,
+        required=required,
         metavar="MODEL.yaml",
         help="the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
     )
     parser.add_argument(
         "--start",
         type=time,
-        required=True,
+        required=required,
         metavar="T",
         help="second at which the person stands as for --front; tracking starts there. A body of "
         "'cardbox body' is fitted to the first silhouette from then on, in any posture",
