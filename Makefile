@@ -74,7 +74,7 @@ lint: $(VENV)/package
 
 # Optional libraries, 200 MB, for the tests of what needs them; 'make setup' does without.
 $(VENV)/extras: setup.py $(VENV)/package
-	$(PIP) install --quiet .[view]
+	$(PIP) install --quiet .[view,retarget]
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@
 
@@ -128,7 +128,7 @@ colcon: setup
 		| tar --create --null --files-from=- | tar --extract --directory=$(COLCON)/src/cardbox_tracker
 	cd $(COLCON) && export AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH=$(BIN):$$PATH && \
 		colcon build --event-handlers console_direct+ && \
-		for name in cardbox background initializer tracker camera play_bag rula cardbox_nodes; do \
+		for name in cardbox background initializer tracker camera play_bag rula retarget cardbox_nodes; do \
 			test -x install/cardbox_tracker/lib/cardbox_tracker/$$name || \
 				{ echo "colcon installed no $$name" >&2; exit 1; }; \
 		done && \

@@ -20,7 +20,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("body",),
     ("vision", "description"),
     ("estimation",),
-    ("ergonomics",),
+    ("ergonomics", "retargeting"),
     ("drawing",),
     ("outputs",),
     ("recordings",),

@@ -20,7 +20,10 @@ import cardbox_tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
-CORE = ("body", "vision", "estimation", "description", "ergonomics", "drawing")
+CORE = (
+    *("body", "vision", "estimation", "description", "ergonomics", "retargeting"),
+    "drawing",
+)
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
 OUTER = (
     *("recordings", "ros", "simulation", "evaluation", "viewing", "demo", "benchmarks"),
@@ -35,6 +38,7 @@ MESSAGES = (
     "sensor_msgs",
     "std_msgs",
     "std_srvs",
+    "trajectory_msgs",
     "visualization_msgs",
 )
 ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
@@ -253,7 +257,13 @@ def outside(folder: Path) -> set[str]:
 
 
 def test_what_is_imported_is_declared() -> None:
-    distributions = {"cv2": "opencv-python-headless", "yaml": "pyyaml", "rerun": "rerun-sdk"}
+    distributions = {
+        "cv2": "opencv-python-headless",
+        "pink": "pin-pink",
+        "pinocchio": "pin",
+        "rerun": "rerun-sdk",
+        "yaml": "pyyaml",
+    }
     from_ros = {"rclpy", "ament_index_python", "launch", "launch_ros", *MESSAGES}
     in_xml = {element.text for element in package_xml().findall("exec_depend")}
     for name in sorted(outside(SOURCES) | outside(ROOT / "launch") | outside(ROOT / "tools")):

@@ -82,14 +82,15 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
     from cardbox_tracker.evaluation.truth import load_ground_truth
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.result_reader import has_results
     from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.result_bag import is_result_bag, show_results
+    from cardbox_tracker.viewing.result_bag import show_results
     from cardbox_tracker.viewing.tracking import ShownTracking
 
     truth = options.truth or _truth_beside(options.recording)
     feed = Feed(scene, None if truth is None else load_ground_truth(truth).frames)
     with BagReader(options.recording) as bag:
-        if is_result_bag(bag):
+        if has_results(bag):
             with progress_bar("view") as show:
                 return show_results(bag, feed, show)
     missing = [name for name in ("model", "background", "start") if getattr(options, name) is None]

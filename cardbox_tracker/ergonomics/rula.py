@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import rotation_x, rotation_y
+from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
@@ -27,8 +27,6 @@ from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.tables import TABLE_A, TABLE_B, TABLE_C, ScoreArray
 
 BoolArray = NDArray[np.bool_]
-
-_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 class ArmScores(NamedTuple):
@@ -112,9 +110,7 @@ def lower_arm_score(
 def _arm(
     body: BodyModel, angles: FloatArray, side: float, rest: ScoreArray, config: RulaConfig
 ) -> ArmScores:
-    upper_frame = rotation_x(side * angles[..., 0]) @ rotation_y(-angles[..., 1])
-    upper = upper_frame @ _DOWN
-    fore = upper_frame @ rotation_x(side * angles[..., 2]) @ rotation_y(-angles[..., 3]) @ _DOWN
+    upper, fore = arm_directions(angles, side)
     parts = body_parts(body.sizes)
     hand_m = side * parts.shoulder_aside_m + (
         parts.upper_arm.height_m * upper[..., 1] + parts.forearm.height_m * fore[..., 1]

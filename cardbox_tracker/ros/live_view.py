@@ -12,6 +12,8 @@ from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.viewing.feed import Feed
 from cardbox_tracker.viewing.scene import Scene
 
+_ROBOT = "retarget"
+
 
 class LiveView(CardboxNode):
     """Hands the tracker's results to the viewer; a robot's too, of the node ``retarget``."""
@@ -38,6 +40,13 @@ class LiveView(CardboxNode):
             qos.RESULT,
         )
         self.subscribe(
+            String,
+            f"{_ROBOT}/robot_description",
+            lambda m, _: feed.robot(_ROBOT, m.data),
+            qos.LATCHED,
+        )
+        self.subscribe(JointState, f"{_ROBOT}/joint_states", self._on_robot_joints, qos.RESULT)
+        self.subscribe(
             Image,
             "overlay",
             lambda m, _: feed.image(_stamp_ns(m), conversions.image_of(m)),
@@ -51,6 +60,11 @@ class LiveView(CardboxNode):
         self._latest_ns = _stamp_ns(message)
         self._feed.joints(self._latest_ns, results.joint_values_of(message))
         self.diagnostics.working(sent_ns)
+
+    def _on_robot_joints(self, message: JointState, _: int) -> None:
+        stamp_ns = _stamp_ns(message) or self._latest_ns
+        if stamp_ns:
+            self._feed.robot_joints(stamp_ns, _ROBOT, results.joint_values_of(message))
 
     def _on_state(self, message: String, _: int) -> None:
         # It has no stamp; it is sent before the other results of its image.

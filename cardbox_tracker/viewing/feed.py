@@ -13,8 +13,8 @@ from cardbox_tracker.evaluation.truth import TrueFrame
 from cardbox_tracker.outputs import JointValues
 from cardbox_tracker.viewing.scene import Scene
 
-# Where a robot stands: beside the person, about as far from the camera.
-ROBOT_PLACE_M = (1.5, 1.2, -0.5)
+# Where a robot stands: beside the person, about as far from the camera, and facing it.
+ROBOT_PLACE_M = (2.0, 0.9, 0.0)
 
 
 class Feed:

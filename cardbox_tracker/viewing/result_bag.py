@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.errors import BagError
-from cardbox_tracker.outputs import JointValues
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader
+from cardbox_tracker.recordings.result_reader import (
+    MODEL,
+    joints_of,
+    namespace_of,
+    stamp_ns_of,
+)
 from cardbox_tracker.viewing.feed import Feed
 from cardbox_tracker.vision.encodings import decode_bgr
 
-_MODEL, _ROBOT, _JOINTS = "/body_model", "/robot_description", "/joint_states"
-
-
-def is_result_bag(bag: BagReader) -> bool:
-    """Return whether a recording has results of the tracker, not only images."""
-    return any(topic.endswith(_MODEL) for topic in bag.topics)
+_ROBOT, _JOINTS = "/robot_description", "/joint_states"
 
 
 def show_results(
@@ -34,10 +34,7 @@ def show_results(
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
     """
-    models = sorted(topic for topic in bag.topics if topic.endswith(_MODEL))
-    if not models:
-        raise BagError(f"{bag.path} has no results of the tracker: no topic body_model")
-    space = models[0].removesuffix(_MODEL)
+    space = namespace_of(bag)
     handlers = _handlers(bag, feed, space) | _robots(bag, feed, space)
     count, total_s = 0, max(bag.duration_s, 1e-9)
     for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
@@ -60,12 +57,12 @@ Handler = Callable[[BagMessage, Any], None]
 def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
     """What is done with the topics of the tracker in the namespace ``space``."""
     return {
-        space + _MODEL: lambda m, c: feed.model(str(c.data), f"{m.topic} of {bag.path}"),
+        space + MODEL: lambda m, c: feed.model(str(c.data), f"{m.topic} of {bag.path}"),
         space + "/tracking_state": lambda m, c: feed.state(m.time_ns, str(c.data)),
-        space + _JOINTS: lambda _, c: feed.joints(_stamp_ns(c), _joints(c)),
-        space + "/joint_states_stddev": lambda _, c: feed.deviations(_stamp_ns(c), _joints(c)),
-        space + "/keypoints": lambda _, c: feed.keypoints(_stamp_ns(c), _points(c)),
-        space + "/overlay": lambda _, c: feed.image(_stamp_ns(c), _image(c)),
+        space + _JOINTS: lambda _, c: feed.joints(stamp_ns_of(c), joints_of(c)),
+        space + "/joint_states_stddev": lambda _, c: feed.deviations(stamp_ns_of(c), joints_of(c)),
+        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
+        space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), _image(c)),
     }
 
 
@@ -79,18 +76,9 @@ def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
         name = robot.strip("/").replace("/", "_") or "robot"
         handlers[topic] = lambda _, c, name=name: feed.robot(name, str(c.data))  # type: ignore[misc]
         handlers[robot + _JOINTS] = lambda _, c, name=name: feed.robot_joints(  # type: ignore[misc]
-            _stamp_ns(c), name, _joints(c)
+            stamp_ns_of(c), name, joints_of(c)
         )
     return handlers
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
-
-
-def _joints(message: Any) -> JointValues:
-    return JointValues(tuple(message.name), np.array(message.position, np.float64))
 
 
 def _points(message: Any) -> np.ndarray[Any, np.dtype[np.float64]]:

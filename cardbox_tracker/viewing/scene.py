@@ -29,6 +29,7 @@ _COLOURS = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
 _MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
 _SPREAD = 2.0
 """Standard deviations between which nine in ten errors lie."""
+_HALF_TURN = (0.0, 0.0, 1.0, 0.0)
 _SHOULDERS = [0, 3]
 _ARMS = ((0, 1, 2), (3, 4, 5))
 _RADIUS_M = 0.018
@@ -65,10 +66,13 @@ class Scene:
         self._robot("person", urdf_from_body(body))
 
     def robot(self, name: str, urdf: str, place_m: Sequence[float]) -> None:
-        """Also show a robot, whose root stands at ``place_m`` of the camera's level frame."""
+        """Also show a robot that faces the camera, its root at ``place_m`` of the level frame."""
         root = self._robot(name, urdf)
         put = self._rr.Transform3D(
-            translation=place_m, parent_frame=ROOT_FRAME, child_frame=f"{name}/{root}"
+            translation=place_m,
+            quaternion=self._rr.Quaternion(xyzw=_HALF_TURN),
+            parent_frame=ROOT_FRAME,
+            child_frame=f"{name}/{root}",
         )
         self._stream.log(f"{name}/place", put, static=True)
 

@@ -21,7 +21,7 @@ from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.estimation.tracker import Estimate, Tracker
-from cardbox_tracker.evaluation.recorded.angles import joint_angles
+from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import track_session
 
@@ -99,10 +99,7 @@ def score_errors(
 
 def true_scores(session: RecordedSession, body: BodyModel, rula: RulaConfig) -> ScoreArray:
     """Return the grand scores (n,) of the true joints; of ``body`` come the lengths."""
-    postures = np.zeros((len(session.stamps_ns), 12))
-    pitch_rad = float(np.radians(session.truth.pitch_deg))
-    torso = np.nan_to_num(session.torso_rad)
-    postures[:, 1:] = joint_angles(session.keypoints_m, torso, pitch_rad)
+    postures = true_postures(session)
     return rula_scores(body, postures, rula).grand
 
 

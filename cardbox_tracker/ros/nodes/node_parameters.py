@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.initialization.config import (
 from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.nodes.input_parameters import CameraParameters, PlayBagParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.nodes.use_parameters import RulaParameters
+from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters, RulaParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
@@ -189,5 +189,6 @@ NODES: dict[str, type[NodeParameters]] = {
     "camera": CameraParameters,
     "play_bag": PlayBagParameters,
     "rula": RulaParameters,
+    "retarget": RetargetParameters,
 }
 """Node name to its parameters."""
