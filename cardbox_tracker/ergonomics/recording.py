@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.distribution import ScoreDistribution, expected
 from cardbox_tracker.ergonomics.tables import ACTION_LEVELS, HIGHEST
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import stamp_text, write_table
 
 ABOVE = 5
 """The score above which time is counted: work has to be changed soon, or at once."""
@@ -83,17 +82,11 @@ def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
     Raises:
         CardboxError: the file cannot be written.
     """
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(CSV_HEADER)
-        table.writerows(_fields(row) for row in rows)
+    write_table(path, CSV_HEADER, map(_fields, rows))
 
 
 def _fields(row: RulaRow) -> list[str]:
-    stamp = f"{row.stamp_ns // 10**9}.{row.stamp_ns % 10**9:09d}"
+    stamp = stamp_text(row.stamp_ns)
     if row.scores is None:
         return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
     scores = row.scores

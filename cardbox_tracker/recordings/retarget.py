@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import stamp_text, write_table
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import read_results
@@ -40,16 +39,11 @@ def write_csv(steps: Sequence[Step], joints: Sequence[str], path: Path) -> None:
     Raises:
         CardboxError: the file cannot be written.
     """
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(("stamp", "status", *joints))
-        for stamp_ns, command in steps:
-            stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
-            positions = (f"{value:.6f}" for value in command.positions)
-            table.writerow((stamp, command.status, *positions))
+    rows = (
+        (stamp_text(stamp_ns), command.status, *(f"{value:.6f}" for value in command.positions))
+        for stamp_ns, command in steps
+    )
+    write_table(path, ("stamp", "status", *joints), rows)
 
 
 def write_bag(

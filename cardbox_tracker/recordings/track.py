@@ -18,7 +18,7 @@ from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import UNCERTAIN, Estimate, Tracker
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import atomic_path, stamp_text
 from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
 from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
@@ -141,7 +141,7 @@ def _estimates(
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
     """Return the row of one image; what is not known is left empty."""
-    stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+    stamp = stamp_text(stamp_ns)
     joints = joint_values(estimate)
     if joints is None or estimate.keypoints_m is None:
         return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]
