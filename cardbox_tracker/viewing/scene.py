@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.outputs import JointValues
 from cardbox_tracker.viewing.layout import (
     ERROR,
@@ -77,17 +78,26 @@ class Scene:
         self._stream.log(f"{name}/place", put, static=True)
 
     def _robot(self, name: str, urdf: str) -> str:
-        """Log geometry and joints below ``name`` and return the root link."""
+        """Log geometry and joints below ``name`` and return the root link.
+
+        Raises:
+            CardboxError: the description cannot be read.
+        """
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{name}.urdf"
             path.write_text(urdf, encoding="utf-8")
-            tree = self._rr.urdf.UrdfTree.from_file_path(
-                path,
-                entity_path_prefix=name,
-                frame_prefix=f"{name}/",
-                static_transform_entity_path=f"{name}/links",
-            )
-            tree.log_urdf_to_recording(self._stream)
+            try:
+                tree = self._rr.urdf.UrdfTree.from_file_path(
+                    path,
+                    entity_path_prefix=name,
+                    frame_prefix=f"{name}/",
+                    static_transform_entity_path=f"{name}/links",
+                )
+                tree.log_urdf_to_recording(self._stream)
+            except Exception as error:
+                # The library passes on whatever its parsers raise.
+                reason = cut(" ".join(str(error).split()))
+                raise CardboxError(f"the viewer cannot show the robot {name}: {reason}") from None
         self._trees[name] = {
             joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"
         }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
@@ -18,6 +19,8 @@ from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.hand import HandFollower
 from cardbox_tracker.retargeting.retargeter import Retargeter
 from cardbox_tracker.retargeting.robot import Robot
+
+BoolArray = NDArray[np.bool_]
 
 SIDES = ("left", "right")
 
@@ -43,13 +46,13 @@ class HandError:
     with_frozen: float
 
 
-def hand_error(
+def hand_errors(
     session: RecordedSession,
     tracker: TrackerConfig,
     seed: int,
     robot: Robot,
-    config: Callable[[str], RetargetConfig],
-) -> HandError:
+    configs: Sequence[RetargetConfig],
+) -> list[HandError]:
     """Track a session and let a robot follow either arm, as measured and as it truly was.
 
     Args:
@@ -57,7 +60,7 @@ def hand_error(
         tracker: settings of the tracker.
         seed: of initialization and filters.
         robot: the arm.
-        config: settings for ``left`` and ``right``.
+        configs: settings, each for an error of its own; ``side`` does not count.
 
     Raises:
         CardboxError: the recording or the robot cannot be used.
@@ -77,17 +80,28 @@ def hand_error(
         raise ValueError(f"{session.name} has no image with both an estimate and the true torso")
     stamps = session.stamps_ns[known].tolist()
     truth = true_postures(session)[known]
-    sides = [
-        _distances(robot, config(side), body[0], stamps, [found[s] for s in stamps], truth)
-        for side in SIDES
+    estimates = [found[stamp] for stamp in stamps]
+    return [
+        _error(
+            [
+                _distances(robot, replace(config, side=side), body[0], stamps, estimates, truth)
+                for side in SIDES
+            ]
+        )
+        for config in configs
     ]
+
+
+def _error(sides: Sequence[tuple[FloatArray, BoolArray]]) -> HandError:
+    """Return the error of both arms, each with distances and whether the robot moved."""
     distance_cm = np.concatenate([distance for distance, _ in sides])
     moving = np.concatenate([is_moving for _, is_moving in sides])
-    half, most = np.percentile(distance_cm[moving], (50, 90)).tolist()
+    while_moving = distance_cm[moving] if moving.any() else np.array([np.nan])
+    half, most = np.percentile(while_moving, (50, 90)).tolist()
     return HandError(
-        images=len(stamps),
+        images=len(distance_cm) // len(sides),
         frozen=float(1.0 - moving.mean()),
-        mean=float(distance_cm[moving].mean()),
+        mean=float(while_moving.mean()),
         percentile_50=half,
         percentile_90=most,
         with_frozen=float(distance_cm.mean()),
@@ -101,7 +115,7 @@ def _distances(
     stamps_ns: list[int],
     estimates: list[Estimate],
     truth: FloatArray,
-) -> tuple[FloatArray, np.typing.NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Return the distance of the hands (n,), cm, and whether the robot moved (n,)."""
     follower = HandFollower(robot, config)
     measured, true = (Retargeter(robot, follower, config) for _ in range(2))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +12,15 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.body.model_file import dumps_body_model  # noqa: E402
-from cardbox_tracker.body.posture import JOINT_NAMES  # noqa: E402
 from cardbox_tracker.body.proportions import body_from_proportions  # noqa: E402
 from cardbox_tracker.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 
 CONFIG = Path(__file__).parents[3] / "config"
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))
-
-
-class Heard:
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
-
-    def publish(self, message: Any) -> None:
-        self.messages.append(message)
 
 
 def make(**parameters: Any) -> Any:
@@ -46,35 +36,34 @@ def ros() -> Iterator[None]:
 
 
 @pytest.fixture
-def node(ros: None) -> Iterator[Any]:
+def node(ros: None, heard: Any) -> Iterator[Any]:
     joint_map = str(CONFIG / "example_joint_map.yaml")
     made = make(robot_file=str(CONFIG / "example_arm.urdf"), joint_map_file=joint_map)
-    made._trajectory, made._commands, made._robot_joints, made._says = (Heard() for _ in range(4))
+    made._trajectory, made._commands, made._robot_joints, made._says = (heard() for _ in range(4))
     made._on_model(MODEL, 0)
     yield made
     made.destroy_node()
 
 
-def joints(tenth: int, values: dict[str, float], other: float = 0.0) -> JointState:
-    message = JointState(name=list(JOINT_NAMES))
-    message.position = [values.get(name, other) for name in JOINT_NAMES]
-    message.header.stamp.sec, message.header.stamp.nanosec = 1, tenth * 10**8
-    return message
+@pytest.fixture
+def send(node: Any, joints: Any) -> Callable[..., None]:
+    """Hand the node what the tracker sends of one image."""
 
+    def hand_over(tenth: int, state: str = "tracking", deviation: float = 0.1) -> None:
+        node._on_state(String(data=state), 0)
+        node._on_joints(joints(tenth, {"right_shoulder_abduction": 1.0}), 0)
+        node._on_stddev(joints(tenth, {}, other=deviation), 0)
 
-def send(node: Any, tenth: int, state: str = "tracking", deviation: float = 0.1) -> None:
-    node._on_state(String(data=state), 0)
-    node._on_joints(joints(tenth, {"right_shoulder_abduction": 1.0}), 0)
-    node._on_stddev(joints(tenth, {}, other=deviation), 0)
+    return hand_over
 
 
 def said(node: Any) -> list[str]:
     return [message.data for message in node._says.messages]
 
 
-def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(node: Any) -> None:
+def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(node: Any, send: Any) -> None:
     for tenth in range(3):
-        send(node, tenth)
+        send(tenth)
     moved = np.array([message.data.tolist() for message in node._commands.messages])
     np.testing.assert_allclose(moved, [[0, 0, 0], [-0.1, 0, 0], [-0.2, 0, 0]], atol=1e-12)
     node._on_state(String(data="lost"), 0)
@@ -88,16 +77,16 @@ def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(node: Any) 
     assert (last.header.stamp.sec, last.header.stamp.nanosec) == (0, 0)
 
 
-def test_an_uncertain_posture_moves_nothing(node: Any) -> None:
-    send(node, 0)
-    send(node, 1, deviation=2.0)
-    send(node, 2, state="uncertain")
+def test_an_uncertain_posture_moves_nothing(node: Any, send: Any) -> None:
+    send(0)
+    send(1, deviation=2.0)
+    send(2, state="uncertain")
     assert {tuple(message.data) for message in node._commands.messages} == {(0.0, 0.0, 0.0)}
     assert said(node) == ["moving", "frozen: too uncertain", "frozen: uncertain"]
 
 
-def test_silence_is_a_dead_man_too(node: Any) -> None:
-    send(node, 0)
+def test_silence_is_a_dead_man_too(node: Any, send: Any) -> None:
+    send(0)
     node._check()
     assert said(node) == ["moving"]
     node._heard_s -= 1.0
