@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--hand",
-        default="",
+        default=None,
         metavar="LINK",
         help="the robot's hand; without it, the link with the most joints before it",
     )
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
         results=() if options.bag is None else (options.bag,),
     )
     config = settings_from(options, RetargetConfig)
-    robot, retargeter = make_retargeter(options.robot, options.map, options.hand, config)
+    robot, retargeter = make_retargeter(options.robot, options.map, options.hand or "", config)
     with BagReader(options.results) as bag:
         steps = retarget_bag(bag, retargeter)
         if options.csv is not None:

@@ -26,6 +26,9 @@ def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None
             group.add_argument(flag, action="store_true", help=text)
             continue
         unit = f" [{setting.unit}]" if setting.unit else ""
+        if setting.choices:
+            group.add_argument(flag, choices=setting.choices, default=default, help=text)
+            continue
         allowed = f"; {setting.range_text}" if setting.range_text else ""
         group.add_argument(
             flag, type=type(default), default=default, metavar="N", help=f"{text}{unit}{allowed}"

@@ -69,7 +69,7 @@ def test_the_robot_follows_and_stands_still(
         (("--map", str(ROBOT)), "is no joint map"),
         (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or a hand"),
         (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
-        (("--side", "both"), "--side is 'both'; expected one of left, right"),
+        (("--side", "both"), "--side: invalid choice: 'both'"),
     ],
 )
 def test_mistakes_of_retarget(
