@@ -29,7 +29,7 @@ from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.further_camera import FurtherCamera
 from cardbox_tracker.estimation.person_region import PersonRegion
-from cardbox_tracker.estimation.sampling import normal_postures
+from cardbox_tracker.estimation.sampling import likely_postures
 from cardbox_tracker.estimation.size_refinement import SizeRefinement
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
@@ -265,20 +265,9 @@ class Tracker:
         return estimate
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return postures (count, 12), equally likely, that the last ``estimate`` stands for.
-
-        They come from the filter's particles; where it has none of whole states, from a normal
-        distribution of each joint by itself, :func:`.sampling.normal_postures`.
-
-        Raises:
-            ValueError: the estimate has no posture.
-        """
-        if estimate.posture is None or estimate.posture_stddev is None:
-            raise ValueError(f"an estimate in the state {estimate.state} has no posture to sample")
-        if self._particles is not None and estimate.offset_m is not None:
-            around = np.concatenate([estimate.posture, estimate.offset_m])
-            return self._particles.postures(around, count, rng)
-        return normal_postures(estimate.posture, estimate.posture_stddev, count, rng)
+        """Return postures (count, 12) as likely as the last ``estimate``: ``likely_postures``."""
+        found = estimate.posture, estimate.posture_stddev, estimate.offset_m
+        return likely_postures(*found, self._particles, count, rng)
 
     def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
         frame = self._silhouette.frame(silhouette, image, self._before)

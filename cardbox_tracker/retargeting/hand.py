@@ -102,15 +102,18 @@ class HandFollower:
         for _ in range(_STEPS):
             if np.linalg.norm(self._task.compute_error(self._configuration)[:3]) < _CLOSE_M:
                 break
-            velocity = self._pink.solve_ik(
-                self._configuration,
-                self._tasks,
-                1.0,
-                solver="daqp",
-                damping=_DAMPING,
-                limits=self._limits,
-                safety_break=False,
-            )
+            try:
+                velocity = self._pink.solve_ik(
+                    self._configuration,
+                    self._tasks,
+                    1.0,
+                    solver="daqp",
+                    damping=_DAMPING,
+                    limits=self._limits,
+                    safety_break=False,
+                )
+            except self._pink.exceptions.PinkError:
+                return np.full(len(self.joints), np.nan)  # no solution: the robot stands still
             self._configuration.integrate_inplace(velocity, 1.0)
         found: FloatArray = self._configuration.q[self._order]
         return found
@@ -144,6 +147,7 @@ def _libraries() -> tuple[Any, Any]:
     try:
         import daqp  # noqa: F401
         import pink
+        import pink.exceptions
         import pink.limits
         import pink.tasks
         import pinocchio

@@ -31,7 +31,7 @@ class Method(Protocol):
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """Return where the robot's joints (n,) should be for a posture (12,).
 
-        ``now`` is where they are. Nothing has to be within any limit.
+        ``now`` is where they are. Nothing has to be within any limit; nan: there is no solution.
         """
 
 

@@ -93,6 +93,20 @@ def test_limits_and_speeds_hold_for_any_posture(shares: list[list[float]]) -> No
 
 
 @pytest.mark.usefixtures("libraries")
+def test_without_a_solution_the_robot_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = pytest.importorskip("pink.exceptions")
+
+    def fails(*_: object, **__: object) -> None:
+        raise errors.PinkError("no solution")
+
+    robot = Retargeter(ROBOT, HandFollower(ROBOT, RetargetConfig()), RetargetConfig())
+    monkeypatch.setattr("pink.solve_ik", fails)
+    command = robot.update(0, "tracking", BODY, posture(right_elbow_flexion=80), np.zeros(12))
+    assert command.status == "frozen: no solution"
+    assert not command.positions.any()
+
+
+@pytest.mark.usefixtures("libraries")
 def test_a_robot_that_is_no_arm_is_told() -> None:
     with pytest.raises(CardboxError, match="no link 'foot'"):
         HandFollower(ROBOT, RetargetConfig(), "foot")
