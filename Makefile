@@ -72,8 +72,18 @@ lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# Optional libraries, 170 MB for 'view' and 80 for 'retarget', so that their tests are not skipped.
+# 'make setup' does without. By their names, for '.[view]' would install the package once more.
+NEEDED = import importlib.metadata, re; print(*(line.split(";")[0] for line in \
+	importlib.metadata.requires("cardbox_tracker") \
+	if re.search("extra == .(view|retarget)", line)), sep="\n")
+$(VENV)/extras: setup.py | $(VENV)/package
+	$(BIN)/python -I -c '$(NEEDED)' > $@.txt
+	$(PIP) install --quiet --requirement $@.txt
+	@touch $@
+
 .PHONY: test
-test: lint
+test: lint $(VENV)/extras
 	$(BIN)/python -m pytest
 
 .PHONY: demo
@@ -122,7 +132,7 @@ colcon: setup
 		| tar --create --null --files-from=- | tar --extract --directory=$(COLCON)/src/cardbox_tracker
 	cd $(COLCON) && export AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH=$(BIN):$$PATH && \
 		colcon build --event-handlers console_direct+ && \
-		for name in cardbox background initializer tracker camera play_bag stereo_depth cardbox_nodes; do \
+		for name in cardbox background initializer tracker camera play_bag stereo_depth rula retarget cardbox_nodes; do \
 			test -x install/cardbox_tracker/lib/cardbox_tracker/$$name || \
 				{ echo "colcon installed no $$name" >&2; exit 1; }; \
 		done && \

@@ -24,6 +24,10 @@ TEST = [
     "types-tqdm",
     "yourdfpy>=0.0.56",
 ]
+# 170 MB, so only for those who want the viewer. Its interface changes with each minor version.
+VIEW = ["rerun-sdk>=0.41,<0.42"]
+# Inverse kinematics of a robot's hand; a joint map does without.
+RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
 
@@ -75,6 +79,8 @@ setup(
         "ros": ROS,
         "test": TEST,
         "colcon": COLCON,
+        "view": VIEW,
+        "retarget": RETARGET,
         "mediapipe": ["mediapipe==0.10.21"],
     },
     entry_points={
@@ -86,6 +92,8 @@ setup(
             f"camera = {NAME}.start:camera",
             f"play_bag = {NAME}.start:play_bag",
             f"stereo_depth = {NAME}.start:stereo_depth",
+            f"rula = {NAME}.start:rula",
+            f"retarget = {NAME}.start:retarget",
             f"cardbox_nodes = {NAME}.start:cardbox_nodes",
         ],
     },

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import fcntl
 import os
 import re
@@ -11,7 +12,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -222,3 +223,23 @@ def _refused(target: Path, error: OSError | str) -> CardboxError:
     return CardboxError(
         f"cannot write {target}: {reason}; choose a folder that exists and is writable"
     )
+
+
+def stamp_text(stamp_ns: int) -> str:
+    """Return a stamp, ns, as seconds with nine decimals."""
+    return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+
+
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Write a CSV file, whole or not at all.
+
+    Raises:
+        CardboxError: it cannot be written.
+    """
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)

@@ -21,6 +21,8 @@ NODES: dict[str, str] = {
     "camera": "cardbox_tracker.ros.nodes.camera_node",
     "play_bag": "cardbox_tracker.ros.nodes.play_bag_node",
     "stereo_depth": "cardbox_tracker.ros.nodes.stereo_depth_node",
+    "rula": "cardbox_tracker.ros.nodes.rula_node",
+    "retarget": "cardbox_tracker.ros.nodes.retarget_node",
     "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
 }
 """Module of each executable that ``ros2 run cardbox_tracker`` knows, besides ``cardbox``."""
@@ -81,6 +83,16 @@ def play_bag() -> int:
 def stereo_depth() -> int:
     """Run the node ``stereo_depth``."""
     return _node("stereo_depth")
+
+
+def rula() -> int:
+    """Run the node ``rula``."""
+    return _node("rula")
+
+
+def retarget() -> int:
+    """Run the node ``retarget``."""
+    return _node("retarget")
 
 
 def cardbox_nodes() -> int:

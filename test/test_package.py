@@ -20,9 +20,15 @@ import cardbox_tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
-CORE = ("body", "vision", "estimation", "description", "drawing")
+CORE = (
+    *("body", "vision", "estimation", "description", "ergonomics", "retargeting"),
+    "drawing",
+)
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
-OUTER = ("recordings", "ros", "simulation", "evaluation", "demo", "benchmarks", "commands")
+OUTER = (
+    *("recordings", "ros", "simulation", "evaluation", "viewing", "demo", "benchmarks"),
+    "commands",
+)
 MESSAGES = (
     "builtin_interfaces",
     "diagnostic_msgs",
@@ -32,6 +38,7 @@ MESSAGES = (
     "sensor_msgs",
     "std_msgs",
     "std_srvs",
+    "trajectory_msgs",
     "visualization_msgs",
 )
 ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAGES)
@@ -220,7 +227,7 @@ def test_the_rule_for_the_core_would_find_an_offender(tmp_path: Path) -> None:
 
 def test_recordings_are_handled_without_rclpy() -> None:
     """What 'cardbox initialize' and 'cardbox track' import, other than in functions."""
-    for folder in ("recordings", "simulation"):
+    for folder in ("recordings", "simulation", "viewing"):
         for path in (SOURCES / folder).rglob("*.py"):
             assert not [n for n in imported_by(path) if n.split(".")[0] in ("rclpy", *MESSAGES)]
 
@@ -250,7 +257,13 @@ def outside(folder: Path) -> set[str]:
 
 
 def test_what_is_imported_is_declared() -> None:
-    distributions = {"cv2": "opencv-python-headless", "yaml": "pyyaml"}
+    distributions = {
+        "cv2": "opencv-python-headless",
+        "pink": "pin-pink",
+        "pinocchio": "pin",
+        "rerun": "rerun-sdk",
+        "yaml": "pyyaml",
+    }
     from_ros = {"rclpy", "ament_index_python", "launch", "launch_ros", *MESSAGES}
     in_xml = {element.text for element in package_xml().findall("exec_depend")}
     for name in sorted(outside(SOURCES) | outside(ROOT / "launch") | outside(ROOT / "tools")):

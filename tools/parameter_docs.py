@@ -16,6 +16,9 @@ from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, Paramet
 _GENERATED = (
     "made by 'python -m tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"
 )
+APART = ("rula", "retarget")
+"""Nodes that are no part of ``cardbox_nodes``."""
+
 _TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}
 
 
@@ -56,7 +59,8 @@ def all_config_text() -> str:
     """Return the YAML file of ``cardbox_nodes``: all nodes, each in any namespace."""
     lines = ["# All nodes in one process (cardbox_nodes).", f"# {_GENERATED}"]
     for node, kind in NODES.items():
-        lines += [f"/**/{node}:", *_section(kind)]
+        if node not in APART:
+            lines += [f"/**/{node}:", *_section(kind)]
     return "\n".join(lines) + "\n"
 
 

@@ -27,11 +27,14 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
+from cardbox_tracker.ros.nodes.rula_node import RulaNode
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
-PATH = Path(__file__).resolve().parents[1] / "config" / "sros2_policy.xml"
+_CONFIG = Path(__file__).resolve().parents[1] / "config"
+PATH = _CONFIG / "sros2_policy.xml"
 # What a person who operates the tracker needs: no parameters, no topics of ours to publish.
 OPERATOR = "operator"
 _TRIGGER = "std_srvs/srv/Trigger"
@@ -82,7 +85,7 @@ def policy(nodes: dict[str, Access]) -> str:
     operator = Access(publish={"/rosout", "/parameter_events"}, subscribe={"/diagnostics"})
     for name, access in nodes.items():
         operator.request |= access.triggers
-        if name in ("initializer", "tracker"):
+        if name in ("initializer", "tracker", "rula", "retarget"):
             operator.subscribe |= access.publish - set(_GLOBAL)
     root = ElementTree.Element("policy", version="0.2.0")
     root.append(ElementTree.Comment(_COMMENT))
@@ -127,6 +130,11 @@ def running(folder: Path, domain: int | None = None) -> Iterator[tuple[Any, tupl
         InitializerNode: {},
         TrackerNode: {},
         StereoDepthNode: {},
+        RulaNode: {},
+        RetargetNode: {
+            "robot_file": str(_CONFIG / "example_arm.urdf"),
+            "joint_map_file": str(_CONFIG / "example_joint_map.yaml"),
+        },
     }
     make: Any = Parameter
     made = []

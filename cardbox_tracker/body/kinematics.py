@@ -141,6 +141,19 @@ def with_shoulders(frames: BodyFrames, shoulders_m: FloatArray) -> BodyFrames:
     return frames._replace(left=arms[0], right=arms[1])
 
 
+def arm_directions(angles_rad: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:
+    """Return unit vectors (..., 3) along upper arm and forearm in the torso's frame.
+
+    Args:
+        angles_rad: the four angles of an arm, (..., 4).
+        side: +1 for the left arm, -1 for the right.
+    """
+    a = np.asarray(angles_rad, dtype=np.float64)
+    upper_arm = rotation_x(side * a[..., 0]) @ rotation_y(-a[..., 1])
+    forearm = upper_arm @ rotation_x(side * a[..., 2]) @ rotation_y(-a[..., 3])
+    return -upper_arm[..., 2], -forearm[..., 2]
+
+
 def keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
     """Return shoulder, elbow and hand of the left, then the right arm.
 

@@ -21,13 +21,19 @@ REFERENCES = {
 """Names of the reference postures, and what the person does in them."""
 
 
-def add_recording(parser: argparse.ArgumentParser) -> None:
+def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Add the recording to read and the span in which its background is learned."""
-    parser.add_argument("recording", type=Path, metavar="BAG", help="rosbag2 folder or file")
+    parser.add_argument(
+        "recording",
+        type=Path,
+        nargs=None if required else "?",
+        metavar="BAG",
+        help="rosbag2 folder or file",
+    )
     parser.add_argument(
         "--background",
         type=span,
-        required=True,
+        required=required,
         metavar="T0:T1",
         help="seconds during which nobody is in view",
     )

@@ -16,9 +16,12 @@ from cardbox_tracker.commands import (
     demo,
     evaluate,
     initialize,
+    retarget,
+    rula,
     synthesize,
     track,
     urdf,
+    view,
 )
 from cardbox_tracker.commands.command import Command
 from cardbox_tracker.commands.signals import Terminated, ended_by_signals
@@ -33,6 +36,9 @@ COMMANDS: tuple[Command, ...] = (
     body,
     calibrate_extrinsics,
     track,
+    view,
+    rula,
+    retarget,
     benchmark,
     urdf,
     call,

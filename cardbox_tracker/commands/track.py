@@ -21,6 +21,7 @@ from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
     from cardbox_tracker.estimation.config import TrackerConfig
+    from cardbox_tracker.recordings.track import Observer
 
 NAME = "track"
 HELP = "follow the posture through a recording"
@@ -28,9 +29,31 @@ HELP = "follow the posture through a recording"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox track``."""
+    add_inputs(parser)
+    parser.add_argument(
+        "--csv",
+        type=Path,
+        required=True,
+        metavar="OUT.csv",
+        help="table to write, one row per image",
+    )
+    parser.add_argument(
+        "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
+    )
+    parser.add_argument(
+        "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
+    )
+    add_force(parser)
+
+
+def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Add what every subcommand asks that tracks a recording: it, the person, the settings.
+
+    Without ``required`` the recording may be missing, or one of results that needs no more.
+    """
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
-    add_recording(parser)
+    add_recording(parser, required)
     add_cameras(parser)
     parser.add_argument(
         "--depth",
@@ -42,24 +65,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        required=True,
+        required=required,
         metavar="MODEL.yaml",
         help="the person, from 'cardbox initialize', the node initializer, or 'cardbox body'",
     )
     parser.add_argument(
         "--start",
         type=time,
-        required=True,
+        required=required,
         metavar="T",
         help="second at which the person stands as for --front; tracking starts there. A body of "
         "'cardbox body' is fitted to the first silhouette from then on, in any posture",
-    )
-    parser.add_argument(
-        "--csv",
-        type=Path,
-        required=True,
-        metavar="OUT.csv",
-        help="table to write, one row per image",
     )
     add_preset(parser, "default")
     parser.add_argument(
@@ -80,14 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="refine the breadths while tracking, slowly and near the model's",
     )
-    parser.add_argument(
-        "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
-    )
-    parser.add_argument(
-        "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
-    )
     add_seed(parser, "the filters")
-    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -97,18 +106,44 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the recording or the body model cannot be read, a setting is out of range, or
             a result cannot be written.
     """
+    check_outputs(
+        (options.csv, options.video),
+        options.force,
+        inputs=inputs_of(options),
+        results=() if options.bag is None else (options.bag,),
+    )
+    track_inputs(options, options.csv, options.video, options.bag, options.force)
+    for path in (options.csv, options.video, options.bag):
+        if path is not None:
+            print(f"wrote {path}")
+
+
+def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
+    """Return the files that the arguments of :func:`add_inputs` name."""
+    return options.recording, options.model, options.extrinsics
+
+
+def track_inputs(
+    options: argparse.Namespace,
+    csv: Path | None = None,
+    video: Path | None = None,
+    bag: Path | None = None,
+    force: bool = False,
+    observers: tuple[Observer, ...] = (),
+) -> None:
+    """Track what the arguments of :func:`add_inputs` name, and say how well it went.
+
+    ``observers`` are called after each image; with ``force`` a ``bag`` that exists is replaced.
+
+    Raises:
+        CardboxError: see :func:`run`.
+    """
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.cameras import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
     from cardbox_tracker.recordings.track import track_recording
 
-    check_outputs(
-        (options.csv, options.video),
-        options.force,
-        inputs=(options.recording, options.model, options.extrinsics),
-        results=() if options.bag is None else (options.bag,),
-    )
     body = load_body_model(options.model)
     if body.doubt:
         print(f"{options.model}: {body.doubt}")
@@ -125,7 +160,7 @@ def run(options: argparse.Namespace) -> None:
     ) as source:
         total_s = max(1e-9, source.first.duration_s - options.start)
         with (
-            ResultBag(options.bag, source.first.frame_id, options.force) as results,
+            ResultBag(bag, source.first.frame_id, force) as results,
             progress_bar("track") as show,
         ):
             summary = track_recording(
@@ -134,10 +169,11 @@ def run(options: argparse.Namespace) -> None:
                 config,
                 options.seed,
                 options.start,
-                options.csv,
-                options.video,
+                csv,
+                video,
                 observers=(
                     results.add,
+                    *observers,
                     lambda frame, *_: show((frame.time_s - options.start) / total_s),
                 ),
             )
@@ -147,9 +183,6 @@ def run(options: argparse.Namespace) -> None:
         f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
     )
     print_remarks(source.first, summary.remarks)
-    for path in (options.csv, options.video, options.bag):
-        if path is not None:
-            print(f"wrote {path}")
 
 
 def _config(options: argparse.Namespace) -> TrackerConfig:

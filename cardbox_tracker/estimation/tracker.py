@@ -24,11 +24,13 @@ from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette,
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
+from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.further_camera import FurtherCamera
 from cardbox_tracker.estimation.person_region import PersonRegion
+from cardbox_tracker.estimation.sampling import likely_postures
 from cardbox_tracker.estimation.size_refinement import SizeRefinement
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
@@ -166,6 +168,7 @@ class Tracker:
             cost = self.config.whole_body.cost
             self._refinement = SizeRefinement(self.body, self.camera, cost)
         self._poor_frames = 0
+        self._particles: Particles | None = None
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
 
@@ -267,6 +270,11 @@ class Tracker:
             return replace(estimate, state=UNCERTAIN)
         return estimate
 
+    def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
+        """Return postures (count, 12) as likely as the last ``estimate``: ``likely_postures``."""
+        found = estimate.posture, estimate.posture_stddev, estimate.offset_m
+        return likely_postures(*found, self._particles, count, rng)
+
     def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
         frame = self._silhouette.frame(silhouette, image, self._before)
         if self._others_now or self._depth_m is not None:
@@ -282,6 +290,7 @@ class Tracker:
             # A lamp goes on, a door opens: soon the person is where they were.
             return Estimate(LOST)
         fit = self._filter.follow(self._terms)
+        self._particles = fit.particles
         if not fit.is_finite:
             # Particles that are not numbers would stay so for ever.
             self.reset()

@@ -18,7 +18,7 @@ from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import UNCERTAIN, Estimate, Tracker
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import atomic_path, stamp_text
 from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
 from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
@@ -32,6 +32,9 @@ CSV_HEADER = (
     *(figure.name for figure in FIGURES),
     *JOINT_STATE_NAMES[N_JOINTS:],
 )
+
+Observer = Callable[[Frame, Estimate, Tracker], None]
+"""Is told of each image and what was found in it."""
 
 _VIDEO_SCALE = 2
 
@@ -58,12 +61,12 @@ def track_recording(
     config: TrackerConfig,
     seed: int,
     start_s: float,
-    csv_path: Path,
+    csv_path: Path | None,
     video_path: Path | None = None,
     fps: float = 15.0,
-    observers: tuple[Callable[[Frame, Estimate, Tracker], None], ...] = (),
+    observers: tuple[Observer, ...] = (),
 ) -> TrackSummary:
-    """Track every image from ``start_s`` on and write one CSV row for each.
+    """Track every image from ``start_s`` on; write one CSV row for each.
 
     Args:
         source: the recording, or several cameras of it.
@@ -71,7 +74,7 @@ def track_recording(
         config: settings of the tracker.
         seed: the same recording and seed give the same bytes.
         start_s: when the person stands in the front reference posture, from the bag's start.
-        csv_path: written atomically.
+        csv_path: written atomically, if at all.
         video_path: where to write the overlay, if at all.
         fps: frames a second of the video.
         observers: called after each image, such as a progress bar or a bag writer.
@@ -86,11 +89,13 @@ def track_recording(
     ious: list[float] = []
     frames = frames_uncertain = 0
     with ExitStack() as stack:
-        table = stack.enter_context(
-            stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
-        )
-        rows = csv.writer(table, lineterminator="\n")
-        rows.writerow(CSV_HEADER)
+        rows = None
+        if csv_path is not None:
+            table = stack.enter_context(
+                stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
+            )
+            rows = csv.writer(table, lineterminator="\n")
+            rows.writerow(CSV_HEADER)
         draw = None
         if video_path is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
@@ -98,7 +103,8 @@ def track_recording(
         for frame, estimate in _estimates(source, tracker, start_s):
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
-            rows.writerow(csv_row(frame.stamp_ns, estimate))
+            if rows is not None:
+                rows.writerow(csv_row(frame.stamp_ns, estimate))
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
@@ -143,7 +149,7 @@ def _estimates(
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
     """Return the row of one image; what is not known is left empty."""
-    stamp = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+    stamp = stamp_text(stamp_ns)
     joints = joint_values(estimate)
     if joints is None or estimate.keypoints_m is None:
         return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]

@@ -18,7 +18,10 @@ from cardbox_tracker.commands.main import COMMANDS, RETIRED, build_parser
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
-SHARED = {"output_paths", "signals", "__init__", "arguments", "command", "main"}
+SHARED = {
+    *("output_paths", "signals", "__init__", "arguments", "command", "main"),
+    "settings_arguments",
+}
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:

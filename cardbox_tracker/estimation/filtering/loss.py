@@ -136,3 +136,19 @@ def state_stddev(stddev: FloatArray) -> FloatArray:
     """Return calibrated deviations (14,) from those of the states (14,)."""
     calibrated: FloatArray = np.hypot(_GAINS * stddev, _FLOORS)
     return calibrated
+
+
+def calibrated_states(
+    deviations: FloatArray, rng: np.random.Generator, limits: FloatArray, around: FloatArray
+) -> FloatArray:
+    """Return states (n, 14) ``around`` a state (14,), as far apart as :func:`state_stddev` says.
+
+    Args:
+        deviations: of states drawn by their weights from the mean, (n, 14).
+        rng: source of what the floors add.
+        limits: lowest and highest value of each, (14, 2).
+        around: the result, (14,).
+    """
+    noise = _FLOORS * rng.standard_normal(deviations.shape)
+    moved: FloatArray = np.clip(around + _GAINS * deviations + noise, limits[:, 0], limits[:, 1])
+    return moved

@@ -13,6 +13,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
+from cardbox_tracker.estimation.filtering.particles import Particles
 
 
 class Sight(Enum):
@@ -45,6 +46,7 @@ class Fit:
         is_poor: it does not fit; several such frames in a row mean that the person was lost.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: their standard deviations, (2,), or None.
+        particles: of whole states, or None from a filter that has none.
     """
 
     posture: FloatArray
@@ -56,6 +58,7 @@ class Fit:
     is_poor: bool
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
+    particles: Particles | None = None
 
     @property
     def is_finite(self) -> bool:

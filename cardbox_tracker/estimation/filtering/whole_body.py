@@ -36,6 +36,7 @@ from cardbox_tracker.estimation.filtering.loss import (
     remembered,
     state_stddev,
 )
+from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
 from cardbox_tracker.estimation.filtering.walking import Walk
 
@@ -305,4 +306,5 @@ class WholeBodyFilter:
             is_poor=self._chance > config.lost_from or iou < self._lost_iou,
             offset_m=self._output[N_JOINTS:].copy(),
             offset_stddev_m=deviations[N_JOINTS:],
+            particles=Particles(self.states, self.ratings, mean, config.spread),
         )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
 
 FloatArray = NDArray[np.float64]
 
@@ -48,6 +49,18 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
             angles.append(np.stack([abduction, flexion], axis=-1))
             parent = parent @ rotation_x(side * abduction) @ rotation_y(-flexion)
     return np.concatenate(angles, axis=-1)
+
+
+def true_postures(session: RecordedSession) -> FloatArray:
+    """Return the true postures (n, 12) of a session; ``torso_y`` is 0.
+
+    Where the torso's angles are not known they are taken for 0, and no angle of the arms is right.
+    """
+    postures = np.zeros((len(session.stamps_ns), 12))
+    pitch_rad = float(np.radians(session.truth.pitch_deg))
+    torso_rad = np.nan_to_num(session.torso_rad)
+    postures[:, 1:] = joint_angles(session.keypoints_m, torso_rad, pitch_rad)
+    return postures
 
 
 def limb_angles(bone: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:

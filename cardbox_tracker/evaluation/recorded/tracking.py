@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,11 +53,13 @@ def track_session(
     config: TrackerConfig,
     seeds: tuple[int, ...],
     only: str | None = None,
+    observe: Callable[[int, int, Estimate, Tracker], None] | None = None,
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
 
     Of several cameras the first one measures the person; all of them track, or the one that
     ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
+    ``observe`` is told of every estimate: seed, stamp in ns, estimate and tracker.
 
     Raises:
         CardboxError: the recording cannot be read.
@@ -82,12 +84,14 @@ def track_session(
         for stamp_ns, silhouettes, images, depth_m in _seen(
             source, session.start_s + offset_s, only
         ):
-            for tracker, estimates, spent in zip(trackers, found, times, strict=True):
+            for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
                 if tracker is None:
                     continue
                 start = time.perf_counter()
                 estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m)
                 spent.append(1e3 * (time.perf_counter() - start))
+                if observe is not None:
+                    observe(seed, stamp_ns, estimates[stamp_ns], tracker)
     return [
         _run(session, body, failure, estimates, spent)
         for (body, failure), estimates, spent in zip(bodies, found, times, strict=True)

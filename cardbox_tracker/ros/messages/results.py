@@ -15,8 +15,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
-from cardbox_tracker.errors import NotFiniteError
-from cardbox_tracker.outputs import JointValues, Markers, Points, Text, Value
+from cardbox_tracker.errors import CardboxError, NotFiniteError
+from cardbox_tracker.outputs import JointValues, Markers, Points, Text, Value, posture_from
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
@@ -35,6 +35,20 @@ def joint_state_message(header: Header, joints: JointValues) -> JointState:
 def joint_values_of(message: JointState) -> JointValues:
     """Return the names and positions of a message."""
     return JointValues(tuple(message.name), np.array(message.position))
+
+
+def posture_of(message: JointState) -> FloatArray:
+    """Return the posture (12,), or its deviations, of a message of the tracker.
+
+    Raises:
+        NotFiniteError: a value is not a finite number.
+        CardboxError: a joint is missing, or it has another number of names than of values.
+    """
+    try:
+        found = posture_from(joint_values_of(message))
+    except ValueError as error:
+        raise CardboxError(f"joint states are not the tracker's: {error}") from None
+    return _finite(found, "joint states")
 
 
 def points_message(header: Header, points: Points) -> PoseArray:

@@ -19,6 +19,7 @@ from cardbox_tracker.ros.nodes.input_parameters import (
     StereoDepthParameters,
 )
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters, RulaParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
@@ -192,5 +193,7 @@ NODES: dict[str, type[NodeParameters]] = {
     "camera": CameraParameters,
     "play_bag": PlayBagParameters,
     "stereo_depth": StereoDepthParameters,
+    "rula": RulaParameters,
+    "retarget": RetargetParameters,
 }
 """Node name to its parameters."""

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch  # noqa: E402
+from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch
 
 
 class Agreement:

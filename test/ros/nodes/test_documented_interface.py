@@ -27,12 +27,27 @@ from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E4
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
+from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
+from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.simulation.session import session_camera  # noqa: E402
 
 ROOT = Path(__file__).parents[3]
-NODES = ("camera", "play_bag", "background", "stereo_depth", "initializer", "tracker")
+NODES = (
+    "camera",
+    "play_bag",
+    "background",
+    "stereo_depth",
+    "initializer",
+    "tracker",
+    "rula",
+    "retarget",
+)
+ARM = {
+    "robot_file": str(ROOT / "config" / "example_arm.urdf"),
+    "joint_map_file": str(ROOT / "config" / "example_joint_map.yaml"),
+}
 # What rclpy adds to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
 ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
@@ -129,6 +144,10 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
             make(TrackerNode, rep155_id="ID"),
             make(TrackerNode, cameras=["CAMERA"], depth="DEPTH"),
         ]
+    if name == "retarget":
+        return [make(RetargetNode, **ARM)]
+    if name == "rula":
+        return [make(RulaNode)]
     return [make(InitializerNode), make(InitializerNode, cameras=["CAMERA"])]
 
 

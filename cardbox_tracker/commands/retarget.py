@@ -1,0 +1,82 @@
+"""``cardbox retarget``: a robot arm follows a person's arm."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from pathlib import Path
+
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
+
+NAME = "retarget"
+HELP = "move a robot arm, given by its URDF, as the measured person moves theirs"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox retarget``."""
+    from cardbox_tracker.retargeting.config import RetargetConfig
+
+    parser.add_argument(
+        "results", type=Path, metavar="RESULTS", help="bag of results, of 'cardbox track --bag'"
+    )
+    parser.add_argument("--robot", type=Path, required=True, metavar="ROBOT.urdf", help="the robot")
+    parser.add_argument(
+        "--map",
+        type=Path,
+        default=None,
+        metavar="MAP.yaml",
+        help="which joint moves which, as in config/example_joint_map.yaml; without it the robot's "
+        "hand follows the person's by inverse kinematics",
+    )
+    parser.add_argument(
+        "--hand",
+        default=None,
+        metavar="LINK",
+        help="the robot's hand; without it, the link with the most joints before it",
+    )
+    parser.add_argument(
+        "--csv", type=Path, default=None, metavar="OUT.csv", help="table of the robot's joints"
+    )
+    parser.add_argument(
+        "--bag",
+        type=Path,
+        default=None,
+        metavar="OUT",
+        help="the results with the robot beside the person, for 'cardbox view'",
+    )
+    add_force(parser)
+    add_settings(parser, RetargetConfig, "limits and mounting")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Move the robot through a recording and write what was asked for.
+
+    Raises:
+        CardboxError: the bag, the robot or the map cannot be read, or a result cannot be written.
+    """
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.retarget import retarget_bag, write_bag, write_csv
+    from cardbox_tracker.retargeting.config import RetargetConfig
+    from cardbox_tracker.retargeting.setup import make_retargeter
+
+    check_outputs(
+        (options.csv,),
+        options.force,
+        inputs=(options.results, options.robot, options.map),
+        results=() if options.bag is None else (options.bag,),
+    )
+    config = settings_from(options, RetargetConfig)
+    robot, retargeter = make_retargeter(options.robot, options.map, options.hand or "", config)
+    with BagReader(options.results) as bag:
+        steps = retarget_bag(bag, retargeter)
+        if options.csv is not None:
+            write_csv(steps, retargeter.joints, options.csv)
+        if options.bag is not None:
+            joints = retargeter.joints
+            write_bag(bag, steps, joints, robot.urdf, options.bag, options.force)
+    for status, count in Counter(step.command.status for step in steps).most_common():
+        print(f"{status}: {count} of {len(steps)} images")
+    for path in (options.csv, options.bag):
+        if path is not None:
+            print(f"wrote {path}")

@@ -1,0 +1,111 @@
+"""``cardbox view``: results in the viewer Rerun, without ROS, or of running nodes."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.errors import CardboxError, RosMissingError
+
+if TYPE_CHECKING:
+    from cardbox_tracker.viewing.scene import Scene
+
+NAME = "view"
+HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
+_TRUTH = "ground_truth.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox view``."""
+    parser.add_argument("--live", action="store_true", help="show what the running nodes publish")
+    parser.add_argument(
+        "--save", type=Path, default=None, metavar="FILE.rrd", help="write a file for the viewer"
+    )
+    parser.add_argument(
+        "--web", action="store_true", help="serve the viewer to a browser on this computer"
+    )
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
+    )
+    add_inputs(parser, required=False)
+    add_force(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes.
+
+    Raises:
+        CardboxError: rerun-sdk is not installed, or what is to be shown cannot be read.
+    """
+    if options.live == (options.recording is not None):
+        raise CardboxError("expected either BAG or --live")
+    check_outputs((options.save,), options.force, inputs=inputs_of(options))
+    from cardbox_tracker.viewing.layout import layout
+    from cardbox_tracker.viewing.library import recording
+    from cardbox_tracker.viewing.scene import Scene
+
+    with recording(layout(), options.save, options.web) as (stream, address):
+        if address:
+            print(f"open {address} in a browser; Ctrl-C ends", flush=True)
+        if options.live:
+            _show_nodes(Scene(stream))
+        else:
+            count = _show_recording(options, Scene(stream))
+            print(f"shown: {count} images with a posture", flush=True)
+        if options.web and not options.live:
+            stream.flush()
+            with suppress(KeyboardInterrupt):
+                while True:
+                    time.sleep(1.0)
+    if options.save is not None:
+        print(f"wrote {options.save}; look at it with 'rerun {options.save}'")
+
+
+def _show_nodes(scene: Scene) -> None:
+    try:
+        from cardbox_tracker.ros.live_view import show_nodes
+    except ImportError as error:
+        raise RosMissingError(error) from None
+    show_nodes(scene)
+
+
+def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
+    from cardbox_tracker.evaluation.truth import load_ground_truth
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.result_reader import has_results
+    from cardbox_tracker.viewing.feed import Feed
+    from cardbox_tracker.viewing.result_bag import show_results
+    from cardbox_tracker.viewing.tracking import ShownTracking
+
+    truth = options.truth or _truth_beside(options.recording)
+    feed = Feed(scene, None if truth is None else load_ground_truth(truth).frames)
+    with BagReader(options.recording) as bag:
+        if has_results(bag):
+            with progress_bar("view") as show:
+                return show_results(bag, feed, show)
+    missing = [name for name in ("model", "background", "start") if getattr(options, name) is None]
+    if missing:
+        raise CardboxError(
+            f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
+            f"--{', --'.join(missing)} as for 'cardbox track', to track it now"
+        )
+    shown = ShownTracking(feed)
+    track_inputs(options, observers=(shown,))
+    return shown.count
+
+
+def _truth_beside(bag: Path) -> Path | None:
+    for folder in (bag, bag.parent):
+        if (folder / _TRUTH).is_file():
+            return folder / _TRUTH
+    return None

@@ -1,0 +1,87 @@
+"""What RULA asks and an outline of the upper body cannot show, and what the paper leaves open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cardbox_tracker.settings import check, setting
+
+_DECLARED = "declared, since it is not measured"
+
+
+@dataclass(frozen=True)
+class RulaConfig:
+    """Settings of the score; the first ones describe the task, the last ones draw lines.
+
+    Raises:
+        ValueError: a value is out of its range; the text names it.
+    """
+
+    neck: int = setting(
+        1,
+        "score of the neck: 1 for 0 to 10 degrees of flexion, 2 to 20, 3 beyond, 4 in extension; 1 "
+        f"more each if twisted, bent aside; {_DECLARED}",
+        limits=(1, 6),
+    )
+    wrist: int = setting(
+        1,
+        "score of the wrists: 1 neutral, 2 to 15 degrees, 3 beyond; 1 more if bent aside; "
+        f"{_DECLARED}",
+        limits=(1, 4),
+    )
+    wrist_twist: int = setting(
+        1, f"1 in the middle of the range, 2 at or near its end; {_DECLARED}", limits=(1, 2)
+    )
+    legs: int = setting(
+        1, f"1 if legs and feet are supported and balanced, else 2; {_DECLARED}", limits=(1, 2)
+    )
+    arm_muscle_use: int = setting(
+        0, "1 if the arms' posture is held for a minute or repeated 4 times in one", limits=(0, 1)
+    )
+    arm_load: int = setting(
+        0,
+        "load on the arms: 0 below 2 kg now and then, 1 for 2 to 10 kg now and then, 2 for 2 to 10 "
+        "kg held or repeated, 3 beyond or with shocks",
+        limits=(0, 3),
+    )
+    body_muscle_use: int = setting(0, "as arm_muscle_use, of neck, trunk and legs", limits=(0, 1))
+    body_load: int = setting(0, "as arm_load, of neck, trunk and legs", limits=(0, 3))
+    shoulders_raised: bool = setting(False, f"the shoulders are raised; {_DECLARED}")
+    arms_supported: bool = setting(
+        False, f"the arms are supported, or the person leans; {_DECLARED}"
+    )
+    trunk_twisted: bool = setting(
+        False,
+        "the trunk is twisted against the hips; declared, since torso_yaw is where the whole "
+        "person faces",
+    )
+    abducted_deg: float = setting(
+        30.0,
+        "an upper arm this far to the side counts as abducted; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    outwards_deg: float = setting(
+        30.0,
+        "a forearm that points this far to the outside works out to the side of the body; the "
+        "paper names no angle",
+        unit="deg",
+        limits=(5.0, 90.0),
+    )
+    side_bent_deg: float = setting(
+        10.0,
+        "a trunk this far to a side counts as bent; the paper names no angle",
+        unit="deg",
+        limits=(1.0, 45.0),
+    )
+    upright_deg: float = setting(
+        10.0,
+        "a trunk bowed less than this is upright, score 1; the paper has 0, which nobody keeps and "
+        "no outline shows",
+        unit="deg",
+        limits=(0.0, 20.0),
+    )
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        check(self)

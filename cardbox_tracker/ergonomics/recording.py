@@ -1,0 +1,102 @@
+"""RULA over a recording: a row for each image, and how long the score was how high."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.ergonomics.distribution import ScoreDistribution, expected
+from cardbox_tracker.ergonomics.tables import ACTION_LEVELS, HIGHEST
+from cardbox_tracker.files import stamp_text, write_table
+
+ABOVE = 5
+"""The score above which time is counted: work has to be changed soon, or at once."""
+
+CSV_HEADER = (
+    *("stamp", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
+    *(f"chance_{score}" for score in range(1, HIGHEST + 1)),
+    *("left_score", "right_score"),
+)
+
+# An image counts until the next one, but not over a gap.
+_LONGEST_STEP = 3.0
+
+
+@dataclass(frozen=True)
+class RulaRow:
+    """One image; the distribution is None without a posture."""
+
+    stamp_ns: int
+    state: str
+    scores: ScoreDistribution | None
+
+
+@dataclass(frozen=True)
+class RulaSummary:
+    """Expected times, s.
+
+    Attributes:
+        measured_s: with a posture.
+        above_s: with a score above ``ABOVE``.
+        by_level_s: at each of ``ACTION_LEVELS``.
+        mean: expected score over that time; nan without any.
+    """
+
+    measured_s: float
+    above_s: float
+    by_level_s: tuple[float, ...]
+    mean: float
+
+
+def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
+    """Return how long the score was how high."""
+    measured = np.array([row.scores is not None for row in rows], dtype=bool)
+    durations_s = _durations_s(np.array([row.stamp_ns for row in rows], np.int64))[measured]
+    chances = np.array([row.scores.grand for row in rows if row.scores is not None])
+    time_s = durations_s @ chances if len(chances) else np.zeros(HIGHEST)
+    total_s = float(durations_s.sum())
+    return RulaSummary(
+        total_s,
+        float(time_s[ABOVE:].sum()),
+        tuple(float(time_s[low - 1 : high].sum()) for low, high, _ in ACTION_LEVELS),
+        expected(time_s / total_s) if total_s else float("nan"),
+    )
+
+
+def _durations_s(stamps_ns: np.typing.NDArray[np.int64]) -> FloatArray:
+    if len(stamps_ns) < 2:
+        return np.zeros(len(stamps_ns))
+    steps_s = np.diff(stamps_ns) / 1e9
+    usual_s = float(np.median(steps_s))
+    durations: FloatArray = np.append(np.clip(steps_s, 0.0, _LONGEST_STEP * usual_s), usual_s)
+    return durations
+
+
+def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
+    """Write ``CSV_HEADER`` and a row for each image; what is not known is left empty.
+
+    Raises:
+        CardboxError: the file cannot be written.
+    """
+    write_table(path, CSV_HEADER, map(_fields, rows))
+
+
+def _fields(row: RulaRow) -> list[str]:
+    stamp = stamp_text(row.stamp_ns)
+    if row.scores is None:
+        return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
+    scores = row.scores
+    return [
+        stamp,
+        row.state,
+        f"{scores.mean:.3f}",
+        str(scores.likeliest),
+        f"{scores.chance_above(ABOVE):.3f}",
+        *(f"{chance:.3f}" for chance in scores.grand),
+        f"{expected(scores.left):.3f}",
+        f"{expected(scores.right):.3f}",
+    ]

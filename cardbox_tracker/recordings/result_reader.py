@@ -1,0 +1,107 @@
+"""Read a bag of results: of ``cardbox track --bag``, or recorded from running nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN
+from cardbox_tracker.outputs import JointValues, posture_from
+from cardbox_tracker.recordings.bag_reader import BagReader
+
+MODEL = "/body_model"
+_STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
+
+
+class Result(NamedTuple):
+    """What the tracker said of one image; body, posture and deviations (12,) where it did."""
+
+    stamp_ns: int
+    state: str
+    body: BodyModel | None = None
+    posture: FloatArray | None = None
+    stddev: FloatArray | None = None
+
+
+def has_results(bag: BagReader) -> bool:
+    """Return whether a recording has results of the tracker, not only images."""
+    return any(topic.endswith(MODEL) for topic in bag.topics)
+
+
+def namespace_of(bag: BagReader) -> str:
+    """Return the namespace of the tracker's topics, such as "" or "/left"; the first of several.
+
+    Raises:
+        BagError: the bag has no results of the tracker.
+    """
+    models = sorted(topic for topic in bag.topics if topic.endswith(MODEL))
+    if not models:
+        raise BagError(
+            f"{bag.path} has no results of the tracker (no topic body_model); make them with "
+            "'cardbox track BAG ... --bag RESULTS'"
+        )
+    return models[0].removesuffix(MODEL)
+
+
+def stamp_ns_of(message: Any) -> int:
+    """Return the stamp in the header of a message."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def joints_of(message: Any) -> JointValues:
+    """Return names and positions of a JointState."""
+    return JointValues(tuple(message.name), np.array(message.position, np.float64))
+
+
+def read_results(bag: BagReader) -> Iterator[Result]:
+    """Yield what the tracker said of each image, in order.
+
+    Raises:
+        BagError: the bag has no results of the tracker, or is damaged.
+    """
+    space = namespace_of(bag)
+    topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV)]
+    reader = _Results(space)
+    for message in bag.messages([topic for topic in topics if topic in bag.topics]):
+        content = bag.deserialize(message)
+        try:
+            found = reader.take(message.topic, message.time_ns, content)
+        except (AttributeError, TypeError, ValueError) as error:
+            # Recordings bring definitions of their types along.
+            where = f"{message.topic} of {bag.path}"
+            raise BagError(f"{where} is not what it should be: {error}; record it again") from None
+        if found is not None:
+            yield found
+
+
+class _Results:
+    """Puts together what belongs to one image: its joints, then under their stamp deviations."""
+
+    def __init__(self, space: str) -> None:
+        self._space = space
+        self._state = ""
+        self._body: BodyModel | None = None
+        self._joints: Result | None = None
+
+    def take(self, topic: str, time_ns: int, message: Any) -> Result | None:
+        """Return the result that a message completes."""
+        name = topic.removeprefix(self._space)
+        if name == MODEL:
+            self._body = loads_body_model(str(message.data), source=topic)
+        elif name == _STATE:
+            self._state = str(message.data)
+            if self._state not in (TRACKING, UNCERTAIN):
+                return Result(time_ns, self._state, self._body)
+        elif name == _JOINTS:
+            posture = posture_from(joints_of(message))
+            self._joints = Result(stamp_ns_of(message), self._state, self._body, posture)
+        elif self._joints is not None and self._joints.stamp_ns == stamp_ns_of(message):
+            return self._joints._replace(stddev=posture_from(joints_of(message)))
+        return None

@@ -1,0 +1,1 @@
+"""Moves a robot arm as the measured person moves theirs, within its limits; no ROS."""

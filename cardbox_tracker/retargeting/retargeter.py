@@ -1,0 +1,115 @@
+"""From one posture after the other to the joints of a robot, with a dead-man."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.retargeting.config import RetargetConfig
+from cardbox_tracker.retargeting.motion import Limits, SafeMotion
+from cardbox_tracker.retargeting.robot import Robot
+
+MOVING = "moving"
+
+
+class Method(Protocol):
+    """How a posture becomes joints of a robot."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of our joints that count."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the robot's joints that move."""
+
+    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+        """Return where the robot's joints (n,) should be for a posture (12,).
+
+        ``now`` is where they are. Nothing has to be within any limit; nan: there is no solution.
+        """
+
+
+class Command(NamedTuple):
+    """What the robot is told at one image.
+
+    Attributes:
+        positions: of ``Retargeter.joints``, (n,), rad or m.
+        status: ``moving``, or ``frozen:`` and why.
+        duration_s: how long it may take to get there.
+    """
+
+    positions: FloatArray
+    status: str
+    duration_s: float
+
+    @property
+    def is_moving(self) -> bool:
+        """False while the robot has to stand still."""
+        return self.status == MOVING
+
+
+class Retargeter:
+    """Tells a robot where to go, image by image; limits and speeds hold whatever is measured."""
+
+    def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
+        """Begin at the position 0 of each joint, or its limit nearest to 0.
+
+        Raises:
+            CardboxError: the robot lacks a joint of ``method``.
+        """
+        self.joints = method.joints
+        lower, upper, speed = robot.limits_of(method.joints)
+        self._motion = SafeMotion(Limits(lower, upper, np.minimum(speed, config.max_speed)))
+        self._method, self._config = method, config
+        self._sources = [JOINT_NAMES.index(name) for name in method.sources]
+        self._before_ns: int | None = None
+
+    def hold(self, reason: str) -> Command:
+        """Return the command to stand still; the next image counts as the first."""
+        self._before_ns = None
+        return Command(self._motion.positions, f"frozen: {reason.replace('_', ' ')}", 0.0)
+
+    def update(
+        self,
+        stamp_ns: int,
+        state: str,
+        body: BodyModel | None = None,
+        posture: FloatArray | None = None,
+        stddev: FloatArray | None = None,
+    ) -> Command:
+        """Return the command of an image.
+
+        Args:
+            stamp_ns: of the image.
+            state: of the tracker; in any but ``tracking`` the robot stands still.
+            body: the person.
+            posture: d1..d12, (12,).
+            stddev: their standard deviations, (12,).
+        """
+        before_ns, self._before_ns = self._before_ns, stamp_ns
+        elapsed_s = 0.0 if before_ns is None else (stamp_ns - before_ns) / 1e9
+        duration_s = min(max(elapsed_s, 0.0), self._config.longest_step_s)
+        reason = self._reason(state, posture, stddev)
+        if reason or body is None or posture is None:
+            return Command(self._motion.positions, f"frozen: {reason or 'nobody'}", duration_s)
+        target = self._method.target(body, posture, self._motion.positions)
+        if not np.isfinite(target).all():
+            return Command(self._motion.positions, "frozen: no solution", duration_s)
+        return Command(self._motion.move(target, duration_s), MOVING, duration_s)
+
+    def _reason(self, state: str, posture: FloatArray | None, stddev: FloatArray | None) -> str:
+        """Return why the robot must not move; empty if it may."""
+        if state != TRACKING:
+            return state.replace("_", " ") or "no state yet"
+        if posture is None or stddev is None:
+            return "no posture"
+        worst = stddev[self._sources]
+        if not (np.isfinite(posture).all() and (worst <= self._config.max_stddev_rad).all()):
+            return "too uncertain"
+        return ""

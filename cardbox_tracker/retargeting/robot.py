@@ -1,0 +1,176 @@
+"""A robot's joints and their limits, from its URDF."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.errors import CardboxError, cut, quoted
+
+_MOVABLE = ("revolute", "continuous", "prismatic")
+_LARGEST_BYTES = 20_000_000
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One movable joint: limits in rad or m, the speed of its URDF in rad/s or m/s, or inf."""
+
+    name: str
+    lower: float
+    upper: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot.
+
+    Attributes:
+        urdf: its description, in which joints without end are limited to half a turn either way.
+        joints: the movable joints by name, in the order of the description.
+        parents: of each link but the root, its joint's name and the link before.
+    """
+
+    urdf: str
+    joints: dict[str, Joint]
+    parents: dict[str, tuple[str, str]]
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """All links, the root first."""
+        roots = {parent for _, parent in self.parents.values()} - self.parents.keys()
+        return (*sorted(roots), *self.parents)
+
+    @property
+    def last_link(self) -> str:
+        """The link with the most movable joints before it."""
+        return max(reversed(self.links), key=lambda link: len(self.chain(link)))
+
+    def chain(self, link: str) -> tuple[str, ...]:
+        """Return the movable joints between the root and ``link``, from the root on.
+
+        Raises:
+            CardboxError: there is no such link.
+        """
+        if link not in self.links:
+            raise CardboxError(
+                f"the robot has no link {quoted(link)}; it has {cut(', '.join(self.links))}"
+            )
+        found = []
+        while link in self.parents:
+            joint, link = self.parents[link]
+            if joint in self.joints:
+                found.append(joint)
+        return tuple(reversed(found))
+
+    def limits_of(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return lowest and highest positions and speeds (n,) of joints.
+
+        Raises:
+            CardboxError: there is no such joint, or it cannot move.
+        """
+        unknown = [name for name in names if name not in self.joints]
+        if unknown:
+            raise CardboxError(
+                f"the robot has no movable joint {', '.join(map(quoted, unknown))}; it has "
+                f"{cut(', '.join(self.joints))}"
+            )
+        chosen = [self.joints[name] for name in names]
+        rows = np.array([(one.lower, one.upper, one.speed) for one in chosen], np.float64)
+        lower, upper, speed = rows.reshape(-1, 3).T
+        return lower, upper, speed
+
+
+def load_robot(path: str | os.PathLike[str]) -> Robot:
+    """Read a URDF file.
+
+    Raises:
+        CardboxError: it cannot be read, or is no URDF of a robot that moves.
+    """
+    try:
+        if Path(path).stat().st_size > _LARGEST_BYTES:
+            raise CardboxError(f"{path} is larger than {_LARGEST_BYTES} bytes; is it a URDF?")
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise CardboxError(f"cannot read the robot {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise CardboxError(f"{path} is no text; expected the URDF of a robot") from None
+    return parse_robot(text, str(path))
+
+
+def parse_robot(text: str, source: str = "the description") -> Robot:
+    """Read a URDF; ``source`` names it in errors.
+
+    Raises:
+        CardboxError: see :func:`load_robot`.
+    """
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise CardboxError(f"{source} defines entities, which no URDF needs; remove them")
+    if "xmlns:xacro" in text:
+        raise CardboxError(f"{source} is xacro; make a URDF of it first: xacro FILE > robot.urdf")
+    try:
+        root = Xml.fromstring(text)
+    except Xml.ParseError as error:
+        raise CardboxError(f"{source} is no URDF: {error}; expected the URDF of a robot") from None
+    try:
+        return _robot(root)
+    except (AttributeError, KeyError, ValueError) as error:
+        raise CardboxError(
+            f"{source} is no URDF of a robot that moves: {error}; every joint needs name, type, "
+            "parent and child, and a revolute or prismatic one finite limits"
+        ) from None
+
+
+def _robot(root: Xml.Element) -> Robot:
+    joints: dict[str, Joint] = {}
+    parents: dict[str, tuple[str, str]] = {}
+    for element in root.findall("joint"):
+        name, kind = element.attrib["name"], element.attrib["type"]
+        parent, child = (_attribute(element, which, "link") for which in ("parent", "child"))
+        if child in parents or name in joints:
+            raise ValueError(f"{child} has two joints before it, or {name} is there twice")
+        parents[child] = name, parent
+        if kind in _MOVABLE and element.find("mimic") is None:
+            joints[name] = _joint(element, name, kind)
+    for link in parents:
+        seen, at = {link}, parents[link][1]
+        while at in parents:
+            if at in seen:
+                raise ValueError(f"the links go in a circle at {at}")
+            seen.add(at)
+            at = parents[at][1]
+    if not joints:
+        raise ValueError("it has no movable joint")
+    return Robot(Xml.tostring(root, encoding="unicode"), joints, parents)
+
+
+def _attribute(element: Xml.Element, child: str, name: str) -> str:
+    found = element.find(child)
+    if found is None:
+        raise ValueError(f"the joint {element.get('name')} has no {child}")
+    return found.attrib[name]
+
+
+def _joint(element: Xml.Element, name: str, kind: str) -> Joint:
+    limit = element.find("limit")
+    if limit is None:
+        if kind != "continuous":
+            raise ValueError(f"the joint {name} has no limit")
+        limit = Xml.SubElement(element, "limit", effort="0", velocity="0")
+    if kind == "continuous":
+        # Half a turn either way: what follows an arm needs no more, and a joint then is one number.
+        element.set("type", "revolute")
+        limit.set("lower", repr(-math.pi))
+        limit.set("upper", repr(math.pi))
+    lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+    speed = float(limit.get("velocity", 0.0))
+    if not (math.isfinite(lower) and math.isfinite(upper) and lower <= upper and speed >= 0.0):
+        raise ValueError(f"the joint {name} may be at {lower} to {upper}, at a speed of {speed}")
+    return Joint(name, lower, upper, speed or math.inf)

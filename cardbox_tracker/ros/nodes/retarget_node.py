@@ -1,0 +1,125 @@
+"""The node ``retarget``: the tracker's posture in, commands for a robot arm out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from builtin_interfaces.msg import Duration
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, Header, String
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.files import user_path
+from cardbox_tracker.retargeting.retargeter import Command
+from cardbox_tracker.retargeting.setup import make_retargeter
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.results import posture_of
+from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+_DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
+_CHECK_S = 0.1
+
+
+class RetargetNode(CardboxNode):
+    """Commands a robot, and lets it stand still whenever the posture is not sure."""
+
+    def __init__(self, **options: Any) -> None:
+        """Read the robot and subscribe to what the tracker publishes.
+
+        Raises:
+            CardboxError: there is no robot, or it cannot be used as the parameters say.
+        """
+        super().__init__("retarget", **options)
+        settings = LiveParameters(self, RetargetParameters).value
+        if not settings.robot_file:
+            raise CardboxError("retarget needs a robot: give the parameter robot_file, a URDF")
+        joint_map = user_path(settings.joint_map_file) if settings.joint_map_file else None
+        robot, self._retargeter = make_retargeter(
+            user_path(settings.robot_file), joint_map, settings.hand_link, settings.config()
+        )
+        self._timeout_s = settings.timeout_s
+        self._body: BodyModel | None = None
+        self._state, self._status = "", ""
+        self._joints = JointState()
+        self._heard_s = time.monotonic()
+        self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
+        self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
+        self._robot_joints = self.advertise(JointState, "retarget/joint_states", qos.RESULT)
+        self._says = self.advertise(String, "retarget/status", qos.LATCHED)
+        description = self.advertise(String, "retarget/robot_description", qos.LATCHED)
+        description.publish(String(data=robot.urdf))
+        self._joints_topic = self.resolve("joint_states")
+        self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
+        self.subscribe(String, "tracking_state", self._on_state, qos.RESULT)
+        self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
+        self.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
+        self.create_timer(_CHECK_S, self._check)
+        self.diagnostics.source = f"postures on {self._joints_topic}"
+        self.diagnostics.wait_for(f"postures on {self._joints_topic} (is the tracker running?)")
+
+    def _on_model(self, message: String, _: int) -> None:
+        self._body = loads_body_model(message.data, source=self.resolve("body_model"))
+
+    def _on_state(self, message: String, _: int) -> None:
+        # It comes before the joints of its image, and alone where there are none.
+        self._state = message.data
+        if message.data != TRACKING:
+            self._hold(message.data)
+
+    def _on_joints(self, message: JointState, _: int) -> None:
+        self._joints = message
+
+    def _on_stddev(self, message: JointState, sent_ns: int) -> None:
+        """The tracker sends the deviations after the joints, under the same stamp."""
+        if self._joints.header.stamp != message.header.stamp:
+            return
+        stamp_ns = conversions.stamp_ns(message.header.stamp)
+        if not self.diagnostics.input.add(stamp_ns).is_usable:
+            return
+        self._heard_s = time.monotonic()
+        posture, stddev = posture_of(self._joints), posture_of(message)
+        command = self._retargeter.update(stamp_ns, self._state, self._body, posture, stddev)
+        self._send(command, message.header)
+        self.diagnostics.working(sent_ns)
+
+    def _check(self) -> None:
+        if time.monotonic() > self._heard_s + self._timeout_s:
+            self._hold(f"no posture for {self._timeout_s:g} s")
+
+    def _hold(self, reason: str) -> None:
+        """Stand still: the present positions are sent once."""
+        command = self._retargeter.hold(reason)
+        if command.status != self._status:
+            self._send(command, Header())
+
+    def _send(self, command: Command, header: Header) -> None:
+        names, positions = list(self._retargeter.joints), command.positions.tolist()
+        nanoseconds = round(command.duration_s * 1e9)
+        duration = Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+        point = JointTrajectoryPoint(positions=positions, time_from_start=duration)
+        # Without a stamp: begin at once. That of the image has passed.
+        self._trajectory.publish(JointTrajectory(joint_names=names, points=[point]))
+        self._commands.publish(Float64MultiArray(data=positions))
+        self._robot_joints.publish(JointState(header=header, name=names, position=positions))
+        if command.status != self._status:
+            self._status = command.status
+            self._says.publish(String(data=command.status))
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    return run_node(RetargetNode, plain_command_line("retarget", _DOES, args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""The node ``rula``: joint states and their deviations in, RULA scores and their chances out."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout, String
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.ergonomics.distribution import (
+    SAMPLES,
+    ScoreDistribution,
+    expected,
+    score_distribution,
+)
+from cardbox_tracker.ergonomics.recording import ABOVE
+from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
+from cardbox_tracker.estimation.sampling import normal_postures
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.results import posture_of
+from cardbox_tracker.ros.nodes.use_parameters import RulaParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+
+_DOES = "Score the strain on arms, neck and trunk (RULA) while the tracker follows a person."
+
+
+class RulaNode(CardboxNode):
+    """Scores each posture of the tracker."""
+
+    def __init__(self, **options: Any) -> None:
+        """Subscribe to what the tracker publishes and wait for a body model."""
+        super().__init__("rula", **options)
+        self.parameters = LiveParameters(self, RulaParameters)
+        self._rng = np.random.default_rng(self.parameters.value.seed)
+        self._body: BodyModel | None = None
+        self._joints = JointState()
+        self._score = self.advertise(Float32, "rula/score", qos.RESULT)
+        self._chances = self.advertise(Float32MultiArray, "rula/chances", qos.RESULT)
+        self._report = self.advertise(DiagnosticArray, "rula/report", qos.RESULT)
+        self._model_topic = self.resolve("body_model")
+        self._joints_topic = self.resolve("joint_states")
+        self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
+        self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
+        self.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
+        self.diagnostics.source = f"postures on {self._joints_topic}"
+        self._wait()
+
+    def _wait(self) -> None:
+        missing = self._model_topic if self._body is None else self._joints_topic
+        self.diagnostics.wait_for(f"{missing} (are the initializer and the tracker running?)")
+
+    def _on_model(self, message: String, _: int) -> None:
+        self._body = loads_body_model(message.data, source=self._model_topic)
+        self._wait()
+
+    def _on_joints(self, message: JointState, _: int) -> None:
+        self._joints = message
+
+    def _on_stddev(self, message: JointState, sent_ns: int) -> None:
+        """The tracker sends the deviations after the joints, under the same stamp."""
+        if self._joints.header.stamp != message.header.stamp or self._body is None:
+            return
+        if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
+            return
+        posture, stddev = posture_of(self._joints), posture_of(message)
+        postures = normal_postures(posture, stddev, SAMPLES, self._rng)
+        scores = score_distribution(self._body, postures, self.parameters.value.config())
+        self._score.publish(Float32(data=scores.mean))
+        self._chances.publish(_chances_message(scores))
+        self._report.publish(_report_message(message, scores, self.get_name()))
+        self.diagnostics.working(sent_ns)
+
+
+def _chances_message(scores: ScoreDistribution) -> Float32MultiArray:
+    count = len(scores.grand)
+    layout = MultiArrayLayout(dim=[MultiArrayDimension(label="score", size=count, stride=count)])
+    return Float32MultiArray(layout=layout, data=scores.grand.tolist())
+
+
+def _report_message(message: JointState, scores: ScoreDistribution, name: str) -> DiagnosticArray:
+    """Return all that is known of one image, under its header."""
+    meaning = next(text for low, high, text in ACTION_LEVELS if low <= scores.likeliest <= high)
+    values = {
+        "score": f"{scores.mean:.2f}",
+        "likeliest score": str(scores.likeliest),
+        f"chance above {ABOVE}": f"{scores.chance_above(ABOVE):.3f}",
+        "score with the left arm": f"{expected(scores.left):.2f}",
+        "score with the right arm": f"{expected(scores.right):.2f}",
+    }
+    is_high = scores.likeliest > ABOVE
+    return DiagnosticArray(
+        header=message.header,
+        status=[
+            DiagnosticStatus(
+                level=DiagnosticStatus.WARN if is_high else DiagnosticStatus.OK,
+                name=f"{name}: RULA",
+                message=meaning,
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        ],
+    )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    return run_node(RulaNode, plain_command_line("rula", _DOES, args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,88 @@
+"""The library rerun-sdk, which is installed only by those who want the viewer."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import atomic_path
+
+APPLICATION = "cardbox_tracker"
+
+_THIS_COMPUTER = "127.0.0.1"
+
+
+def rerun() -> Any:
+    """Return the module rerun.
+
+    Raises:
+        CardboxError: it is not installed; the text says how to.
+    """
+    try:
+        import rerun as module
+        import rerun.blueprint
+        import rerun.urdf
+    except ImportError as error:
+        raise CardboxError(
+            f"the viewer needs the library rerun-sdk ({error}); install it with "
+            "'pip install cardbox_tracker[view]' (170 MB)"
+        ) from None
+    return module
+
+
+@contextmanager
+def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
+    """Context of a stream to a file, to a browser, or without either to a window.
+
+    Args:
+        blueprint: how the views are arranged.
+        save: .rrd file to write; it appears, whole, at the end.
+        web: serve the viewer to a browser, as long as the context lasts.
+
+    Yields:
+        The stream, and the address for a browser, which is empty without ``web``.
+
+    Raises:
+        CardboxError: rerun-sdk is not installed, the file cannot be written, or neither a port nor
+            a window can be opened.
+    """
+    rr = rerun()
+    if save is None and not web and not _has_display():
+        raise CardboxError(
+            "there is no display for the viewer's window; give --web for a browser, or --save "
+            "FILE.rrd to look at it elsewhere with 'rerun FILE.rrd'"
+        )
+    with ExitStack() as stack:
+        # A name that does not change, so that the same bag gives the same recording.
+        stream = rr.RecordingStream(APPLICATION, recording_id=APPLICATION)
+        path = None if save is None else stack.enter_context(atomic_path(save))
+        address = ""
+        try:
+            sinks: list[Any] = [] if path is None else [rr.FileSink(path)]
+            if web:
+                server = rr.GrpcServerSink(bind_ip=_THIS_COMPUTER)
+                sinks.append(server)
+                rr.serve_web_viewer(open_browser=False)
+                address = f"http://localhost:9090?url={quote(server.uri, safe='')}"
+            if sinks:
+                stream.set_sinks(*sinks, default_blueprint=blueprint)
+            else:
+                stream.spawn(default_blueprint=blueprint)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise CardboxError(f"cannot open the viewer: {error}") from None
+        try:
+            yield stream, address
+        finally:
+            stream.flush()
+            stream.disconnect()
+
+
+def _has_display() -> bool:
+    is_x11 = sys.platform.startswith("linux")
+    return not is_x11 or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

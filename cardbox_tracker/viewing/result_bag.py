@@ -1,0 +1,97 @@
+"""A bag of results: of ``cardbox track --bag``, or recorded from running nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader
+from cardbox_tracker.recordings.result_reader import (
+    MODEL,
+    joints_of,
+    namespace_of,
+    stamp_ns_of,
+)
+from cardbox_tracker.viewing.feed import Feed
+from cardbox_tracker.vision.encodings import decode_bgr
+
+_ROBOT, _JOINTS = "/robot_description", "/joint_states"
+
+
+def show_results(
+    bag: BagReader, feed: Feed, progress: Callable[[float], None] = lambda _: None
+) -> int:
+    """Show every message of a bag of results; return how many images it has joints of.
+
+    Args:
+        bag: an open recording.
+        feed: where to show it.
+        progress: told the finished fraction.
+
+    Raises:
+        BagError: the bag has no results of the tracker, or is damaged.
+    """
+    space = namespace_of(bag)
+    handlers = _handlers(bag, feed, space) | _robots(bag, feed, space)
+    count, total_s = 0, max(bag.duration_s, 1e-9)
+    for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
+        content = bag.deserialize(message)
+        try:
+            handlers[message.topic](message, content)
+        except (AttributeError, TypeError, ValueError) as error:
+            # Recordings bring definitions of their types along.
+            raise BagError(
+                f"{message.topic} of {bag.path} is not what it should be: {error}"
+            ) from None
+        count += message.topic == space + _JOINTS
+        progress((message.time_ns - bag.start_ns) / 1e9 / total_s)
+    return count
+
+
+Handler = Callable[[BagMessage, Any], None]
+
+
+def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
+    """What is done with the topics of the tracker in the namespace ``space``."""
+    return {
+        space + MODEL: lambda m, c: feed.model(str(c.data), f"{m.topic} of {bag.path}"),
+        space + "/tracking_state": lambda m, c: feed.state(m.time_ns, str(c.data)),
+        space + _JOINTS: lambda _, c: feed.joints(stamp_ns_of(c), joints_of(c)),
+        space + "/joint_states_stddev": lambda _, c: feed.deviations(stamp_ns_of(c), joints_of(c)),
+        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
+        space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), _image(c)),
+    }
+
+
+def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
+    """The same of robots: each has its description and joint states in a namespace of its own."""
+    handlers: dict[str, Handler] = {}
+    for topic in bag.topics:
+        if not topic.endswith(_ROBOT) or topic == space + _ROBOT:
+            continue
+        robot = topic.removesuffix(_ROBOT)
+        name = robot.strip("/").replace("/", "_") or "robot"
+        handlers[topic] = lambda _, c, name=name: feed.robot(name, str(c.data))  # type: ignore[misc]
+        handlers[robot + _JOINTS] = lambda _, c, name=name: feed.robot_joints(  # type: ignore[misc]
+            stamp_ns_of(c), name, joints_of(c)
+        )
+    return handlers
+
+
+def _points(message: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
+    return np.array(points, np.float64).reshape(-1, 3)
+
+
+def _image(message: Any) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    return decode_bgr(
+        message.data,
+        message.height,
+        message.width,
+        message.step,
+        message.encoding,
+        bool(message.is_bigendian),
+    )

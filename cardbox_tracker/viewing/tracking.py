@@ -1,0 +1,45 @@
+"""A recording that is tracked while it is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.model_file import dumps_body_model
+from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.outputs import joint_deviations, joint_values
+from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.viewing.feed import Feed
+
+_SCALE = 2
+
+
+class ShownTracking:
+    """Shows each image; an observer of :func:`~cardbox_tracker.recordings.track.track_recording`.
+
+    Attributes:
+        count: images that have a posture.
+    """
+
+    def __init__(self, feed: Feed) -> None:
+        """Begin."""
+        self._feed = feed
+        self._described: object = None
+        self.count = 0
+
+    def __call__(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+        """Show one image."""
+        feed, stamp_ns = self._feed, frame.stamp_ns
+        if tracker.body is not self._described:
+            feed.model(dumps_body_model(tracker.body), "the tracker")
+        self._described = tracker.body
+        feed.state(stamp_ns, estimate.state)
+        image = frame.brightness if frame.image is None else frame.image
+        feed.image(stamp_ns, draw_overlay(image, tracker.body, tracker.camera, estimate, _SCALE))
+        joints, deviations = joint_values(estimate), joint_deviations(estimate)
+        if joints is not None and deviations is not None:
+            self.count += 1
+            feed.joints(stamp_ns, joints)
+            feed.deviations(stamp_ns, deviations)
+        if estimate.keypoints_m is not None:
+            feed.keypoints(stamp_ns, np.asarray(estimate.keypoints_m))

@@ -1,0 +1,88 @@
+"""'cardbox retarget': a table, a bag with the robot in it, and mistakes in words."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate, Tracker
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.vision.camera import Camera
+
+CONFIG = Path(__file__).parents[2] / "config"
+ROBOT, MAP = CONFIG / "example_arm.urdf", CONFIG / "example_joint_map.yaml"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four images of stretched arms, of which the third has nobody."""
+    path = tmp_path_factory.mktemp("results") / "results"
+    tracker = Tracker(BodyModel.of(hip_height_m=-0.51), Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
+    grey, posture = np.zeros((48, 64), np.uint8), reference_posture("arms")
+    seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
+    with ResultBag(path, "camera") as bag:
+        for i, estimate in enumerate((seen, seen, Estimate(LOST), seen, seen)):
+            bag.add(Frame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+    return path
+
+
+def test_the_robot_follows_and_stands_still(
+    results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    table, bag = tmp_path / "arm.csv", tmp_path / "with_arm"
+    done = cardbox(
+        *("retarget", results, "--robot", ROBOT, "--map", MAP, "--max-speed", "0.5"),
+        *("--csv", table, "--bag", bag),
+    )
+    assert done.code == 0, done.err
+    assert "moving: 4 of 5 images" in done.out
+    assert "frozen: lost: 1 of 5 images" in done.out
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == ["moving"] * 2 + ["frozen: lost"] + ["moving"] * 2
+    roll = [float(row["shoulder_roll"]) for row in rows]
+    assert roll == pytest.approx([0.0, -0.05, -0.05, -0.1, -0.15])
+    with BagReader(bag) as read, BagReader(results) as before:
+        kinds = read.topics
+        assert kinds["/retarget/joint_trajectory"] == "trajectory_msgs/msg/JointTrajectory"
+        assert read.count(["/retarget/joint_states"]) == 5
+        assert kinds.keys() - before.topics.keys() == {
+            f"/retarget/{name}"
+            for name in ("joint_states", "joint_trajectory", "robot_description", "status")
+        }
+        assert read.count(list(before.topics)) == before.count()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--robot", "FOLDER/missing.urdf"), "missing.urdf: No such file or directory"),
+        (("--robot", str(MAP)), "is no URDF"),
+        (("--map", str(ROBOT)), "is no joint map"),
+        (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or a hand"),
+        (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
+        (("--side", "both"), "--side: invalid choice: 'both'"),
+    ],
+)
+def test_mistakes_of_retarget(
+    results: Path, tmp_path: Path, words: tuple[str, ...], expected: str, cardbox: Callable
+) -> None:
+    given = [word.replace("FOLDER", str(tmp_path)) for word in words]
+    rest = [] if "--robot" in words else ["--robot", ROBOT]
+    rest += [] if "--map" in words else ["--map", MAP]
+    done = cardbox("retarget", results, *rest, *given, "--csv", tmp_path / "arm.csv")
+    done.assert_refused("retarget", expected)
+    assert not (tmp_path / "arm.csv").exists()
+
+
+def test_images_alone_are_no_results(files: Path, cardbox: Callable) -> None:
+    done = cardbox("retarget", files / "session", "--robot", ROBOT, "--map", MAP)
+    done.assert_refused("retarget", "has no results of the tracker", "cardbox track BAG")

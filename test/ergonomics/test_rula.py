@@ -1,0 +1,172 @@
+"""RULA: the tables of the paper, angles to scores, and the chances of uncertain postures."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cardbox_tracker.body.posture import JOINT_NAMES, TURNING_LIMITS
+from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.ergonomics.config import RulaConfig
+from cardbox_tracker.ergonomics.distribution import ScoreDistribution, score_distribution
+from cardbox_tracker.ergonomics.plot import plot_scores
+from cardbox_tracker.ergonomics.recording import CSV_HEADER, RulaRow, summarize, write_csv
+from cardbox_tracker.ergonomics.rula import grand_score, rula_scores
+from cardbox_tracker.ergonomics.tables import TABLE_A, TABLE_B, TABLE_C
+
+BODY = body_from_proportions(1.75, 2.0)
+
+
+def posture(**angles_deg: float) -> np.ndarray:
+    d = np.zeros(12)
+    for name, value in angles_deg.items():
+        d[JOINT_NAMES.index(name)] = np.radians(value)
+    return d
+
+
+def scores(config: RulaConfig | None = None, **angles_deg: float) -> tuple[int, ...]:
+    """Upper arm, lower arm, trunk, grand score, of the left arm; the right one hangs."""
+    found = rula_scores(BODY, posture(**angles_deg), config or RulaConfig())
+    left = found.left
+    return tuple(map(int, (left.upper_arm, left.lower_arm, found.trunk, left.grand)))
+
+
+@pytest.mark.parametrize(
+    ("upper", "lower", "wrist", "twist", "score"),
+    [(1, 1, 1, 1, 1), (2, 2, 3, 2, 4), (3, 3, 3, 1, 4), (4, 3, 2, 2, 5), (6, 1, 4, 2, 9)],
+)
+def test_table_a_is_the_worksheets(
+    upper: int, lower: int, wrist: int, twist: int, score: int
+) -> None:
+    assert TABLE_A[upper - 1, lower - 1, wrist - 1, twist - 1] == score
+
+
+@pytest.mark.parametrize(
+    ("neck", "trunk", "legs", "score"),
+    [(1, 1, 2, 3), (2, 3, 1, 4), (3, 4, 2, 6), (4, 6, 1, 8), (6, 4, 2, 9)],
+)
+def test_table_b_is_the_worksheets(neck: int, trunk: int, legs: int, score: int) -> None:
+    assert TABLE_B[neck - 1, trunk - 1, legs - 1] == score
+
+
+def test_scores_beyond_table_c_count_as_its_last() -> None:
+    assert [grand_score(np.array(a), np.array(b)) for a, b in ((3, 3), (12, 2), (2, 9))] == [
+        3,
+        5,
+        5,
+    ]
+
+
+@pytest.mark.parametrize("table", [TABLE_A, TABLE_B, TABLE_C])
+def test_no_table_falls_where_a_part_is_worse(table: np.ndarray) -> None:
+    for axis in range(table.ndim):
+        assert (np.diff(table, axis=axis) >= 0).all()
+
+
+# Worked by hand on the worksheet: upper arm, lower arm, trunk; A, B, then the grand score.
+@pytest.mark.parametrize(
+    ("angles_deg", "expected"),
+    [
+        ({}, (1, 2, 1, 2)),  # A 2, B 1
+        ({"left_elbow_flexion": 80}, (1, 1, 1, 1)),  # A 1, B 1
+        ({"left_shoulder_flexion": 30, "left_elbow_flexion": 70}, (2, 1, 1, 2)),  # A 2, B 1
+        ({"left_shoulder_flexion": 60, "left_elbow_flexion": 20}, (3, 2, 1, 3)),  # A 3, B 1
+        ({"left_shoulder_flexion": -30}, (2, 2, 1, 3)),  # A 3, B 1
+        ({"left_shoulder_abduction": 60}, (4, 3, 1, 3)),  # A 4, B 1
+        ({"left_shoulder_abduction": 100, "torso_pitch": 30}, (5, 3, 3, 5)),  # A 6, B 3
+        ({"torso_pitch": 70, "torso_roll": 15}, (1, 2, 5, 5)),  # A 2, B 6
+        ({"torso_pitch": -15}, (1, 2, 2, 2)),  # A 2, B 2
+    ],
+)
+def test_postures_score_as_on_the_worksheet(
+    angles_deg: dict[str, float], expected: tuple[int, ...]
+) -> None:
+    assert scores(**angles_deg) == expected
+
+
+def test_a_hand_beyond_the_middle_of_the_body_adds_one() -> None:
+    # The elbow is bent by 80 degrees each time.
+    assert scores(left_elbow_flexion=80)[1] == 1
+    assert scores(left_elbow_abduction=-80)[1] == 2
+    assert scores(left_elbow_abduction=80)[1] == 2  # to the outside
+
+
+def test_what_is_declared_counts() -> None:
+    assert scores(RulaConfig(neck=3, legs=2))[3] == 3  # A 2, B 3
+    assert scores(RulaConfig(arm_load=3, arm_muscle_use=1))[3] == 4  # A 2 + 4, B 1
+    assert scores(RulaConfig(shoulders_raised=True, trunk_twisted=True))[:3] == (2, 2, 2)
+    assert scores(RulaConfig(arms_supported=True), left_shoulder_flexion=30)[0] == 1
+    with pytest.raises(ValueError, match=r"neck is 7; expected 1 to 6"):
+        RulaConfig(neck=7)
+
+
+def test_the_worse_arm_decides_and_sides_are_alike() -> None:
+    left = rula_scores(BODY, posture(left_shoulder_abduction=100), RulaConfig())
+    right = rula_scores(BODY, posture(right_shoulder_abduction=100), RulaConfig())
+    assert left.grand == left.left.grand > left.right.grand
+    assert (left.left, left.right) == (right.right, right.left)
+
+
+@given(
+    arrays(np.float64, 12, elements=st.floats(0, 1)),
+    st.builds(RulaConfig, neck=st.integers(1, 6), arm_load=st.integers(0, 3)),
+)
+def test_every_posture_has_a_score(share: np.ndarray, config: RulaConfig) -> None:
+    low, high = TURNING_LIMITS.T
+    found = rula_scores(BODY, (low + share * (high - low))[None], config)
+    assert 1 <= found.grand[0] <= 7
+    assert found.grand[0] == max(found.left.grand[0], found.right.grand[0])
+
+
+def test_a_posture_on_a_line_is_as_likely_on_either_side() -> None:
+    on_the_line = posture(left_shoulder_flexion=45, left_elbow_flexion=80)
+    spread = np.zeros((2001, 12))
+    spread[:, JOINT_NAMES.index("left_shoulder_flexion")] = np.linspace(-0.2, 0.2, 2001)
+    found = score_distribution(BODY, on_the_line + spread, RulaConfig())
+    assert found.grand.sum() == pytest.approx(1)
+    # Upper arm 2 or 3 with a lower arm of 1 is A 2 or 3, with B 1.
+    assert found.left[[1, 2]] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert found.mean == pytest.approx(2.5, abs=0.01)
+
+
+def rows_of(*scores: int | None) -> list[RulaRow]:
+    rows = []
+    for number, score in enumerate(scores):
+        chances = np.eye(7)[score - 1] if score else None
+        found = None if chances is None else ScoreDistribution(chances, chances, chances)
+        rows.append(RulaRow(number * 10**8, "tracking" if score else "lost", found))
+    return rows
+
+
+def test_time_above_five_is_that_of_six_and_seven() -> None:
+    summary = summarize(rows_of(5, 6, None, 7, 1))
+    assert summary.measured_s == pytest.approx(0.4)
+    assert summary.above_s == pytest.approx(0.2)
+    assert summary.by_level_s == pytest.approx((0.1, 0.0, 0.2, 0.1))
+    assert summary.mean == pytest.approx((5 + 6 + 7 + 1) / 4)
+    assert np.isnan(summarize(rows_of(None)).mean)
+
+
+def test_a_gap_in_the_images_is_not_time_at_a_score() -> None:
+    rows = rows_of(6, 6, 6, 6)
+    rows[-1] = RulaRow(10**11, "tracking", rows[-1].scores)
+    assert summarize(rows).above_s == pytest.approx(0.1 + 0.1 + 0.3 + 0.1)
+
+
+def test_table_and_plot_are_written(tmp_path: Path) -> None:
+    rows = rows_of(3, None, 6)
+    write_csv(rows, tmp_path / "r.csv")
+    with (tmp_path / "r.csv").open(encoding="utf-8") as file:
+        header, first, lost, last = csv.reader(file)
+    assert tuple(header) == CSV_HEADER
+    assert first[:5] == ["0.000000000", "tracking", "3.000", "3", "0.000"]
+    assert lost == ["0.100000000", "lost", *[""] * (len(CSV_HEADER) - 2)]
+    assert (last[3], last[4]) == ("6", "1.000")
+    plot_scores(rows, tmp_path / "r.png")
+    assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,199 @@
+"""Whatever is measured, a robot keeps its limits and speeds, and stands still when it must."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.retargeting.config import RetargetConfig
+from cardbox_tracker.retargeting.joint_map import load_joint_map
+from cardbox_tracker.retargeting.motion import Limits, SafeMotion
+from cardbox_tracker.retargeting.retargeter import Retargeter
+from cardbox_tracker.retargeting.robot import load_robot, parse_robot
+
+CONFIG = Path(__file__).parents[2] / "config"
+ROBOT = load_robot(CONFIG / "example_arm.urdf")
+MAP = load_joint_map(CONFIG / "example_joint_map.yaml")
+BODY = body_from_proportions(1.75, 2.0)
+SURE = np.full(12, 0.1)
+PERIOD_NS = 66_666_667
+
+numbers = st.floats(allow_nan=True, allow_infinity=True)
+twelve = st.lists(numbers, min_size=12, max_size=12).map(np.array)
+images = st.lists(
+    st.tuples(
+        st.integers(-(10**10), 10**12),
+        st.sampled_from(["tracking", "uncertain", "lost", "no_person", "", "TRACKING"]),
+        st.none() | twelve,
+        st.none() | twelve,
+    ),
+    max_size=12,
+)
+settings = st.builds(
+    RetargetConfig,
+    max_speed=st.floats(0.01, 20),
+    max_stddev_rad=st.floats(0.05, 3.2),
+    longest_step_s=st.floats(0.01, 1),
+)
+
+
+@given(images, settings)
+def test_limits_and_speeds_hold_for_any_input(
+    sequence: list[tuple[int, str, np.ndarray | None, np.ndarray | None]], config: RetargetConfig
+) -> None:
+    robot = Retargeter(ROBOT, MAP, config)
+    lower, upper, speed = ROBOT.limits_of(MAP.joints)
+    before, stamp_ns = np.clip(np.zeros(3), lower, upper), 0
+    for step_ns, state, posture, stddev in sequence:
+        command = robot.update(stamp_ns := stamp_ns + step_ns, state, BODY, posture, stddev)
+        moved = np.abs(command.positions - before)
+        assert (command.positions >= lower).all() and (command.positions <= upper).all()
+        # Never more than in the time that really passed, nor than in the longest step.
+        step_s = min(max(step_ns / 1e9, 0.0), config.longest_step_s)
+        assert (moved <= np.minimum(speed, config.max_speed) * step_s + 1e-9).all()
+        if state != "tracking" or posture is None or stddev is None:
+            assert not command.is_moving
+        if not command.is_moving:
+            assert not moved.any()
+        before = command.positions
+
+
+@given(
+    st.lists(st.lists(numbers, min_size=2, max_size=2), max_size=10),
+    st.lists(numbers, min_size=10, max_size=10),
+)
+def test_the_last_step_holds_for_any_target(targets: list[list[float]], times: list[float]) -> None:
+    limits = Limits(np.array([-1.0, 0.5]), np.array([2.0, 0.75]), np.array([1.0, math.inf]))
+    motion = SafeMotion(limits)
+    for target, time_s in zip(targets, times, strict=False):
+        before = motion.positions
+        after = motion.move(np.array(target), time_s)
+        assert (after >= limits.lower).all() and (after <= limits.upper).all()
+        longest = max(time_s, 0.0) if math.isfinite(time_s) else 0.0
+        assert abs(after[0] - before[0]) <= longest + 1e-12
+
+
+def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
+    posture = reference_posture("arms")  # abduction 80 degrees
+    positions = [
+        robot.update(i * 10**8, "tracking", BODY, posture, SURE).positions for i in range(20)
+    ]
+    assert positions[0] == pytest.approx([0.0, 0.0, 0.0])
+    assert positions[5] == pytest.approx([-0.5, 0.0, 0.0])
+    assert positions[-1] == pytest.approx([-math.radians(80), 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("state", "deviation", "status"),
+    [
+        ("lost", 0.1, "frozen: lost"),
+        ("no_person", 0.1, "frozen: no person"),
+        ("uncertain", 0.1, "frozen: uncertain"),
+        ("", 0.1, "frozen: no state yet"),
+        ("tracking", 0.8, "frozen: too uncertain"),
+        ("tracking", math.nan, "frozen: too uncertain"),
+        ("tracking", 0.1, "moving"),
+    ],
+)
+def test_the_dead_man(state: str, deviation: float, status: str) -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig())
+    posture = reference_posture("arms")
+    robot.update(0, "tracking", BODY, posture, SURE)
+    before = robot.update(PERIOD_NS, "tracking", BODY, posture, SURE).positions
+    stddev = SURE.copy()
+    stddev[JOINT_NAMES.index("right_elbow_flexion")] = deviation
+    command = robot.update(2 * PERIOD_NS, state, BODY, posture, stddev)
+    assert command.status == status
+    assert (command.positions == before).all() == (status != "moving")
+
+
+def test_what_is_not_followed_may_be_uncertain() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig())
+    stddev = SURE.copy()
+    stddev[JOINT_NAMES.index("left_elbow_flexion")] = 3.0
+    assert robot.update(0, "tracking", BODY, reference_posture("arms"), stddev).is_moving
+
+
+def test_after_holding_nothing_is_made_up_for() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig())
+    posture = reference_posture("arms")
+    before = robot.update(0, "tracking", BODY, posture, SURE).positions
+    assert robot.hold("no posture").status == "frozen: no posture"
+    assert (robot.update(10**9, "tracking", BODY, posture, SURE).positions == before).all()
+
+
+URDF = """<robot name="r">
+<link name="a"/><link name="b"/><link name="c"/>
+<joint name="turns" type="continuous"><parent link="a"/><child link="b"/></joint>
+<joint name="slides" type="prismatic"><parent link="b"/><child link="c"/>
+<limit lower="0.1" upper="0.4" velocity="0.2" effort="1"/></joint>
+</robot>"""
+
+
+def test_a_robot_is_read() -> None:
+    robot = parse_robot(URDF)
+    assert robot.links == ("a", "b", "c")
+    assert robot.last_link == "c"
+    assert robot.chain("b") == ("turns",)
+    lower, upper, speed = robot.limits_of(("slides", "turns"))
+    assert lower == pytest.approx([0.1, -math.pi])
+    assert upper == pytest.approx([0.4, math.pi])
+    assert speed.tolist() == [0.2, math.inf]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("<robot", "<robot xmlns:xacro='x'", "xacro FILE > robot.urdf"),
+        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
+        ("</robot>", "", "is no URDF"),
+        ('upper="0.4"', 'upper="inf"', "slides may be at 0.1 to inf"),
+        ('upper="0.4"', 'upper="0"', "slides may be at 0.1 to 0.0"),
+        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
+        ('<parent link="b"/>', "", "slides has no parent"),
+        ('<child link="c"/>', '<child link="b"/>', "two joints before it"),
+        ('<parent link="a"/>', '<parent link="c"/>', "in a circle"),
+    ],
+)
+def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        parse_robot(URDF.replace(old, new))
+
+
+def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match="no movable joint 'wheel'; it has shoulder_roll"):
+        ROBOT.limits_of(("wheel",))
+    with pytest.raises(CardboxError, match="no link 'foot'; it has base_link"):
+        ROBOT.chain("foot")
+    with pytest.raises(CardboxError, match="No such file"):
+        load_robot(tmp_path / "missing.urdf")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("joints: []", "an empty one"),
+        ("arms: 1", "'joints'"),
+        ("joints: [{from: left_elbow_flexion}]", "needs 'from' and 'to'"),
+        ("joints: [{from: knee, to: a}]", "'knee' is none of torso_y"),
+        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "no finite number"),
+        (
+            "joints: [{from: left_elbow_flexion, to: a}, {from: torso_yaw, to: a}]",
+            "is there twice",
+        ),
+    ],
+)
+def test_what_is_no_joint_map_is_told(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    with pytest.raises(CardboxError, match=expected):
+        load_joint_map(path)

@@ -1,0 +1,173 @@
+"""'cardbox view' of a bag of results: what its file has is read back with the library."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.commands.main import main
+from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate, Tracker
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.simulation.motions import wave
+from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.vision.camera import Camera
+
+BODY = BodyModel.of(hip_height_m=-0.51)
+CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
+IMAGES = 5
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """A bag as 'cardbox track --bag' writes it, and a true frame for each image."""
+    tracker = Tracker(BODY, CAMERA)
+    grey = np.zeros((48, 64), np.uint8)
+    with ResultBag(tmp_path / "results", "camera") as bag:
+        for i in range(IMAGES):
+            posture = wave(i / 5.0)
+            points = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
+            estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
+            bag.add(Frame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+        bag.add(Frame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
+    return tmp_path / "results"
+
+
+def view(*words: object) -> int:
+    return main(["view", *map(str, words)])
+
+
+def rows_of(path: Path) -> Counter[str]:
+    """Rows of every entity in a file, static ones left out."""
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    rows: Counter[str] = Counter()
+    for one in chunk.RrdReader(path).stream():
+        rows[str(one.entity_path).strip("/")] += 0 if one.is_static else one.num_rows
+    return rows
+
+
+def test_every_image_is_in_the_file(results: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    assert view(results, "--save", tmp_path / "view.rrd") == 0
+    rows = rows_of(tmp_path / "view.rrd")
+    assert rows["image"] == IMAGES + 1
+    assert rows["state"] == 2  # tracking, then lost
+    assert rows["keypoints/joints"] == IMAGES
+    for joint in ("left_elbow_flexion", "right_shoulder_abduction"):
+        assert rows[f"person/joints/{joint}"] == IMAGES
+        arm = joint.split("_")[0]
+        assert rows[f"joints/{arm}_arm/{joint}"] == IMAGES
+        for side in ("low", "high"):
+            spread = f"joints/{arm}_arm/within_two_deviations/{joint}/{side}"
+            assert rows[spread] == IMAGES
+    assert rows["joints/place/torso_y"] == IMAGES
+    # The body's boxes are there, once and for all.
+    assert any("left_forearm" in entity for entity in rows)
+    assert not any(entity.startswith("error") for entity in rows)
+
+
+def test_errors_are_shown_where_there_is_a_truth(results: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    synthesize_session(tmp_path / "other", "bow", fps=2.0, width=64, height=48)
+    truth = tmp_path / "other" / "ground_truth.json"
+    assert view(results, "--truth", truth, "--save", tmp_path / "v.rrd") == 0
+    # None of its frames has the stamp of an image.
+    assert "error/aligned" not in rows_of(tmp_path / "v.rrd")
+
+
+def test_a_robot_of_its_own_namespace_is_shown(tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    names = ("torso_yaw", "elbow")
+    with BagWriter(tmp_path / "bag", "mcap") as bag:
+        save_body_model(BODY, tmp_path / "person.yaml")
+        bag.write_string("/body_model", 1, (tmp_path / "person.yaml").read_text())
+        bag.write_string("/arm/robot_description", 1, urdf_from_body(BODY))
+        for i in range(1, 4):
+            bag.write_joint_state("/arm/joint_states", i, "", names, np.array([0.1, 0.2]))
+    assert view(tmp_path / "bag", "--save", tmp_path / "v.rrd") == 0
+    rows = rows_of(tmp_path / "v.rrd")
+    assert rows["arm/joints/torso_yaw"] == 3
+    assert "arm/joints/elbow" not in rows
+
+
+def test_errors_are_those_of_the_keypoints() -> None:
+    scene = pytest.importorskip("cardbox_tracker.viewing.scene")
+    truth = CAMERA.reference_to_optical(keypoints_m(BODY, reference_posture("front")))
+    moved = truth + np.array([0.0, 0.0, 0.1])
+    assert scene.errors_cm(moved, truth) == pytest.approx({"absolute": 10.0, "aligned": 0.0})
+    moved[2, 1] += 0.06
+    assert scene.errors_cm(moved, truth)["aligned"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("pitch_rad", [0.0, 0.3])
+def test_points_stand_where_the_urdf_has_the_person(pitch_rad: float) -> None:
+    scene = pytest.importorskip("cardbox_tracker.viewing.scene")
+    body = BODY.with_values(camera_pitch_rad=pitch_rad)
+    camera = CAMERA.with_pitch(pitch_rad)
+    reference = keypoints_m(body, reference_posture("front"))
+    level = scene.level_points(camera.reference_to_optical(reference), pitch_rad)
+    # The reference frame faces the camera; the root of the URDF looks the same way as it.
+    np.testing.assert_allclose(level, reference * (-1.0, -1.0, 1.0), atol=1e-12)
+
+
+Refusal = tuple[tuple[str, ...], str]
+REFUSALS: list[Refusal] = [
+    ((), "expected either BAG or --live"),
+    (("BAG", "--live"), "expected either BAG or --live"),
+    (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
+]
+
+
+@pytest.mark.parametrize(("words", "expected"), REFUSALS)
+def test_mistakes_are_told(
+    results: Path, words: tuple[str, ...], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [w.replace("BAG", str(results)).replace("FOLDER", str(results.parent)) for w in words]
+    assert view(*given) == 1
+    assert expected in capsys.readouterr().err
+
+
+def test_images_alone_are_tracked_or_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    synthesize_session(tmp_path / "session", "bow", fps=4.0, width=160, height=120)
+    save_body_model(BODY, tmp_path / "person.yaml")
+    out = tmp_path / "v.rrd"
+    assert view(tmp_path / "session", "--start", "22", "--save", out) == 1
+    assert "or --model, --background as for 'cardbox track'" in capsys.readouterr().err
+    assert not out.exists()
+    rest = ("--background", "0:3.9", "--model", tmp_path / "person.yaml", "--start", "22")
+    assert view(tmp_path / "session", *rest, "--save", out) == 0
+    rows = rows_of(out)
+    assert rows["image"] >= rows["keypoints/joints"] > 0
+    # The truth lies beside the recording.
+    assert rows["error/absolute"] == rows["truth/joints"] == rows["keypoints/joints"]
+
+
+def test_without_a_display_the_other_ways_are_named(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    monkeypatch.setattr("cardbox_tracker.viewing.library._has_display", lambda: False)
+    assert view(results) == 1
+    assert "give --web for a browser, or --save FILE.rrd" in capsys.readouterr().err
+
+
+def test_without_the_library_its_extra_is_named(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert view(results, "--save", results.parent / "v.rrd") == 1
+    assert "pip install cardbox_tracker[view]" in capsys.readouterr().err
+    assert not (results.parent / "v.rrd").exists()
