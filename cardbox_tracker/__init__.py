@@ -32,12 +32,13 @@ if TYPE_CHECKING:
     from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
     from cardbox_tracker.estimation.cost.depth import Depth
     from cardbox_tracker.estimation.cost.view import OtherCamera
+    from cardbox_tracker.estimation.estimate import Estimate
     from cardbox_tracker.estimation.initialization.config import (
         InitializationConfig,
         InitializationResult,
     )
     from cardbox_tracker.estimation.initialization.measure import initialize_body
-    from cardbox_tracker.estimation.tracker import Estimate, Tracker
+    from cardbox_tracker.estimation.tracker import Tracker
     from cardbox_tracker.vision.background import (
         BackgroundConfig,
         BackgroundLearner,
@@ -108,7 +109,8 @@ _MODULES = {
     "estimation.cost.view": ("OtherCamera",),
     "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
     "estimation.initialization.measure": ("initialize_body",),
-    "estimation.tracker": ("Estimate", "Tracker"),
+    "estimation.estimate": ("Estimate",),
+    "estimation.tracker": ("Tracker",),
     "vision.background": (
         "BackgroundConfig",
         "BackgroundLearner",

@@ -17,7 +17,8 @@ import numpy as np
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 
 
 class JointValues(NamedTuple):

@@ -14,14 +14,8 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from cardbox_tracker.estimation.tracker import (
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-    Tracker,
-)
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
     FIGURES,
     OUTPUTS,

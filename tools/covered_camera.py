@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import measured_body
 from cardbox_tracker.recordings.cameras import CameraSources, FrameSet

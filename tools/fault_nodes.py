@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.tracker import Estimate
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode

@@ -25,10 +25,11 @@ from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.first_sight import upper_body
 from cardbox_tracker.estimation.initialization.references import lateral_m
 from cardbox_tracker.estimation.initialization.standing import at_height_of
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.estimation.tracker import Estimate
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.vision.camera import Camera
 
 Image = NDArray[np.uint8]

@@ -16,7 +16,7 @@ from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.recordings.bag_reader import BagReader

@@ -12,7 +12,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
     JointValues,
     Markers,

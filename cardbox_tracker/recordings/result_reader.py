@@ -11,7 +11,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BagError
-from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
 from cardbox_tracker.outputs import JointValues, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader
 

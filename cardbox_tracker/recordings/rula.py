@@ -7,7 +7,8 @@ import numpy as np
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import SAMPLES, score_distribution
 from cardbox_tracker.ergonomics.recording import RulaRow
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.silhouettes import Frame
 
 # Apart from the tracker's random numbers, which must not depend on whether scores are asked for.

@@ -17,7 +17,8 @@ from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.tracker import UNCERTAIN, Estimate, Tracker
+from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path, stamp_text
 from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
 from cardbox_tracker.recordings.cameras import CameraSources

@@ -9,7 +9,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.motion import Limits, SafeMotion
 from cardbox_tracker.retargeting.robot import Robot

@@ -6,7 +6,8 @@ import numpy as np
 
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_deviations, joint_values
 from cardbox_tracker.recordings.silhouettes import Frame
 from cardbox_tracker.viewing.feed import Feed

@@ -11,7 +11,8 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import Frame

@@ -21,7 +21,7 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.description.rep155 import REP155_JOINTS, Rep155Joints, joint_names
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
-from cardbox_tracker.estimation.tracker import TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
 
 yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy is not installed")

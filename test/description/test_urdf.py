@@ -19,7 +19,7 @@ from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES,
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
-from cardbox_tracker.estimation.tracker import TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
 
 KEYPOINT_LINKS = (

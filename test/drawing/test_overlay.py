@@ -22,7 +22,7 @@ from cardbox_tracker.drawing.overlay import (
 )
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.tracker import Estimate
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel()

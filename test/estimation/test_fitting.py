@@ -12,7 +12,8 @@ from cardbox_tracker.body.sizes import SIZE_INDEX
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation import fitting
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.tracker import TRACKING, UNCERTAIN, Tracker
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
 

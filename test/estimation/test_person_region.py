@@ -12,8 +12,9 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import default_preset, paper_preset
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING
 from cardbox_tracker.estimation.person_region import PersonRegion
-from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, TRACKING, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 

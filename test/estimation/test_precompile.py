@@ -21,9 +21,10 @@ from cardbox_tracker.estimation.cost import (
     row_sums,
     whole_body_kernels,
 )
+from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
-from cardbox_tracker.estimation.tracker import TRACKING, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import chroma, light, regions, shadows, window
 from cardbox_tracker.vision import foreground as contrast
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor

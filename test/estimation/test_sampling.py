@@ -9,8 +9,9 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import TURNING_LIMITS, reference_posture
 from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import LOST, Estimate
 from cardbox_tracker.estimation.sampling import normal_postures
-from cardbox_tracker.estimation.tracker import LOST, Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render

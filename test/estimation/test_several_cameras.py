@@ -16,8 +16,9 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.initialization.scale import measured_scale, scaled
-from cardbox_tracker.estimation.tracker import NO_PERSON, TRACKING, UNCERTAIN, Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics

@@ -24,17 +24,10 @@ from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame, TorsoCosts
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS
-from cardbox_tracker.estimation.tracker import (
-    FILTERS,
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-    Tracker,
-)
+from cardbox_tracker.estimation.tracker import FILTERS, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera

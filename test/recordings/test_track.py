@@ -18,8 +18,9 @@ from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.description.link_transforms import LinkTransforms
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.result_bag import ResultBag

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, reference_posture
-from cardbox_tracker.estimation.tracker import Estimate
+from cardbox_tracker.estimation.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 

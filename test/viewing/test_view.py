@@ -15,7 +15,8 @@ from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.urdf import urdf_from_body
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import Frame

@@ -17,7 +17,7 @@ from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
-from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.evaluation.metrics import align, angle_errors_deg
 from cardbox_tracker.evaluation.recorded.angles import joint_angles
 from cardbox_tracker.evaluation.recorded.session import RecordedSession

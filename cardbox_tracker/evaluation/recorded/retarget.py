@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.tracker import TRACKING, Estimate, Tracker
+from cardbox_tracker.estimation.estimate import TRACKING, Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import track_session

@@ -19,8 +19,9 @@ from cardbox_tracker.ergonomics.recording import ABOVE
 from cardbox_tracker.ergonomics.rula import rula_scores
 from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.sampling import normal_postures
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import track_session

@@ -14,8 +14,9 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.terms import DepthImage, Image
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.recordings.cameras import STEREO, CameraSources, open_recording

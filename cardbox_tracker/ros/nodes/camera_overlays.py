@@ -10,7 +10,8 @@ from sensor_msgs.msg import Image
 
 from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_views import Views

@@ -14,7 +14,8 @@ from std_msgs.msg import Header, String
 
 from cardbox_tracker.description.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import JointValues, place_of
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters

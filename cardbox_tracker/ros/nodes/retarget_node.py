@@ -14,7 +14,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.tracker import TRACKING
+from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.files import user_path
 from cardbox_tracker.retargeting.retargeter import Command
 from cardbox_tracker.retargeting.setup import make_retargeter

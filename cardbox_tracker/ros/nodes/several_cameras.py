@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch
 from cardbox_tracker.ros.nodes.camera_overlays import CameraOverlays
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses

@@ -14,7 +14,8 @@ from std_msgs.msg import Header
 from cardbox_tracker.description.link_transforms import LinkTransform, LinkTransforms
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_values, positions_of
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos

@@ -8,7 +8,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Bool, Header
 
 from cardbox_tracker.drawing.overlay import draw_message, draw_overlay
-from cardbox_tracker.estimation.tracker import Estimate, Tracker
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs

@@ -6,7 +6,7 @@ import math
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import PLACE_NAMES
-from cardbox_tracker.estimation.tracker import LOST, NO_PERSON, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.outputs import FIGURES, place_of
 from cardbox_tracker.ros.nodes.several_cameras import SeveralCameras
 from cardbox_tracker.ros.runtime.node import CardboxNode

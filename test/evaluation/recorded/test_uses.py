@@ -18,7 +18,7 @@ from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import ScoreDistribution
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.evaluation.recorded import retarget, rula
 from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.retargeting.config import RetargetConfig

@@ -24,10 +24,11 @@ from cardbox_tracker.body.model import BodyModel  # noqa: E402
 from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.body.posture import reference_posture  # noqa: E402
 from cardbox_tracker.errors import CameraError  # noqa: E402
+from cardbox_tracker.estimation.estimate import Estimate  # noqa: E402
 from cardbox_tracker.estimation.initialization.config import (  # noqa: E402
     InitializationConfig,
 )
-from cardbox_tracker.estimation.tracker import Estimate, Tracker  # noqa: E402
+from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages import conversions  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402

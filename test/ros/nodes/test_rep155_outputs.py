@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
 
 PLACE = "/humans/bodies/p1"

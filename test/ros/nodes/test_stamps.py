@@ -18,7 +18,8 @@ from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
 from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
-from cardbox_tracker.estimation.tracker import Estimate, Tracker  # noqa: E402
+from cardbox_tracker.estimation.estimate import Estimate  # noqa: E402
+from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,

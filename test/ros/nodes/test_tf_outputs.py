@@ -19,7 +19,7 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.description.link_transforms import LinkTransforms
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.tracker import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.outputs import joint_values, positions_of
 from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 

@@ -24,13 +24,8 @@ from cardbox_tracker.body.kinematics import keypoints_m  # noqa: E402
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
 from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture  # noqa: E402
-from cardbox_tracker.estimation.tracker import (  # noqa: E402
-    LOST,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-    Tracker,
-)
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, UNCERTAIN, Estimate  # noqa: E402
+from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
