@@ -110,16 +110,23 @@ def played(session: RecordedSession, body: Path, depth: str | None, logs: Path) 
     Raises:
         CardboxError: a node ended, or they do not find each other.
     """
+    depth_node = ["stereo_depth"] if depth else []
     with running_nodes(logs) as nodes, subscribed(session.truth.cameras[0]) as (live, ears):
         topics = _start(nodes, session, body, depth)
         _wait(nodes, ears, lambda: all(ears.node.count_subscribers(topic) for topic in topics))
         _wait(nodes, ears, lambda: ears.node.count_publishers("keypoints") == 1)
         spin_until(ears, time.monotonic() + 1.0)
-        nodes.start("play_bag", str(session.bag), "--topics", *topics)
+        # Late enough that all are connected: the empty scene may be hardly longer than learning.
+        nodes.start(
+            "play_bag", str(session.bag), "--topics", *topics, "--ros-args", "-p", "delay_s:=3.0"
+        )
         while nodes.is_running("play_bag"):
             spin_until(ears, time.monotonic() + 0.2)
         nodes.check()
         spin_until(ears, time.monotonic() + _AFTER_S)
+        if not live.keypoints_m:
+            words = "\n".join(nodes.text(name) for name in ("tracker", *depth_node))
+            raise CardboxError(f"{session.name}: no posture has come:\n{words}")
         return live
 
 
