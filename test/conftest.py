@@ -104,7 +104,9 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
         if handle is not None:
             handle.inner_test = inner
         item.user_properties.append(("promise", marker.args[0]))
-        item.user_properties.append(("tried", next(tried)))
+        # A test may know better, such as how many images it has sent.
+        if "tried" not in dict(item.user_properties):
+            item.user_properties.append(("tried", next(tried)))
 
 
 def _domains() -> Iterator[int]:

@@ -367,9 +367,9 @@ def test_all_at_once(live: Live) -> None:
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("Nodes at 60 Hz for ten minutes: memory, files, threads and latency stay")
+@pytest.mark.promise("Images at 60 Hz through the nodes: memory, files, threads and latency stay")
 @pytest.mark.parametrize("live", LAYOUTS, indirect=True)
-def test_nodes_for_long(live: Live) -> None:
+def test_nodes_for_long(live: Live, request: pytest.FixtureRequest) -> None:
     seconds = max(20.0, 600.0 * SHARE)
     from_s, period_s = live.next_run(), 1 / 60
     drawn = [live.person.image(sent) for sent in even(from_s, from_s + 8.0, period_s)]
@@ -388,6 +388,7 @@ def test_nodes_for_long(live: Live) -> None:
         live.joint_states.clear()
         number += 1
         live.graph.spin(max(start_s + number * period_s - time.monotonic(), 0.0))
+    request.node.user_properties.append(("tried", number))
     late = live.resources()
     live.now_s = from_s + seconds
     pairs = [(s, live.arrived_s[i] - s) for i, s in sent_s.items() if i in live.arrived_s]
@@ -406,8 +407,8 @@ def test_nodes_for_long(live: Live) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.promise("100,000 images through the core: memory, files, threads and latency stay")
-def test_the_core_for_long() -> None:
+@pytest.mark.promise("Images through the core: memory, files, threads and latency stay")
+def test_the_core_for_long(request: pytest.FixtureRequest) -> None:
     person = Person()
     silhouettes = [person.silhouette(1.0 + i / 15) for i in range(120)]
     tracker = Tracker(person.body, person.camera, default_preset(), np.random.default_rng(0))
@@ -422,6 +423,7 @@ def test_the_core_for_long() -> None:
         took_s[number] = time.perf_counter() - start_s
         if estimate.posture is not None:
             assert np.isfinite(estimate.posture).all()
+    request.node.user_properties.append(("tried", count))
     after = resources_of(os.getpid())
     quarter = count // 4
     ratio = np.percentile(took_s[-quarter:], 10) / np.percentile(took_s[1:quarter], 10)
