@@ -81,9 +81,7 @@ class WholeBodyCost:
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
         """Take a silhouette (H, W) of a person whose hips are about where ``state`` (14,) says."""
         config, camera = self._config, self._camera
-        x_m = self._body.placement.distance_m - state[kernels.TORSO_X]
-        z_m = self._body.placement.hip_height_m + state[kernels.TORSO_Z]
-        hip = camera.reference_to_optical(np.array([-x_m, state[kernels.TORSO_Y], z_m]))
+        hip = self._hips(state, camera)
         depth_m = max(float(hip[2]), 1e-3)
         column, row = camera.fx * hip[0] / depth_m + camera.cx, camera.fy * hip[1] / depth_m
         row += camera.cy
@@ -101,6 +99,16 @@ class WholeBodyCost:
             self.silhouette_px -= kernels.leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
 
+    def _hips(self, state: FloatArray, camera: Camera) -> FloatArray:
+        x_m = self._body.placement.distance_m - state[kernels.TORSO_X]
+        z_m = self._body.placement.hip_height_m + state[kernels.TORSO_Z]
+        return camera.reference_to_optical(np.array([-x_m, state[kernels.TORSO_Y], z_m]))
+
+    def hip_row(self, state: FloatArray, camera: Camera) -> float:
+        """Return the row of the hips of a state (14,) in the image of ``camera``, at any size."""
+        _, down_m, ahead_m = self._hips(state, camera).tolist()
+        return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
+
     def see_nothing(self) -> None:
         """Let this frame's silhouette and terms say nothing: ratings are the priors alone."""
         self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
@@ -114,7 +122,7 @@ class WholeBodyCost:
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
         """Rate torsos (N,), with the arms of a state drawn where they are in the image."""
-        gain = kernels.cover(arms_of, False, True, True, *self._figure, self._seen, self._beside)
+        gain = kernels.cover(arms_of, False, True, True, *self.figure, self._seen, self._beside)
         ratings = np.empty(len(states))
         kernels.rate_trunks(
             states,
@@ -136,16 +144,14 @@ class WholeBodyCost:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
         self._torso = torso
         gain = kernels.cover(
-            torso, True, False, False, *self._figure, self._seen, self._beside_trunk
+            torso, True, False, False, *self.figure, self._seen, self._beside_trunk
         )
         self._base_px = self.silhouette_px + gain
         self._arm_terms = [term.arms_beside(torso[_TORSO_OF_TERMS]) for term in self.terms]
 
     def uncovered(self, arm: int) -> NDArray[Any]:
         """Row sums beside the fixed torso and the other arm than ``arm``, 0 left or 1 right."""
-        kernels.cover(
-            self._torso, True, arm == 1, arm == 0, *self._figure, self._seen, self._beside
-        )
+        kernels.cover(self._torso, True, arm == 1, arm == 0, *self.figure, self._seen, self._beside)
         return self._beside
 
     def arms(self, arms: FloatArray, arm: int) -> FloatArray:
@@ -155,7 +161,7 @@ class WholeBodyCost:
             arms,
             1.0 - 2.0 * arm,
             self._torso,
-            *self._figure,
+            *self.figure,
             self._beside_trunk,
             self._base_px,
             self._scale,
@@ -172,7 +178,7 @@ class WholeBodyCost:
         ratings, costs_px, areas_px = np.empty((3, len(states)))
         kernels.rate_bodies(
             states,
-            *self._figure,
+            *self.figure,
             self._seen,
             self.silhouette_px,
             self._scale,
@@ -208,7 +214,7 @@ class WholeBodyCost:
     def corners(self, state: FloatArray) -> FloatArray:
         """Return the drawn patches (13, 4, 3) of a state (14,), metres in the optical frame."""
         corners_m = np.empty((kernels.BODY_PATCHES, 4, 3))
-        kernels.corners_of_body(state, *self._figure, corners_m)
+        kernels.corners_of_body(state, *self.figure, corners_m)
         return corners_m
 
     def corners_before(self, state: FloatArray, body: BodyModel, camera: Camera) -> FloatArray:
@@ -224,7 +230,8 @@ class WholeBodyCost:
         return len(self._seen)
 
     @property
-    def _figure(self) -> _Figure:
+    def figure(self) -> _Figure:
+        """What the kernels know of the body and its camera."""
         return self.parts, self._drawn, self.girdle, self.place, self.view
 
 

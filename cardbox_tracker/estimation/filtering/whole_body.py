@@ -36,6 +36,7 @@ from cardbox_tracker.estimation.filtering.loss import (
     remembered,
     state_stddev,
 )
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
 from cardbox_tracker.estimation.filtering.walking import Walk
@@ -82,6 +83,7 @@ class WholeBodyFilter:
         self._body = silhouette.body
         self._one = WholeBodyCost(silhouette.body, silhouette.camera, self._config.cost)
         self._cost: WholeBodyCost | MultiViewCost = self._one
+        self._outline = OutlineFit(self._one, silhouette.camera, self._config.outline_steps)
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
 
@@ -96,6 +98,7 @@ class WholeBodyFilter:
         self._age, self._home_m = 0, 0.0
         self._walk = Walk()
         self._output: FloatArray | None = None
+        self._outline.forget()
         # Of left elbow and hand, right elbow and hand, m.
         self._arm_spread = [0.0, 0.0, 0.0, 0.0]
         self._chance: float | None = None
@@ -108,6 +111,7 @@ class WholeBodyFilter:
         self._is_lost = True
         # What was wrong is not shown, nor is the next result mixed with it.
         self._output = None
+        self._outline.forget()
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
@@ -254,8 +258,7 @@ class WholeBodyFilter:
             if number == 0:
                 sources = self._apart(states, ratings)
             else:
-                count = min(config.survivors, len(states))
-                sources = moves.best_states(states, ratings, count)
+                sources = moves.best_states(states, ratings, min(config.survivors, len(states)))
             moved = moves.move_all(
                 sources,
                 sigma,
@@ -275,20 +278,17 @@ class WholeBodyFilter:
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
         c, cost = self._config, self._cost
         kept = (c.survivors, c.alike, c.apart_m)
-        chosen = moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)
-        return states[chosen]
+        return states[moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
 
     def _fit(self) -> Fit:
         """Return the smoothed mean of the best states, and how far to believe it."""
         config, cost = self._config, self._cost
-        mean, stddev = moves.mean_and_spread(
-            self.states, self.ratings, config.average, config.spread
-        )
-        if self._output is None:
-            self._output = mean
-        else:
-            self._output = config.smoothing * self._output + (1.0 - config.smoothing) * mean
-        _, costs_px, areas_px = cost.bodies(np.array([mean, self._output]))
+        rated = self.states, self.ratings
+        mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
+        before = mean if self._output is None else self._output
+        self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
+        result = self._outline(self._frame, self._output)
+        _, costs_px, areas_px = cost.bodies(np.array([mean, result]))
         total = cost.silhouette_px
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
         evidence = evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
@@ -297,14 +297,14 @@ class WholeBodyFilter:
         either_px = float(total + areas_px[1] + costs_px[1])  # twice what either of them covers
         iou = 2.0 * float(total + areas_px[1]) / either_px - 1.0
         return Fit(
-            posture=self._output[:N_JOINTS].copy(),
+            posture=result[:N_JOINTS],
             posture_stddev=deviations[:N_JOINTS],
-            keypoints_m=cost.keypoints(self._output),
+            keypoints_m=cost.keypoints(result),
             cost_px=int(costs_px[1]),
             iou=iou,
             is_uncertain=self._chance > config.uncertain_from,
             is_poor=self._chance > config.lost_from or iou < self._lost_iou,
-            offset_m=self._output[N_JOINTS:].copy(),
+            offset_m=result[N_JOINTS:],
             offset_stddev_m=deviations[N_JOINTS:],
             particles=Particles(self.states, self.ratings, mean, config.spread),
         )

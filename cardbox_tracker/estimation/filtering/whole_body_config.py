@@ -130,6 +130,13 @@ class WholeBodyConfig:
         limits=(0.0, 0.99),
         restarts=True,
     )
+    outline_steps: int = setting(
+        2,
+        "Gauss-Newton steps that fit the result to the silhouette's outline; with one camera and "
+        "without depth images",
+        limits=(0, 20),
+        restarts=True,
+    )
     start_passes: int = setting(
         3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
     )
