@@ -82,21 +82,21 @@ def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) ->
                 f"{bag} has images on {', '.join(images)}; choose one with the launch arguments "
                 'image and camera_info, or several cameras with cameras:="[NAMESPACE, NAMESPACE]"'
             )
-        found = [_topics_of(reader, wanted, camera) for camera in cameras or [None]]
+        found = [_topics_of(reader, wanted, camera) for camera in cameras or ("",)]
     if any(one != found[0] for one in found):
         each = "; ".join(f"{name}: {one}" for name, one in zip(cameras, found, strict=True))
         raise CardboxError(f"the cameras of {bag} have different topics, expected the same: {each}")
     return found[0]
 
 
-def _topics_of(reader: BagReader, wanted: Iterable[str], camera: str | None) -> dict[str, str]:
-    """What :func:`find_topics` returns, of one camera."""
+def _topics_of(reader: BagReader, wanted: Iterable[str], camera: str) -> dict[str, str]:
+    """What :func:`find_topics` returns, of one camera; of the only one if its name is empty."""
     folder = f"/{camera}/" if camera else ""
     found = {}
     if "image" in wanted:
-        topic = reader.image_topic(camera).removeprefix(folder)
+        topic = reader.image_topic(camera or None).removeprefix(folder)
         found["image"] = topic.removesuffix(_COMPRESSED)
         found["image_transport"] = "compressed" if topic.endswith(_COMPRESSED) else "raw"
     if "camera_info" in wanted:
-        found["camera_info"] = reader.camera_info_topic(camera).removeprefix(folder)
+        found["camera_info"] = reader.camera_info_topic(camera or None).removeprefix(folder)
     return found
