@@ -64,6 +64,13 @@ def generate_launch_description() -> LaunchDescription:
 
 def _check(context: LaunchContext) -> list[object]:
     values(ARGUMENTS, context.launch_configurations)
+    # Of nodes.launch.py, which would wait for cameras that nobody starts.
+    cameras = context.launch_configurations.get("cameras", "")
+    if cameras.strip(" []"):
+        raise ValueError(
+            f"launch argument cameras is '{cameras}'; expected nothing: live.launch.py has one "
+            "camera; two_cameras.launch.py starts two"
+        )
     return []
 
 

@@ -72,6 +72,8 @@ ARGUMENTS = {
     "extrinsics_file": Argument("", "where the cameras stand, of Kalibr or aniposelib", Path),
     "measure_distance": Argument("true", "with two cameras, they measure person_distance_m", bool),
     "depth": Argument("", "topic of depth images of the (first) camera"),
+    "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
+    "robot_file": Argument("", "start the node retarget with this robot arm, a URDF", Path),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),
@@ -106,6 +108,7 @@ def generate_launch_description() -> LaunchDescription:
             # Without it Fast DDS loses most large images; a profile of the user's own stays.
             SetEnvironmentVariable(PROFILES, profiles),
             OpaqueFunction(function=_nodes),
+            OpaqueFunction(function=_users),
             OpaqueFunction(function=_robot_state_publisher),
             OpaqueFunction(function=_rviz),
         ]
@@ -153,6 +156,27 @@ def _nodes(context: LaunchContext) -> list[object]:
         )
         for name in GIVEN
         for below in (cameras if name == "background" else [""])
+    ]
+
+
+def _users(context: LaunchContext) -> list[object]:
+    """The nodes that use the posture, as far as they are wanted."""
+    typed = values(ARGUMENTS, context.launch_configurations)
+    wanted: dict[str, dict[str, object]] = {}
+    if typed["rula"]:
+        wanted["rula"] = {}
+    if typed["robot_file"]:
+        wanted["retarget"] = {"robot_file": typed["robot_file"]}
+    return [
+        Node(
+            package="cardbox_tracker",
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[[LaunchConfiguration("config_dir"), f"/{name}.yaml"], _exact(own)],
+            output="screen",
+        )
+        for name, own in wanted.items()
     ]
 
 

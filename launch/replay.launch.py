@@ -73,12 +73,15 @@ def _find_topics(context: LaunchContext) -> list[object]:
     """
     given = context.launch_configurations
     wanted = [name for name in ("image", "camera_info") if name not in given]
-    # Those of several cameras are below their namespaces.
-    if not wanted or given.get("cameras", "").strip(" []"):
+    if not wanted:
         return []
+    # Of several cameras the topics are below their namespaces, and there are the nodes that listen.
+    cameras = [name.strip(" /") for name in given.get("cameras", "").strip(" []").split(",")]
+    place = given.get("namespace", "").strip("/")
+    below = [f"--below={place}/{name}".replace("=/", "=") for name in cameras if name]
     program = Path(get_package_prefix("cardbox_tracker")) / "lib" / "cardbox_tracker" / "play_bag"
     found = subprocess.run(
-        [str(program), given["bag"], "--find-topics", *wanted],
+        [str(program), given["bag"], *below, "--find-topics", *wanted],
         capture_output=True,
         text=True,
         check=False,

@@ -79,6 +79,11 @@ def _stereo_depth(context: LaunchContext) -> list[object]:
                 for side in ("left", "right")
                 for topic in TOPICS
             ],
+            parameters=[
+                [LaunchConfiguration("config_dir"), "/stereo_depth.yaml"],
+                # Of nodes.launch.py: the backgrounds and this node take the same images.
+                {"image_transport": LaunchConfiguration("image_transport")},
+            ],
             output="screen",
         )
     ]

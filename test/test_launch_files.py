@@ -177,9 +177,32 @@ def test_replay_says_why_a_bag_cannot_be_played(launch: Callable[..., Any]) -> N
     assert RUNNING == []
 
 
-def test_topics_of_several_cameras_are_not_looked_for(launch: Callable[..., Any]) -> None:
-    nodes = launch("replay", bag="/nowhere", cameras="[left, right]", publish_tf="false")
+@pytest.fixture
+def bag_of_two(tmp_path: Path) -> Path:
+    """Compressed images of two cameras; made before ``launch`` takes away what it is made with."""
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    from cardbox_tracker.vision.camera import Camera
+
+    with BagWriter(tmp_path / "two") as bag:
+        for name in ("left", "right"):
+            bag.write_camera_info(f"/{name}/info", 1, name, Camera(4, 3, 5.0, 5.0, 1.5, 1.0))
+            bag.write_compressed(f"/{name}/image_raw/compressed", 1, name, b"")
+    return tmp_path / "two"
+
+
+def test_replay_finds_the_topics_of_several_cameras_below_their_namespaces(
+    bag_of_two: Path, launch: Callable[..., Any]
+) -> None:
+    nodes = launch("replay", bag=str(bag_of_two), cameras="[left, right]", publish_tf="false")
     assert executables(nodes) == ["background", *NODES, "play_bag"]
+    for node in nodes[:2]:
+        names = dict(node.options["remappings"])
+        assert (names["image_raw"], names["camera_info"]) == ("image_raw", "info")
+        assert parameters_of(node)["image_transport"] == "compressed"
+    for cameras, expected in (("[left, middle]", "0 image topics below /middle/"), ("", "/left/")):
+        with pytest.raises(RuntimeError, match=expected):
+            launch("replay", bag=str(bag_of_two), cameras=cameras)
+        assert RUNNING == []
 
 
 def test_topics_that_are_given_are_not_looked_for(launch: Callable[..., Any]) -> None:
@@ -252,13 +275,27 @@ def test_two_cameras_are_started_with_their_own_devices(
 
 
 def test_a_stereo_pair_has_depth_unless_it_is_not_wanted(launch: Callable[..., Any]) -> None:
-    nodes = launch("stereo", right="r", publish_tf="false")
+    nodes = launch("stereo", right="r", image_transport="compressed", publish_tf="false")
     assert executables(nodes) == ["background", *NODES, "stereo_depth"]
     assert dict(nodes[-1].options["remappings"])["right/image_raw"] == "r/image_raw"
+    transport = nodes[-1].options["parameters"][1]["image_transport"]
+    assert transport.words == ("image_transport",)
     assert parameters_of(nodes[3])["depth"] == "depth"
     without = launch("stereo", stereo_depth="false", publish_tf="false")
     assert executables(without) == ["background", *NODES]
     assert parameters_of(without[3])["depth"] == ""
+
+
+@pytest.mark.parametrize("single_process", ["false", "true"])
+def test_what_uses_the_posture_is_started_where_it_is_asked_for(
+    launch: Callable[..., Any], single_process: str
+) -> None:
+    arm = str(ROOT / "config" / "example_arm.urdf")
+    given = {"single_process": single_process, "publish_tf": "false"}
+    alone = executables(launch("nodes", **given))
+    nodes = launch("nodes", rula="true", robot_file=arm, **given)
+    assert executables(nodes) == [*alone, "rula", "retarget"]
+    assert parameters_of(nodes[-1])["robot_file"] == arm
 
 
 @pytest.mark.parametrize(
@@ -292,6 +329,9 @@ def test_what_two_cameras_cannot_be_is_said_before_anything_runs(
         ("live", "config_dir", "/nowhere", "a folder"),
         ("live", "file", "/nowhere.mp4", "a file that exists"),
         ("live", "calibration_file", "/nowhere.yaml", "a file that exists"),
+        ("live", "cameras", "[left, right]", "nothing: live.launch.py has one camera"),
+        ("nodes", "rula", "yes", "true or false"),
+        ("nodes", "robot_file", "/nowhere.urdf", "a file that exists"),
         ("nodes", "rep155_id", "1st", "a letter, then"),
         ("nodes", "person_distance_m", "-1", "a number from 0.3 to 20"),
         ("nodes", "image_transport", "jpeg", "raw or compressed"),

@@ -23,8 +23,9 @@ class AgreementWatch:
         if agreement is None or not agreement.is_due:
             return
         if self._thread is None or not self._thread.is_alive():
-            # It must not keep a node alive that is to end.
-            self._thread = threading.Thread(target=agreement.check, daemon=True)
+            # Python waits for it at the end, no longer than interrupts.py does: a daemon that is
+            # in compiled code while Python ends aborts the process.
+            self._thread = threading.Thread(target=agreement.check, name="agreement", daemon=False)
             self._thread.start()
 
     def wait(self) -> None:

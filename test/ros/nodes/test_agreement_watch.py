@@ -36,6 +36,8 @@ def test_a_check_runs_beside_the_tracking_and_is_said() -> None:
         watch.see(agreement)  # type: ignore[arg-type]
     assert watch.values() == {"right turned (deg)": "not yet known"}
     assert watch.warnings() == {}
+    # Python waits for those that are no daemons; others in compiled code abort it at its end.
+    assert [one.daemon for one in threading.enumerate() if one.name == "agreement"] == [False]
     agreement.go_on.set()
     watch.wait()
     assert agreement.checks == 1
