@@ -2,7 +2,7 @@
 
 Unknown are the pose of the further camera, the same in all frames, and the state of the person in
 each, which begins at what was tracked. The outline of the body is to agree with the silhouettes of
-both cameras (:mod:`cardbox_tracker.estimation.outline_distances`). A step solves the normal
+both cameras (:mod:`cardbox_tracker.estimation.cost.outline_distances`). A step solves the normal
 equations: Gauss-Newton with the states eliminated by the Schur complement (Triggs et al., "Bundle
 Adjustment -- A Modern Synthesis", 2000), and with weights as of Geman and McClure, so that hair and
 clothes, which the model lacks, weigh little.
@@ -21,12 +21,12 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.outline_distances import SeenOutline, comparing
 from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
-from cardbox_tracker.estimation.outline_distances import SeenOutline, comparing
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 

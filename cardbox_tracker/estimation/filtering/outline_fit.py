@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.outline_distances import comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import fit_outline
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.outline_distances import comparing
 from cardbox_tracker.vision.camera import Camera
 
 # How far a state may go: roll, pitch, yaw, arms in rad, places in m; and steps of the central

@@ -162,7 +162,7 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     share = px[0] / of.silhouette_px
     assert trunk == pytest.approx(share + torso)
     beside = of.silhouette_px + kernels.cover(
-        one, True, False, False, *of._figure, of._seen, of._beside_trunk
+        one, True, False, False, *of.figure, of._seen, of._beside_trunk
     )
     both = left - left_prior + right - right_prior - beside / of.silhouette_px
     assert both == pytest.approx(share)

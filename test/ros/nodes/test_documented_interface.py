@@ -288,7 +288,7 @@ def test_command_lines_of_play_bag_parse() -> None:
     from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
 
     for line in lines_that_start("play_bag"):
-        assert overrides_from(line.split()[1:])
+        assert overrides_from(line.split("play_bag", 1)[1].split())
 
 
 def test_services_and_topics_in_commands_are_documented() -> None:
