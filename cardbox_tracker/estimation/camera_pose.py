@@ -21,7 +21,12 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.outline_distances import SeenOutline, comparing
+from cardbox_tracker.estimation.cost.outline_distances import (
+    HALF_PX,
+    STATE_STEP,
+    SeenOutline,
+    comparing,
+)
 from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -37,12 +42,11 @@ ROTATION = (0, 1, 2)
 WITHOUT_ROLL = (0, 1, 3, 4, 5)
 """All but the turn about the camera's own axis, of which outlines say next to nothing."""
 
-# A distance that weighs a quarter, and the standard deviation of one, px.
-_HALF_PX, _POINT_PX = 5.0, 4.0
+# Standard deviation of a distance, px.
+_POINT_PX = 4.0
 # How far a state may be from the tracked one: standard deviations.
 _STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
-# Steps of the central differences: about 2 px, since an outline is drawn in whole ones.
-_STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * 8, 0.04, 0.02])
+# Steps of the central differences, as of STATE_STEP.
 _POSE_STEP = np.array([0.015, 0.015, 0.015, 0.03, 0.03, 0.03])
 # Derivatives over whole pixels are too steep, so a plain step is too short.
 _RELAXATION = 1.6
@@ -188,7 +192,7 @@ class PoseProblem:
         residual = self._residual(number, state, here)
         count = len(first.distances)
         jacobian = np.zeros((len(residual), N_STATE + N_POSE))
-        for i, step in enumerate(_STATE_STEP.tolist()):
+        for i, step in enumerate(STATE_STEP.tolist()):
             more, less = state.copy(), state.copy()
             more[i] += step
             less[i] -= step
@@ -197,7 +201,7 @@ class PoseProblem:
         for i, (more_there, less_there) in beside.items():
             change = other.drawn(more_there(state)) - other.drawn(less_there(state))
             jacobian[count:, N_STATE + i] = change / (2.0 * _POSE_STEP[i])
-        weights = 1.0 / (_POINT_PX * (1.0 + (residual / _HALF_PX) ** 2)) ** 2
+        weights = 1.0 / (_POINT_PX * (1.0 + (residual / HALF_PX) ** 2)) ** 2
         weighted = jacobian * weights[:, None]
         matrix, right = jacobian.T @ weighted, weighted.T @ residual
         own = np.arange(N_STATE)
@@ -227,7 +231,7 @@ class PoseProblem:
 
     def _robust_cost(self, number: int, state: FloatArray, drawer: _Drawer) -> float:
         squares = self._residual(number, state, drawer) ** 2
-        fit = float(np.sum(squares / (1.0 + squares / _HALF_PX**2))) / _POINT_PX**2
+        fit = float(np.sum(squares / (1.0 + squares / HALF_PX**2))) / _POINT_PX**2
         return fit + float(np.sum(((state - self._tracked[number]) / _STATE_STDDEV) ** 2))
 
     def _drawer(self, extrinsics: Extrinsics) -> _Drawer:

@@ -56,12 +56,17 @@ class SizeRefinement:
         spread = _MEASURED_SD if body.source == MEASURED else _PROPORTIONS_SD
         self._stiffness = _PRIOR / spread**2
         self._change = np.zeros(len(GROUPS))
-        self._begin_block(body)
+        self._costs = self._beside(body)
+        self._forget()
 
-    def _begin_block(self, body: BodyModel) -> None:
+    def _forget(self) -> None:
+        """Begin a block."""
         self._frames, self._rated = 0, 0
         self._sums = np.zeros((len(GROUPS), 2))
-        self._costs = [
+
+    def _beside(self, body: BodyModel) -> list[WholeBodyCost]:
+        """Return what rates bodies a little narrower and broader than ``body``, by group."""
+        return [
             WholeBodyCost(_changed(body, names, step), self._camera, self._config)
             for names in GROUPS.values()
             for step in (-_STEP, _STEP)
@@ -85,17 +90,14 @@ class SizeRefinement:
         self._rated += 1
         if self._rated < _BLOCK:
             return None
-        before = self._change
-        self._change = self._best_change(self._sums / self._rated)
-        if np.abs(self._change - before).max() < _LEAST_CHANGE:
-            self._change = before
-            self._frames, self._rated = 0, 0
-            self._sums[:] = 0.0
+        change = self._best_change(self._sums / self._rated)
+        self._forget()
+        if np.abs(change - self._change).max() < _LEAST_CHANGE:
             return None
-        body = self._measured
-        for names, change in zip(GROUPS.values(), self._change.tolist(), strict=True):
-            body = _changed(body, names, change)
-        self._begin_block(body)
+        self._change, body = change, self._measured
+        for names, of_group in zip(GROUPS.values(), change.tolist(), strict=True):
+            body = _changed(body, names, of_group)
+        self._costs = self._beside(body)
         return body
 
     def _best_change(self, means: FloatArray) -> FloatArray:

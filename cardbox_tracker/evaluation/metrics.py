@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+SHOULDERS = (0, 3)
+"""Their places among the keypoints."""
+
 AXES = ("lateral", "vertical", "depth")
 """The axes x, y and z of the camera optical frame."""
 
@@ -51,6 +54,12 @@ def align(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     scale = np.divide(s.sum(axis=-1), extent, out=np.zeros_like(extent), where=extent > 0)
     aligned: FloatArray = scale[..., None, None] * source @ np.swapaxes(u @ vt, -1, -2) + middle_m
     return aligned
+
+
+def beside_shoulders(difference: FloatArray) -> FloatArray:
+    """Return differences of keypoints (..., 6, 3) without that of the middle of the shoulders."""
+    local: FloatArray = difference - difference[..., SHOULDERS, :].mean(axis=-2, keepdims=True)
+    return local
 
 
 def errors_along_axes_m(estimates_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:

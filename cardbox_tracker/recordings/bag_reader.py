@@ -24,6 +24,7 @@ from cardbox_tracker.vision.encodings import (
     decode_bgr,
     decode_compressed,
     decode_grey,
+    image_parts,
 )
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -233,9 +234,8 @@ class BagReader:
         for message in self.messages([topic or self.image_topic()]):
             image = self.deserialize(message)
             try:
-                header, decode = image.header, _decoder(image)
-                stamp_ns = int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
-                found = BagImage(stamp_ns, str(header.frame_id), message.time_ns, decode)
+                frame_id, decode = str(image.header.frame_id), _decoder(image)
+                found = BagImage(stamp_ns_of(image), frame_id, message.time_ns, decode)
             except (AttributeError, TypeError, ValueError) as error:
                 # Recordings bring definitions of their types along.
                 raise self._damaged(error) from None
@@ -277,23 +277,16 @@ def _reason(error: Exception) -> str:
     return cut(str(error)) or type(error).__name__
 
 
+def stamp_ns_of(message: Any) -> int:
+    """Return the stamp in the header of a message, ns."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
 def _decoder(image: Any) -> Callable[[bool | None], NDArray[np.uint8]]:
     decoders = {True: decode_grey, False: decode_bgr, None: decode_as_sent}
-    fields = ("data", "height", "width", "step", "encoding", "is_bigendian")
-    is_compressed = not hasattr(image, "encoding")
-    for name in ("data",) if is_compressed else fields:
-        getattr(image, name)
-
-    def decode(grey: bool | None) -> NDArray[np.uint8]:
-        if is_compressed:
-            return decode_compressed(image.data, grey)
-        return decoders[grey](
-            image.data,
-            image.height,
-            image.width,
-            image.step,
-            image.encoding,
-            bool(image.is_bigendian),
-        )
-
-    return decode
+    if hasattr(image, "encoding"):
+        parts = image_parts(image)
+        return lambda grey: decoders[grey](*parts)
+    data = image.data
+    return lambda grey: decode_compressed(data, grey)

@@ -13,7 +13,7 @@ import numpy as np
 
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
@@ -22,9 +22,7 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 from cardbox_tracker.vision.extrinsics_sources import (
     FrameTransform,
-    choose,
-    of_rectified_pair,
-    of_transforms,
+    extrinsics_between,
     transforms_of,
 )
 from cardbox_tracker.vision.pairing import camera_names, side_by_side
@@ -161,12 +159,8 @@ class CameraSources:
         with BagReader(self._path) as bag:
             for message in bag.messages([self._depth]):
                 image = bag.deserialize(message)
-                stamp = image.header.stamp
-                depth_m = depth_from_image(image)
-                yield (
-                    stamp.sec * 10**9 + stamp.nanosec,
-                    at_size(depth_m, camera.width, camera.height),
-                )
+                depth_m = at_size(depth_from_image(image), camera.width, camera.height)
+                yield stamp_ns_of(image), depth_m
 
     def _period_ns(self) -> int:
         """Median distance of the first camera's stamps."""
@@ -228,19 +222,7 @@ def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> 
     infos = [bag.camera_info(camera) for camera in cameras]
     transforms = _static_transforms(bag)
     of_file = load_extrinsics(file, cameras) if file is not None else {}
-    frames = [str(info.header.frame_id).lstrip("/") for info in infos]
-    return [
-        choose(
-            [
-                of_rectified_pair(infos[0], info, camera),
-                of_transforms(transforms, frames[0], frame),
-                of_file.get(camera),
-            ],
-            cameras[0],
-            camera,
-        )
-        for camera, info, frame in zip(cameras[1:], infos[1:], frames[1:], strict=True)
-    ]
+    return extrinsics_between(infos, cameras, transforms, of_file)
 
 
 def _static_transforms(bag: BagReader) -> list[FrameTransform]:

@@ -13,7 +13,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
 from cardbox_tracker.outputs import JointValues, posture_from
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 
 MODEL = "/body_model"
 _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_stddev"
@@ -47,12 +47,6 @@ def namespace_of(bag: BagReader) -> str:
             "'cardbox track BAG ... --bag RESULTS'"
         )
     return models[0].removesuffix(MODEL)
-
-
-def stamp_ns_of(message: Any) -> int:
-    """Return the stamp in the header of a message."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
 def joints_of(message: Any) -> JointValues:

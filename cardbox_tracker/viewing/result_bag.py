@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.errors import BagError
-from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader
+from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
 from cardbox_tracker.recordings.result_reader import (
     MODEL,
     joints_of,
     namespace_of,
-    stamp_ns_of,
 )
 from cardbox_tracker.viewing.feed import Feed
-from cardbox_tracker.vision.encodings import decode_bgr
+from cardbox_tracker.vision.encodings import decode_bgr, image_parts
 
 _ROBOT, _JOINTS = "/robot_description", "/joint_states"
 
@@ -62,7 +61,7 @@ def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
         space + _JOINTS: lambda _, c: feed.joints(stamp_ns_of(c), joints_of(c)),
         space + "/joint_states_stddev": lambda _, c: feed.deviations(stamp_ns_of(c), joints_of(c)),
         space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
-        space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), _image(c)),
+        space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
     }
 
 
@@ -84,14 +83,3 @@ def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
 def _points(message: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
     return np.array(points, np.float64).reshape(-1, 3)
-
-
-def _image(message: Any) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    return decode_bgr(
-        message.data,
-        message.height,
-        message.width,
-        message.step,
-        message.encoding,
-        bool(message.is_bigendian),
-    )

@@ -14,6 +14,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, cut
+from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.outputs import JointValues
 from cardbox_tracker.viewing.layout import (
     ERROR,
@@ -31,7 +32,6 @@ _MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
 _SPREAD = 2.0
 """Standard deviations between which nine in ten errors lie."""
 _HALF_TURN = (0.0, 0.0, 1.0, 0.0)
-_SHOULDERS = [0, 3]
 _ARMS = ((0, 1, 2), (3, 4, 5))
 _RADIUS_M = 0.018
 _JPEG_QUALITY = 80
@@ -183,10 +183,9 @@ def _shown(joints: JointValues) -> Mapping[str, float]:
 def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
     """Return how far keypoints (6, 3) are from the true ones: mean, and without the shoulders'."""
     difference = 100 * (points_m - truth_m)
-    aligned = difference - difference[_SHOULDERS].mean(axis=0)
     return {
         "absolute": float(np.linalg.norm(difference, axis=1).mean()),
-        "aligned": float(np.linalg.norm(aligned, axis=1).mean()),
+        "aligned": float(np.linalg.norm(beside_shoulders(difference), axis=1).mean()),
     }
 
 

@@ -35,8 +35,8 @@ class ShownTracking:
             feed.model(dumps_body_model(tracker.body), "the tracker")
         self._described = tracker.body
         feed.state(stamp_ns, estimate.state)
-        image = frame.brightness if frame.image is None else frame.image
-        feed.image(stamp_ns, draw_overlay(image, tracker.body, tracker.camera, estimate, _SCALE))
+        overlay = draw_overlay(frame.picture, tracker.body, tracker.camera, estimate, _SCALE)
+        feed.image(stamp_ns, overlay)
         joints, deviations = joint_values(estimate), joint_deviations(estimate)
         if joints is not None and deviations is not None:
             self.count += 1

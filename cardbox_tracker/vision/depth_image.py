@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.encodings import image_parts
 
 DepthImage = NDArray[np.float32]
 
@@ -49,14 +50,7 @@ def depth_from_image(message: Any) -> DepthImage:
     Raises:
         EncodingError: as :func:`decode_depth`.
     """
-    return decode_depth(
-        message.data,
-        message.height,
-        message.width,
-        message.step,
-        message.encoding,
-        bool(message.is_bigendian),
-    )
+    return decode_depth(*image_parts(message))
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:

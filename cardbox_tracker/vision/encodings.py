@@ -52,6 +52,18 @@ _ENCODINGS = MappingProxyType(
 SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 
+def image_parts(message: Any) -> tuple[Any, int, int, int, str, bool]:
+    """Return what the decoders take of a sensor_msgs/Image, of rclpy or of a recording."""
+    return (
+        message.data,
+        message.height,
+        message.width,
+        message.step,
+        message.encoding,
+        bool(message.is_bigendian),
+    )
+
+
 def decode_grey(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
 ) -> ImageArray:

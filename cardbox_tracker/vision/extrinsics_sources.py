@@ -7,7 +7,7 @@ file. Whatever is there has to agree.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,6 +113,38 @@ def _rotation(quaternion: Any) -> NDArray[np.float64]:
             (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
         ]
     )
+
+
+def extrinsics_between(
+    infos: Sequence[Any],
+    names: Sequence[str],
+    transforms: Sequence[FrameTransform],
+    of_file: Mapping[str, Extrinsics],
+) -> list[Extrinsics]:
+    """Return where each further camera stands against the first one.
+
+    Args:
+        infos: sensor_msgs/CameraInfo of each camera, the first one first.
+        names: of the same cameras.
+        transforms: those of ``/tf_static``.
+        of_file: what a file says, by name.
+
+    Raises:
+        CameraError: nothing says it of a camera, or two sources disagree.
+    """
+    first_frame, *frames = (str(info.header.frame_id).lstrip("/") for info in infos)
+    return [
+        choose(
+            [
+                of_rectified_pair(infos[0], info, name),
+                of_transforms(transforms, first_frame, frame),
+                of_file.get(name),
+            ],
+            names[0],
+            name,
+        )
+        for info, name, frame in zip(infos[1:], names[1:], frames, strict=True)
+    ]
 
 
 def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrinsics:

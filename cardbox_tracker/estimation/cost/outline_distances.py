@@ -18,17 +18,21 @@ from cardbox_tracker.vision.camera import Camera
 WIDTH = 320
 """Images are compared at this width, px."""
 
-FAR_PX = 10.0
-"""Distances beyond this are alike."""
+HALF_PX, FAR_PX = 5.0, 10.0
+"""A distance that weighs a quarter, and the one beyond which all are alike."""
 
 # Pixels from one point of the grid to the next.
 _GRID = 4
 # fillConvexPoly paints every pixel that an edge touches.
 _TOO_WIDE_PX = 0.5
+ABOVE_HIPS_PX = 4
+"""The legs, which the model does not have, begin so many pixels above the hips."""
+
+STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * 8, 0.04, 0.02])
+"""Steps (14,) of central differences: about 2 px. Nearer ones see the outline's whole pixels."""
+
 # Beside the person, what the model may cover while it is moved.
 _MARGIN_PX = 24
-# The legs, which the model does not have, begin at the hips.
-_ABOVE_HIPS_PX = 4
 
 
 def comparing(camera: Camera) -> Camera:
@@ -57,7 +61,7 @@ class SeenOutline:
         grey = cv2.resize(np.asarray(silhouette, np.uint8), size, interpolation=cv2.INTER_AREA)
         mask = np.where(np.asarray(grey) > 127, 255, 0).astype(np.uint8)
         row = camera.fy * float(hips_m[1]) / max(float(hips_m[2]), 1e-3) + camera.cy
-        end = int(np.clip(row - _ABOVE_HIPS_PX, 1, camera.height))
+        end = int(np.clip(row - ABOVE_HIPS_PX, 1, camera.height))
         columns, rows = (np.flatnonzero(mask[:end].any(axis=axis)) for axis in (0, 1))
         self.is_empty = columns.size == 0
         left, right, top = 0, camera.width, 0

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.outline_distances import FAR_PX, HALF_PX
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     BODY_PATCHES,
     N_STATE,
@@ -31,8 +32,6 @@ _ON_EDGE = 6
 _POINTS = BODY_PATCHES * 4 * _ON_EDGE
 # What a pixel of outline says, in 1 / px^2: 312 neighbouring points do not err on their own.
 INFORMATION = 0.01
-# A distance that weighs a quarter, and beyond which all are alike, px.
-HALF_PX, FAR_PX = 5.0, 10.0
 # A point counts as covered so far inside another patch, and is no outline so near to the border.
 _COVERED_PX, _BORDER_PX = 0.5, 3.0
 _MOST_CHANGE = 0.25
@@ -58,15 +57,22 @@ def _outline(corners_m: Floats, lens: Floats, corners_px: Floats, points: Floats
 
 
 @_compile
-def _is_inside(corners_px: Floats, p: int, x: float, y: float) -> bool:
-    """Whether a point is well inside the convex patch ``p``."""
-    twice_area = 0.0
-    for c in range(4):
-        d = (c + 1) % 4
-        twice_area += (
-            corners_px[p, c, 0] * corners_px[p, d, 1] - corners_px[p, d, 0] * corners_px[p, c, 1]
-        )
-    sign = 1.0 if twice_area > 0.0 else -1.0
+def _turns(corners_px: Floats, turns: Floats) -> None:
+    """Write whether the corners of each patch run one way round, 1, or the other, -1; (13,)."""
+    for p in range(BODY_PATCHES):
+        twice_area = 0.0
+        for c in range(4):
+            d = (c + 1) % 4
+            twice_area += (
+                corners_px[p, c, 0] * corners_px[p, d, 1]
+                - corners_px[p, d, 0] * corners_px[p, c, 1]
+            )
+        turns[p] = 1.0 if twice_area > 0.0 else -1.0
+
+
+@_compile
+def _is_inside(corners_px: Floats, p: int, turn: float, x: float, y: float) -> bool:
+    """Whether a point is well inside the convex patch ``p``, whose corners run by ``turn``."""
     for c in range(4):
         d = (c + 1) % 4
         along_x = corners_px[p, d, 0] - corners_px[p, c, 0]
@@ -75,7 +81,7 @@ def _is_inside(corners_px: Floats, p: int, x: float, y: float) -> bool:
         if length < 1e-9:
             continue
         across = along_x * (y - corners_px[p, c, 1]) - along_y * (x - corners_px[p, c, 0])
-        if sign * across < _COVERED_PX * length:
+        if turn * across < _COVERED_PX * length:
             return False
     return True
 
@@ -87,6 +93,8 @@ def _lengths(
     """Write how much outline each point stands for, px: 0 of one that is not on it."""
     width, height = size
     end = min(end_row, height - _BORDER_PX)
+    turns = np.empty(BODY_PATCHES)
+    _turns(corners_px, turns)
     n = 0
     for p in range(BODY_PATCHES):
         for c in range(4):
@@ -99,7 +107,7 @@ def _lengths(
                 counts = _BORDER_PX <= x <= width - 1 - _BORDER_PX and _BORDER_PX <= y < end
                 if counts:
                     for other in range(BODY_PATCHES):
-                        if other != p and _is_inside(corners_px, other, x, y):
+                        if other != p and _is_inside(corners_px, other, turns[other], x, y):
                             counts = False
                             break
                 lengths[n] = length / _ON_EDGE if counts else 0.0

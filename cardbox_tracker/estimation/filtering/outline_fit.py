@@ -14,22 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.outline_distances import comparing
+from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import fit_outline
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.vision.camera import Camera
 
-# How far a state may go: roll, pitch, yaw, arms in rad, places in m; and steps of the central
-# differences, about 2 px.
+# How far a state may go: roll, pitch, yaw, arms in rad, places in m.
 _STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * 8, 0.1, 0.1])
-_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * 8, 0.04, 0.02])
 # Share of the last correction in the next one. Without it the error of the acceleration grows by a
 # third.
 _KEPT = 0.6
-# The legs, which the model does not have, begin at the hips.
-_ABOVE_HIPS_PX = 4
 # Around the silhouette, more than the distance beyond which all are alike.
 _MARGIN_PX = 12
 
@@ -72,7 +68,7 @@ class OutlineFit:
             silhouette = np.asarray(
                 cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA), np.uint8
             )
-        row = self._cost.hip_row(state, camera) - _ABOVE_HIPS_PX
+        row = self._cost.hip_row(state, camera) - ABOVE_HIPS_PX
         left, top, field = signed_distances(silhouette, row)
         if field.size == 0:
             return fitted
@@ -83,7 +79,7 @@ class OutlineFit:
             field,
             row - top,
             _STDDEV,
-            _STEP,
+            STATE_STEP,
             self._steps,
         )
         return fitted

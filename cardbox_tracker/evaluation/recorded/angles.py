@@ -11,6 +11,8 @@ and given as 0.
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,6 +63,19 @@ def true_postures(session: RecordedSession) -> FloatArray:
     torso_rad = np.nan_to_num(session.torso_rad)
     postures[:, 1:] = joint_angles(session.keypoints_m, torso_rad, pitch_rad)
     return postures
+
+
+def comparable(session: RecordedSession, found: Container[int]) -> NDArray[np.bool_]:
+    """Return which images (n,) have a true torso and are among the stamps ``found``, ns.
+
+    Raises:
+        ValueError: none.
+    """
+    known = np.array([stamp in found for stamp in session.stamps_ns.tolist()], dtype=bool)
+    known &= np.isfinite(session.torso_rad).all(axis=1)
+    if not known.any():
+        raise ValueError(f"{session.name} has no image with both an estimate and the true torso")
+    return known
 
 
 def limb_angles(bone: FloatArray, side: float) -> tuple[FloatArray, FloatArray]:

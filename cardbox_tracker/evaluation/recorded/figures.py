@@ -18,14 +18,18 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
-from cardbox_tracker.evaluation.metrics import align, angle_errors_deg
+from cardbox_tracker.evaluation.metrics import (
+    SHOULDERS,
+    align,
+    angle_errors_deg,
+    beside_shoulders,
+)
 from cardbox_tracker.evaluation.recorded.angles import joint_angles
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import SessionRun
 
 FloatArray = NDArray[np.float64]
 
-SHOULDERS = (0, 3)
 KINDS = ("shoulder", "elbow", "hand")
 """Keypoints i and i + 3 are of the same kind."""
 
@@ -53,8 +57,7 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
     estimates, truth = 100 * run.keypoints_m[have], 100 * session.keypoints_m[have]
     difference = estimates - truth
     distance = np.linalg.norm(difference, axis=2)
-    local = difference - difference[:, SHOULDERS].mean(axis=1, keepdims=True)
-    aligned = np.linalg.norm(local, axis=2)
+    aligned = np.linalg.norm(beside_shoulders(difference), axis=2)
     result |= {
         "absolute": float(distance.mean()),
         "aligned": float(aligned.mean()),

@@ -13,7 +13,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.evaluation.recorded.angles import true_postures
+from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import track_session
 from cardbox_tracker.retargeting.config import RetargetConfig
@@ -75,10 +75,7 @@ def hand_errors(
         body[:] = [of.body]
 
     track_session(session, tracker, (seed,), observe=observe)
-    known = np.isfinite(session.torso_rad).all(axis=1)
-    known &= np.array([stamp in found for stamp in session.stamps_ns.tolist()], dtype=bool)
-    if not known.any():
-        raise ValueError(f"{session.name} has no image with both an estimate and the true torso")
+    known = comparable(session, found)
     stamps = session.stamps_ns[known].tolist()
     truth = true_postures(session)[known]
     estimates = [found[stamp] for stamp in stamps]

@@ -22,7 +22,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.evaluation.recorded.angles import true_postures
+from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import track_session
 
@@ -80,10 +80,7 @@ def score_errors(
         }
 
     track_session(session, config, (seed,), observe=observe)
-    known = np.array([stamp in found for stamp in session.stamps_ns.tolist()], dtype=bool)
-    known &= np.isfinite(session.torso_rad).all(axis=1)
-    if not known.any():
-        raise ValueError(f"{session.name} has no image with both an estimate and the true torso")
+    known = comparable(session, found)
     stamps = session.stamps_ns[known].tolist()
     errors: dict[str, dict[str, ScoreError]] = {}
     for task, rula in tasks.items():

@@ -18,7 +18,12 @@ from std_msgs.msg import Header
 from cardbox_tracker.errors import CameraError, EncodingError, quoted
 from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.camera_checks import matrix_problem
-from cardbox_tracker.vision.encodings import MOST_PIXELS, decode_as_sent, decode_compressed
+from cardbox_tracker.vision.encodings import (
+    MOST_PIXELS,
+    decode_as_sent,
+    decode_compressed,
+    image_parts,
+)
 
 ImageArray = NDArray[np.uint8]
 
@@ -40,15 +45,7 @@ def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS)
     """
     if isinstance(message, CompressedImage):
         return decode_compressed(message.data, None, most_pixels)
-    return decode_as_sent(
-        message.data,
-        message.height,
-        message.width,
-        message.step,
-        message.encoding,
-        bool(message.is_bigendian),
-        most_pixels,
-    )
+    return decode_as_sent(*image_parts(message), most_pixels)
 
 
 def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:

@@ -23,9 +23,7 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 from cardbox_tracker.vision.extrinsics_sources import (
     FrameTransform,
-    choose,
-    of_rectified_pair,
-    of_transforms,
+    extrinsics_between,
     transforms_of,
 )
 
@@ -135,22 +133,9 @@ class CameraPoses:
         self._changed()
 
     def _extrinsics(self) -> list[Extrinsics]:
-        first, *others = (info for info in self._infos if info is not None)
         transforms = list(self._transforms.values())
-        frames = [str(info.header.frame_id).lstrip("/") for info in (first, *others)]
         try:
-            return [
-                choose(
-                    [
-                        of_rectified_pair(first, info, name),
-                        of_transforms(transforms, frames[0], frame),
-                        self._of_file.get(name),
-                    ],
-                    self.names[0],
-                    name,
-                )
-                for name, info, frame in zip(self.names[1:], others, frames[1:], strict=True)
-            ]
+            return extrinsics_between(self._infos, self.names, transforms, self._of_file)
         except CameraError as error:
             if self._reads_transforms:
                 raise

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    image_transport_parameter,
+    max_megapixels_parameter,
+)
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
-from cardbox_tracker.vision.encodings import MOST_PIXELS
 from cardbox_tracker.vision.stereo import NEAREST_M
 
 
@@ -116,12 +119,7 @@ class PlayBagParameters(NodeParameters):
 class StereoDepthParameters(NodeParameters):
     """Measure depth in a rectified pair of cameras."""
 
-    image_transport: str = parameter(
-        "raw",
-        "raw subscribes to image_raw, compressed to image_raw/compressed",
-        choices=("raw", "compressed"),
-        read_only=True,
-    )
+    image_transport: str = image_transport_parameter()
     width: int = parameter(
         320, "width at which depth is measured", unit="px", limits=(32, 4096), read_only=True
     )
@@ -137,8 +135,4 @@ class StereoDepthParameters(NodeParameters):
         unit="s",
         limits=(0.0, 1.0),
     )
-    max_megapixels: float = parameter(
-        round(MOST_PIXELS / 1e6, 1),
-        "images with more million pixels are refused before they are decoded",
-        limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
-    )
+    max_megapixels: float = max_megapixels_parameter()

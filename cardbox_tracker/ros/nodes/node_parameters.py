@@ -12,18 +12,22 @@ from cardbox_tracker.estimation.initialization.config import (
     MAX_PITCH_RAD,
     InitializationConfig,
 )
-from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.nodes.input_parameters import (
     CameraParameters,
     PlayBagParameters,
     StereoDepthParameters,
+)
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    cameras_parameter,
+    extrinsics_parameter,
+    image_transport_parameter,
+    max_megapixels_parameter,
 )
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters, RulaParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
-from cardbox_tracker.vision.encodings import MOST_PIXELS
 from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.pairing import camera_names
 
@@ -37,12 +41,7 @@ _NEXT_MEASUREMENT = "next measurement"
 class BackgroundParameters(NodeParameters):
     """Cut the person out of the camera's images."""
 
-    image_transport: str = parameter(
-        "raw",
-        "raw subscribes to image_raw, compressed to image_raw/compressed",
-        choices=("raw", "compressed"),
-        read_only=True,
-    )
+    image_transport: str = image_transport_parameter()
     width: int = parameter(
         320, "working resolution, width", unit="px", limits=(32, 4096), read_only=True
     )
@@ -63,12 +62,7 @@ class BackgroundParameters(NodeParameters):
         choices=tuple(WAYS),
         effect=_NEXT_LEARNING,
     )
-    max_megapixels: float = parameter(
-        round(MOST_PIXELS / 1e6, 1),
-        "images with more million pixels are refused before they are decoded, as are those with "
-        "sixteen times the pixels of their CameraInfo; a few bytes can stand for gigabytes",
-        limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
-    )
+    max_megapixels: float = max_megapixels_parameter()
     learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
     threshold: float = shared(BackgroundConfig, "threshold")
     min_stddev: float = shared(BackgroundConfig, "min_stddev")

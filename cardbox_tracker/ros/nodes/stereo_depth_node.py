@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -16,6 +16,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
+from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.extrinsics_sources import of_rectified_pair
 from cardbox_tracker.vision.resize import to_working_size
@@ -24,6 +25,15 @@ from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
 _DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
 # Images of either side that wait for one of the other.
 _KEPT = 4
+
+
+class _Pair(NamedTuple):
+    """What both CameraInfo say, kept until one of them changes."""
+
+    calibrations: list[Calibration]
+    rectifiers: list[Rectifier | None]
+    camera: Camera
+    stereo: StereoDepth
 
 
 class StereoDepthNode(CardboxNode):
@@ -35,7 +45,7 @@ class StereoDepthNode(CardboxNode):
         self.parameters = LiveParameters(self, StereoDepthParameters, self._changed)
         settings = self.parameters.value
         self._infos: dict[str, CameraInfo] = {}
-        self._stereo: StereoDepth | None = None
+        self._pair: _Pair | None = None
         self._known = 0.0
         self._depth = self.advertise(Image, "depth", qos.SILHOUETTE)
         self._depth_info = self.advertise(CameraInfo, "depth/camera_info", qos.SILHOUETTE)
@@ -56,7 +66,7 @@ class StereoDepthNode(CardboxNode):
         )
 
     def _changed(self, _: StereoDepthParameters) -> None:
-        self._stereo = None
+        self._pair = None
 
     def _on_left_info(self, message: CameraInfo, _: int) -> None:
         self._on_info("left", message)
@@ -71,7 +81,7 @@ class StereoDepthNode(CardboxNode):
             not np.array_equal(getattr(before, name), getattr(message, name))
             for name in ("k", "r", "p", "d", "width", "height")
         ):
-            self._stereo = None
+            self._pair = None
 
     def _on_left(self, message: Image | CompressedImage, sent_ns: int) -> None:
         if self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
@@ -106,36 +116,47 @@ class StereoDepthNode(CardboxNode):
             )
             self.diagnostics.wait_for(f"the CameraInfo on {missing}")
             return
-        settings = self.parameters.value
-        first, other = (
-            calibration_from_info(self._infos[side], topic, self.resolve(f"{side}/camera_info"))
-            for side, topic in self._topics.items()
-        )
-        height = round(settings.width * first.height / first.width)
-        camera = first.camera(settings.width, height)
-        if self._stereo is None:
-            where = of_rectified_pair(self._infos["left"], self._infos["right"], "the right camera")
-            if where is None:
-                raise CameraError(
-                    "the cameras are no rectified pair: expected P[0,3] = -fx B below 0 in "
-                    f"{self.resolve('right/camera_info')}; calibrate them together, and rectify "
-                    "the images with stereo_image_proc"
-                )
-            self._stereo = stereo_of_pair(
-                camera, other.camera(settings.width, height), where, settings.nearest_m
-            )
+        if self._pair is None:
+            self._pair = self._pair_of_infos()
+        pair, settings = self._pair, self.parameters.value
         images = []
-        for message, calibration in ((left, first), (right, other)):
+        for message, calibration, rectifier in zip(
+            (left, right), pair.calibrations, pair.rectifiers, strict=True
+        ):
             most = conversions.most_pixels_of(calibration, settings.max_megapixels)
-            image = to_working_size(conversions.image_of(message, most), settings.width, height)
-            rectifier = calibration.rectifier(settings.width, height)
+            image = conversions.image_of(message, most)
+            image = to_working_size(image, pair.camera.width, pair.camera.height)
             images.append(image if rectifier is None else rectifier(image))
-        depth_m = self._stereo(images[0], images[1])
+        depth_m = pair.stereo(*images)
         self._known = float(np.count_nonzero(depth_m) / depth_m.size)
         depth_m[depth_m == 0.0] = np.nan
         self._depth.publish(conversions.image_message(left.header, depth_m, "32FC1"))
-        self._depth_info.publish(conversions.camera_info_message(left.header, camera))
+        self._depth_info.publish(conversions.camera_info_message(left.header, pair.camera))
         self.diagnostics.working(sent_ns)
+
+    def _pair_of_infos(self) -> _Pair:
+        """Return what both CameraInfo say; raise CameraError where they are no rectified pair."""
+        settings = self.parameters.value
+        calibrations = [
+            calibration_from_info(self._infos[side], topic, self.resolve(f"{side}/camera_info"))
+            for side, topic in self._topics.items()
+        ]
+        where = of_rectified_pair(self._infos["left"], self._infos["right"], "the right camera")
+        if where is None:
+            raise CameraError(
+                "the cameras are no rectified pair: expected P[0,3] = -fx B below 0 in "
+                f"{self.resolve('right/camera_info')}; calibrate them together, and rectify "
+                "the images with stereo_image_proc"
+            )
+        width = settings.width
+        height = round(width * calibrations[0].height / calibrations[0].width)
+        camera, other = (calibration.camera(width, height) for calibration in calibrations)
+        return _Pair(
+            calibrations,
+            [calibration.rectifier(width, height) for calibration in calibrations],
+            camera,
+            stereo_of_pair(camera, other, where, settings.nearest_m),
+        )
 
 
 def main(args: list[str] | None = None) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
-from cardbox_tracker.ros.nodes.cameras_parameters import cameras_parameter, extrinsics_parameter
+from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
     RESTARTS,
     NodeParameters,

@@ -1,10 +1,11 @@
-"""The parameters of several cameras, which tracker and initializer share."""
+"""Parameters that more than one node has."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from cardbox_tracker.ros.runtime.parameter_fields import parameter
+from cardbox_tracker.vision.encodings import MOST_PIXELS
 
 
 def cameras_parameter() -> Any:
@@ -25,4 +26,24 @@ def extrinsics_parameter() -> Any:
         "where the cameras stand: a camchain of Kalibr (YAML) or a camera group of aniposelib "
         "(TOML); not needed for a rectified pair or with /tf_static; empty: none",
         read_only=True,
+    )
+
+
+def image_transport_parameter() -> Any:
+    """Return the field of the topic images come on."""
+    return parameter(
+        "raw",
+        "raw subscribes to image_raw, compressed to image_raw/compressed",
+        choices=("raw", "compressed"),
+        read_only=True,
+    )
+
+
+def max_megapixels_parameter() -> Any:
+    """Return the field of the largest image that is decoded."""
+    return parameter(
+        round(MOST_PIXELS / 1e6, 1),
+        "images with more million pixels are refused before they are decoded, as are those with "
+        "sixteen times the pixels of their CameraInfo; a few bytes can stand for gigabytes",
+        limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
     )
