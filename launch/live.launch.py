@@ -7,6 +7,8 @@ Keep the scene empty at the start, then call initializer/initialize and follow i
 Several cameras: start it once per camera, each with a namespace and a device of its own.
 """
 
+import runpy
+import sys
 from pathlib import Path
 
 import yaml
@@ -23,7 +25,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # The node's parameters of the same names.
@@ -41,6 +43,8 @@ ARGUMENTS = {
     "loop": Argument("false", "play the file again and again", bool),
     "frame_id": Argument("camera_optical_frame", "name of the camera's optical frame"),
 }
+# Arguments of the launch file that is included, and thus of this one.
+NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -63,6 +67,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _check(context: LaunchContext) -> list[object]:
+    check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
     values(ARGUMENTS, context.launch_configurations)
     # Of nodes.launch.py, which would wait for cameras that nobody starts.
     cameras = context.launch_configurations.get("cameras", "")

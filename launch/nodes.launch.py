@@ -6,6 +6,7 @@ Included by live.launch.py and replay.launch.py; start it alone beside a camera 
         camera_info:=/camera/camera_info person_distance_m:=2.0
 """
 
+import sys
 import tempfile
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -116,6 +117,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _check(context: LaunchContext) -> list[object]:
+    check_names(__file__, ARGUMENTS, sys.argv)
     given = context.launch_configurations
     typed = values(ARGUMENTS, given)
     if typed["cameras"] and typed["single_process"]:

@@ -8,7 +8,9 @@ pause_at:="[6.5, 9.5, 12.5]" the recording stands still at those times, so that 
 can be captured (initializer/capture_front) before play_bag/resume.
 """
 
+import runpy
 import subprocess
+import sys
 from pathlib import Path
 
 import yaml
@@ -25,7 +27,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # All but 'bag' are parameters of the node, by the same names.
@@ -39,6 +41,8 @@ ARGUMENTS = {
         "0.0", "play this long; 0: to the end of the bag", float, limits=(0.0, 1e6)
     ),
 }
+# Arguments of the launch file that is included, and thus of this one.
+NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -62,6 +66,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _check(context: LaunchContext) -> list[object]:
+    check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
     values(ARGUMENTS, context.launch_configurations)
     return []
 

@@ -6,6 +6,8 @@ A driver, or play_bag with a recording, publishes the images and CameraInfo of b
 left and right; P of the right CameraInfo says how far apart they are.
 """
 
+import runpy
+import sys
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -20,7 +22,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 ARGUMENTS = {
@@ -30,6 +32,8 @@ ARGUMENTS = {
 }
 # Topics of the pair as the node stereo_depth has them, below the namespace of each camera.
 TOPICS = ("image_raw", "image_raw/compressed", "camera_info")
+# Arguments of the launch file that is included, and thus of this one.
+NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -51,6 +55,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _check(context: LaunchContext) -> list[object]:
+    check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
     typed = values(ARGUMENTS, context.launch_configurations)
     left, right = typed["left"], typed["right"]
     if not left or not right or left == right:

@@ -10,6 +10,8 @@ of your own, which publish cam0/image_raw, cam0/camera_info and the same of cam1
 both is played with replay.launch.py and cameras:="[cam0, cam1]".
 """
 
+import runpy
+import sys
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -25,7 +27,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, values
+from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 ORDER = ("first", "second")
@@ -42,6 +44,8 @@ ARGUMENTS = {
 }
 # The camera node's parameters of the same names.
 OF_BOTH = ("width", "height", "rate_hz")
+# Arguments of the launch file that is included, and thus of this one.
+NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -63,6 +67,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _check(context: LaunchContext) -> list[object]:
+    check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
     given = context.launch_configurations
     typed = values(ARGUMENTS, given)
     names = [str(typed[one]) for one in ORDER]

@@ -352,6 +352,41 @@ def test_a_wrong_argument_is_named_before_anything_runs(
     assert RUNNING == []
 
 
+@pytest.mark.parametrize(
+    ("started", "given", "expected"),
+    [
+        (("cardbox_tracker", "live.launch.py"), "devise:=x", "'devise'; did you mean device"),
+        (("cardbox_tracker", "live.launch.py"), "person_distance:=2", "person_distance_m"),
+        (("cardbox_tracker", "nodes.launch.py"), "xyz:=1", "'xyz'; it has background_file, "),
+        (("launch/stereo.launch.py",), "lefd:=a", "did you mean left"),
+        (("cardbox_tracker", "two_cameras.launch.py"), "first_devise:=x", "mean first_device"),
+        (("cardbox_tracker", "replay.launch.py"), "lop:=true", "did you mean loop"),
+    ],
+)
+def test_a_misspelt_argument_is_named_before_anything_runs(
+    started: tuple[str, ...],
+    given: str,
+    expected: str,
+    launch: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, "argv", ["ros2", "launch", *started, "rviz:=false", given])
+    name = Path(started[-1]).name.removesuffix(".launch.py")
+    with pytest.raises(Exception, match=expected) as refused:
+        launch(name, bag="/nowhere", image="/i", camera_info="/c")
+    assert f"{name}.launch.py has no launch argument" in str(refused.value)
+    assert RUNNING == []
+
+
+@pytest.mark.parametrize("started", [("my_robot", "live.launch.py"), ("my.launch.py",)])
+def test_another_launch_file_has_arguments_of_its_own(
+    started: tuple[str, ...], launch: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["ros2", "launch", *started, "robot:=mine"])
+    assert executables(launch("live", robot="mine", publish_tf="false")) == [*NODES, "camera"]
+
+
 def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
     pytest.importorskip("rclpy", reason="rclpy is not installed")
     from cardbox_tracker.ros.nodes.node_parameters import NODES as PARAMETERS

@@ -1,9 +1,10 @@
-"""The installed class of a recorded topic's messages."""
+"""The installed classes of recorded topics' messages."""
 
 from __future__ import annotations
 
 import importlib
 import re
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from cardbox_tracker.errors import BagError, cut, quoted
@@ -29,5 +30,34 @@ def message_class(topic: str, kind: str) -> Any:
     except (ImportError, AttributeError):
         raise BagError(
             f"topic {topic} has the type {kind}, which is not installed; install the package "
-            f"'{package}', or play other topics with --topics"
+            f"'{package}' (ros-jazzy-{package.replace('_', '-')}), or play other topics with --topics"
         ) from None
+
+
+def message_classes(
+    kinds: Mapping[str, str], chosen: Iterable[str], leave_out: Callable[[str], None]
+) -> dict[str, Any]:
+    """Return the class of each topic's messages.
+
+    Args:
+        kinds: type of each topic, by its name.
+        chosen: the topics that are wanted; if there are none, all whose type is installed.
+        leave_out: called with what to say of each topic that nobody chose and that has none.
+
+    Raises:
+        BagError: the type of a chosen topic is not installed, or that of all topics.
+    """
+    names = list(chosen)
+    if names:
+        return {name: message_class(name, kinds[name]) for name in names}
+    found = {}
+    problem = ""
+    for name, kind in kinds.items():
+        try:
+            found[name] = message_class(name, kind)
+        except BagError as error:
+            problem = str(error)
+            leave_out(f"not played: {problem}")
+    if problem and not found:
+        raise BagError(f"no topic can be played: {problem}")
+    return found

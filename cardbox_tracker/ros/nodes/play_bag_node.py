@@ -23,7 +23,7 @@ from std_msgs.msg import String
 
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.ros.messages.types import message_class
+from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
 from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
 from cardbox_tracker.ros.runtime import qos
@@ -65,21 +65,17 @@ class PlayBagNode(CardboxNode):
                 f"{settings.bag} has no topic {', '.join(unknown)}; it has "
                 f"{', '.join(sorted(self._reader.topics))}"
             )
-        self._publishers_of = {
-            topic: self._advertise(topic, kind)
-            for topic, kind in self._reader.topics.items()
-            if not settings.topics or topic in settings.topics
-        }
+        classes = message_classes(self._reader.topics, settings.topics, self.diagnostics.warn)
+        self._publishers_of = {name: self._advertise(name, of) for name, of in classes.items()}
         self._watched = [
             publisher
             for topic, publisher in self._publishers_of.items()
             if self._reader.topics[topic] in _IMAGES
         ] or self._all()
 
-    def _advertise(self, topic: str, kind: str) -> Publisher:
+    def _advertise(self, topic: str, of: Any) -> Publisher:
         latched = topic.endswith(_LATCHED_ENDINGS)
-        profile = qos.LATCHED if latched else qos.PLAYED
-        return self.advertise(message_class(topic, kind), topic, profile)
+        return self.advertise(of, topic, qos.LATCHED if latched else qos.PLAYED)
 
     def play(self) -> None:
         """Play the bag to its end, or forever with ``loop``."""

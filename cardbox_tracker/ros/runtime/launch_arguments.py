@@ -6,13 +6,18 @@ nodes run in. Hence only the standard library is imported here.
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError, quoted
+
+_PACKAGE = "cardbox_tracker"
+# Options of ``ros2 launch`` that it passes on like arguments.
+_OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
 
 Value = bool | int | float | str | list[float] | list[str]
 
@@ -87,6 +92,42 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
     if wrong:
         raise CardboxError("; ".join(wrong))
     return found
+
+
+def check_names(file: str, known: Iterable[str], command_line: Sequence[str]) -> None:
+    """Refuse arguments that were given to the launch file ``file`` and that it does not know.
+
+    ``ros2 launch`` takes any name, and a misspelt one would do nothing. Where another launch file
+    includes this one, the command line has the arguments of that one, and nothing is checked.
+
+    Args:
+        file: path of the launch file.
+        known: names of its arguments and of those of the launch files that it includes.
+        command_line: of the process, such as ros2 launch cardbox_tracker live.launch.py loop:=true.
+
+    Raises:
+        CardboxError: some are unknown; the text names them, and those there are.
+    """
+    names = sorted(known)
+    given = [word.partition(":=")[0] for word in _arguments_of(file, command_line) if ":=" in word]
+    unknown = sorted(set(given).difference(names, _OF_LAUNCH))
+    if not unknown:
+        return
+    near = [one for name in unknown for one in difflib.get_close_matches(name, names, 1)]
+    raise CardboxError(
+        f"{Path(file).name} has no launch argument {', '.join(map(quoted, unknown))}"
+        + (f"; did you mean {', '.join(near)}? It has " if near else "; it has ")
+        + ", ".join(names)
+    )
+
+
+def _arguments_of(file: str, command_line: Sequence[str]) -> Sequence[str]:
+    """Return the words after the launch file ``file``; none if another one was started."""
+    for place, (before, word) in enumerate(zip(["", *command_line], command_line, strict=False)):
+        by_package = before == _PACKAGE and word == Path(file).name
+        if by_package or (Path(word).is_file() and Path(word).samefile(file)):
+            return command_line[place + 1 :]
+    return ()
 
 
 def _parsed(kind: type, text: str) -> Value | None:

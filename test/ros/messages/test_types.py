@@ -8,11 +8,30 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import Image
 
 from cardbox_tracker.errors import BagError
-from cardbox_tracker.ros.messages.types import message_class
+from cardbox_tracker.ros.messages.types import message_class, message_classes
 
 
 def test_an_installed_type_is_found() -> None:
     assert message_class("/image_raw", "sensor_msgs/msg/Image") is Image
+
+
+KINDS = {"/tf_static": "no_such_msgs/msg/TF", "/odd": "Image", "/image": "sensor_msgs/msg/Image"}
+
+
+def test_topics_without_a_class_are_left_out_and_said() -> None:
+    said: list[str] = []
+    assert message_classes(KINDS, [], said.append) == {"/image": Image}
+    assert len(said) == 2
+    assert "/tf_static has the type no_such_msgs/msg/TF, which is not installed" in said[0]
+    assert "'no_such_msgs' (ros-jazzy-no-such-msgs)" in said[0]
+    assert message_classes({}, [], said.append) == {}
+
+
+@pytest.mark.parametrize("chosen", [["/image", "/tf_static"], []])
+def test_what_was_chosen_has_to_have_one_and_so_has_some_topic(chosen: list[str]) -> None:
+    kinds = KINDS if chosen else {"/tf_static": KINDS["/tf_static"]}
+    with pytest.raises(BagError, match=r"/tf_static has the type no_such_msgs/msg/TF"):
+        message_classes(kinds, chosen, lambda text: None)
 
 
 @pytest.mark.parametrize(
