@@ -123,7 +123,7 @@ def _check(context: LaunchContext) -> list[object]:
     if typed["cameras"] and typed["single_process"]:
         raise ValueError(
             "launch argument single_process is true, but cameras are given; expected one of them: "
-            "several cameras need more than the one core of a process"
+            "several cameras need more than the one core of a process; leave single_process out"
         )
     if not Path(given["config_dir"]).is_dir():
         raise ValueError(

@@ -17,6 +17,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import try_shutdown
@@ -55,6 +56,7 @@ class AllNodes:
             intra_process = IntraProcess()
             for kind in kinds:
                 self.nodes.append(kind(intra_process=intra_process))
+                _check_cameras(self.nodes[-1])
             if source == "play_bag":
                 self._player = PlayBagNode()
         except Exception:
@@ -82,6 +84,18 @@ class AllNodes:
             self._player.close()
         for node in reversed(self.nodes):
             node.close()
+
+
+def _check_cameras(node: Any) -> None:
+    """Refuse several cameras: there is one background here, which would serve one of them."""
+    cameras = getattr(node.parameters.value, "cameras", ())
+    if cameras:
+        raise CardboxError(
+            f"the parameter cameras of {node.get_name()} is [{', '.join(cameras)}]; expected none "
+            "in cardbox_nodes, whose one process cannot keep up with several cameras: start each "
+            "node by itself, a background for each camera, as two_cameras.launch.py, stereo.launch"
+            ".py and replay.launch.py cameras:=[...] do"
+        )
 
 
 def _play(player: PlayBagNode) -> None:

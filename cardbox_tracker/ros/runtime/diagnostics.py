@@ -29,6 +29,9 @@ _SILENT_PERIODS = 5.0
 _ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
+_PLAYED = "play_bag plays a recording, which may be paused; if not, is every node in between running?"
+# Only a node play_bag has it.
+_PLAYING = "/play_bag/status"
 
 STATUS = "status"
 """Key of the value that says whether a node is ``waiting``, ``working`` or has an ``error``."""
@@ -63,6 +66,7 @@ class NodeDiagnostics:
         self._kind = ""
         self._log = LogLimit()
         self._silence = ""
+        self._is_played = False
         self._arrived = (0, time.monotonic())
         self._warnings: list[str] = []
         self._published = self._late = 0
@@ -127,9 +131,15 @@ class NodeDiagnostics:
             _SILENT_S, _SILENT_PERIODS * self.input.period_ns / 1e9
         ):
             return
-        if not self._silence:
-            self._node.get_logger().warning(f"{self.source} have ceased: {_CEASED}")
-        self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {_CEASED}"
+        # A pause is no fault, and whether it is one cannot be seen from here: so no warning.
+        topics = self._node.get_topic_names_and_types()
+        self._is_played = any(name.endswith(_PLAYING) for name, _ in topics)
+        why = _PLAYED if self._is_played else _CEASED
+        if not self._silence and self._is_played:
+            self._node.get_logger().info(f"{self.source} have ceased: {why}")
+        elif not self._silence:
+            self._node.get_logger().warning(f"{self.source} have ceased: {why}")
+        self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {why}"
 
     def _slowness(self) -> dict[str, str]:
         """Return what to say where results need longer than images have time."""
@@ -170,7 +180,8 @@ class NodeDiagnostics:
         span_s = max(now - before, 1e-3)
         warnings = self._remarks()
         if self._silence:
-            state, level, text = WAITING, DiagnosticStatus.ERROR, f"waiting for {self._silence}"
+            level = DiagnosticStatus.WARN if self._is_played else DiagnosticStatus.ERROR
+            state, text = WAITING, f"waiting for {self._silence}"
         elif self._problem:
             state, level, text = ERROR, DiagnosticStatus.ERROR, self._problem
         elif self._waiting:

@@ -169,6 +169,31 @@ def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
     assert logged.lines[1:] == ["images on /image_raw arrive again"]
 
 
+def test_the_pause_of_a_recording_is_no_fault(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    diagnostics = NodeDiagnostics(node)
+    logged = Logged(node, monkeypatch)
+    warned: list[str] = []
+    logged.warning = warned.append
+    topics: list[tuple[str, list[str]]] = [("/eye/play_bag/status", ["std_msgs/msg/String"])]
+    monkeypatch.setattr(node, "get_topic_names_and_types", lambda: topics)
+    now = [time.monotonic()]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    diagnostics.source = "images"
+    diagnostics.input.add(1)
+    for _ in range(6):
+        now[0] += 1.0
+        diagnostics._tick()
+    assert logged.lines[0].startswith("images have ceased: play_bag plays a recording")
+    assert len(logged.lines) == 1 and not warned
+    assert diagnostics._status().level == DiagnosticStatus.WARN
+    topics.clear()
+    diagnostics._tick()
+    assert diagnostics._status().level == DiagnosticStatus.ERROR
+
+
 def test_a_slow_camera_is_not_silent(make_node: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
     diagnostics = NodeDiagnostics(make_node())
     diagnostics.source = "images"
