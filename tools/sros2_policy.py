@@ -1,7 +1,8 @@
-"""Write ``config/sros2_policy.xml``: what each node may do, read from the graph of running nodes.
+"""Write ``config/sros2_policy*.xml``: what each node may do, read from the graph of running nodes.
 
-``python -m tools.sros2_policy`` starts each node in this process, asks the graph for its topics and
-services, and allows these and nothing else. ``docs/security.md`` says how the file is used.
+``python -m tools.sros2_policy`` starts the nodes of each layout in this process, asks the graph for
+their topics and services, and allows these and nothing else. ``docs/security.md`` says how the
+files are used.
 """
 
 from __future__ import annotations
@@ -34,7 +35,6 @@ from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
 _CONFIG = Path(__file__).resolve().parents[1] / "config"
-PATH = _CONFIG / "sros2_policy.xml"
 # What a person who operates the tracker needs: no parameters, no topics of ours to publish.
 OPERATOR = "operator"
 _TRIGGER = "std_srvs/srv/Trigger"
@@ -43,6 +43,39 @@ _COMMENT = """
   What each node of cardbox_tracker may do with SROS 2, and nothing else; see docs/security.md.
   Written by 'python -m tools.sros2_policy' from the graph of the running nodes.
 """
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which nodes run together, as a launch file starts them.
+
+    Attributes:
+        file: name of its policy.
+        cameras: namespaces of several cameras; empty: one, without a namespace.
+        depth: whether they are a rectified pair, whose depth is measured; drivers of the user's
+            own publish their images.
+    """
+
+    file: str
+    cameras: tuple[str, ...] = ()
+    depth: bool = False
+
+    @property
+    def path(self) -> Path:
+        """Where its policy is."""
+        return _CONFIG / self.file
+
+    @property
+    def places(self) -> list[str]:
+        """Namespaces of the cameras' own nodes, absolute."""
+        return [f"/{name}" for name in self.cameras or ("",)]
+
+
+LAYOUTS = (
+    Layout("sros2_policy.xml"),
+    Layout("sros2_policy_two_cameras.xml", ("cam0", "cam1")),
+    Layout("sros2_policy_stereo.xml", ("left", "right"), depth=True),
+)
 
 
 @dataclass
@@ -56,44 +89,54 @@ class Access:
     triggers: set[str] = field(default_factory=set)
 
 
-def access_of(observer: Any, name: str) -> Access:
-    """Return what the graph says of the node ``name`` in the root namespace."""
+def access_of(observer: Any, name: str, place: str) -> Access:
+    """Return what the graph says of the node ``name`` in the namespace ``place``."""
 
     def names(query: Callable[..., Any]) -> dict[str, list[str]]:
-        return dict(query(name, "/"))
+        return dict(query(name, place))
 
     services = names(observer.get_service_names_and_types_by_node)
+    triggers = {service for service, kinds in services.items() if _TRIGGER in kinds}
     return Access(
-        _relative(names(observer.get_publisher_names_and_types_by_node)),
-        _relative(names(observer.get_subscriber_names_and_types_by_node)),
-        _relative(services),
-        _relative(names(observer.get_client_names_and_types_by_node)),
-        _relative({service for service, kinds in services.items() if _TRIGGER in kinds}),
+        *(
+            _relative(found, place)
+            for found in (
+                names(observer.get_publisher_names_and_types_by_node),
+                names(observer.get_subscriber_names_and_types_by_node),
+                services,
+                names(observer.get_client_names_and_types_by_node),
+                triggers,
+            )
+        )
     )
 
 
 # These are the same for all nodes, whatever their namespace.
-_GLOBAL = ("/diagnostics", "/rosout", "/parameter_events")
+_GLOBAL = ("/diagnostics", "/rosout", "/parameter_events", "/tf_static")
+# Nodes that learn from it where several cameras stand; only where tf2_msgs is installed.
+_OF_TRANSFORMS = ("tracker", "initializer")
 
 
-def _relative(names: Any) -> set[str]:
-    return {name if name in _GLOBAL else name.removeprefix("/") for name in names}
+def _relative(names: Any, place: str) -> set[str]:
+    below = f"{place.rstrip('/')}/"
+    return {name if name in _GLOBAL else name.removeprefix(below) for name in names}
 
 
 def policy(nodes: dict[str, Access]) -> str:
     """Return the policy file: an enclave for each node, and one for an operator."""
     operator = Access(publish={"/rosout", "/parameter_events"}, subscribe={"/diagnostics"})
-    for name, access in nodes.items():
-        operator.request |= access.triggers
-        if name in ("initializer", "tracker", "rula", "retarget"):
+    for path, access in nodes.items():
+        operator.request |= {f"{_place(path)}/{name}".lstrip("/") for name in access.triggers}
+        if path in ("initializer", "tracker", "rula", "retarget"):
             operator.subscribe |= access.publish - set(_GLOBAL)
     root = ElementTree.Element("policy", version="0.2.0")
     root.append(ElementTree.Comment(_COMMENT))
     enclaves = ElementTree.SubElement(root, "enclaves")
-    for name, access in (*nodes.items(), (OPERATOR, operator)):
-        enclave = ElementTree.SubElement(enclaves, "enclave", path=f"/cardbox/{name}")
+    for path, access in (*nodes.items(), (OPERATOR, operator)):
+        enclave = ElementTree.SubElement(enclaves, "enclave", path=f"/cardbox/{path}")
         profiles = ElementTree.SubElement(enclave, "profiles")
-        profile = ElementTree.SubElement(profiles, "profile", ns="/", node=name)
+        of = {"ns": _place(path) or "/", "node": path.rpartition("/")[2]}
+        profile = ElementTree.SubElement(profiles, "profile", of)
         for kind, verb, allowed in (
             ("topic", "publish", access.publish),
             ("topic", "subscribe", access.subscribe),
@@ -109,42 +152,52 @@ def policy(nodes: dict[str, Access]) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
+def _place(path: str) -> str:
+    """The namespace of the node ``path``, such as cam0/background; empty if it has none."""
+    return f"/{path}".rpartition("/")[0]
+
+
 @contextmanager
-def running(folder: Path, domain: int | None = None) -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Context of one node of each kind; gives a node that observes them, and their names."""
+def running(
+    folder: Path, layout: Layout, domain: int | None = None
+) -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Context of the nodes of ``layout``; gives a node that observes them, and their paths."""
     video = folder / "video.avi"
     writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (64, 48))
     writer.write(np.zeros((48, 64, 3), np.uint8))
     writer.release()
     with BagWriter(folder / "bag") as bag:
         camera = session_camera()
-        bag.write_camera_info("camera_info", 1, "camera", camera)
         empty = np.zeros((camera.height, camera.width), np.uint8)
-        bag.write_image("image_raw", 1, "camera", empty, "mono8")
+        for place in layout.places:
+            bag.write_camera_info(f"{place}/camera_info".lstrip("/"), 1, "camera", camera)
+            bag.write_image(f"{place}/image_raw".lstrip("/"), 1, "camera", empty, "mono8")
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain)
-    kinds: dict[Any, dict[str, Any]] = {
-        CameraNode: {"file": str(video)},
-        PlayBagNode: {"bag": str(folder / "bag")},
-        BackgroundNode: {},
-        InitializerNode: {},
-        TrackerNode: {},
-        StereoDepthNode: {},
-        RulaNode: {},
-        RetargetNode: {
-            "robot_file": str(_CONFIG / "example_arm.urdf"),
-            "joint_map_file": str(_CONFIG / "example_joint_map.yaml"),
-        },
+    several: dict[str, Any] = {"cameras": list(layout.cameras)} if layout.cameras else {}
+    robot = {
+        "robot_file": str(_CONFIG / "example_arm.urdf"),
+        "joint_map_file": str(_CONFIG / "example_joint_map.yaml"),
     }
+    kinds: list[tuple[Any, str, dict[str, Any]]] = [
+        *((CameraNode, place, {"file": str(video)}) for place in layout.places if not layout.depth),
+        (PlayBagNode, "/", {"bag": str(folder / "bag")}),
+        *((BackgroundNode, place, {}) for place in layout.places),
+        (InitializerNode, "/", several),
+        (TrackerNode, "/", several | ({"depth": "depth"} if layout.depth else {})),
+        *([(StereoDepthNode, "/", {})] if layout.depth or not layout.cameras else []),
+        (RulaNode, "/", {}),
+        (RetargetNode, "/", robot),
+    ]
     make: Any = Parameter
     made = []
     try:
-        for kind, values in kinds.items():
+        for kind, place, values in kinds:
             overrides = [make(name, value=value) for name, value in values.items()]
-            made.append(kind(context=context, parameter_overrides=overrides))
+            made.append(kind(context=context, namespace=place, parameter_overrides=overrides))
         observer = rclpy.create_node("observer", context=context, enable_rosout=False)
         made.append(observer)
-        yield observer, tuple(node.get_name() for node in made[:-1])
+        yield observer, tuple(node.get_fully_qualified_name().lstrip("/") for node in made[:-1])
     finally:
         for node in made:
             getattr(node, "close", lambda: None)()
@@ -152,27 +205,34 @@ def running(folder: Path, domain: int | None = None) -> Iterator[tuple[Any, tupl
         context.try_shutdown()
 
 
-def read_graph(folder: Path, domain: int | None = None) -> dict[str, Access]:
+def read_graph(folder: Path, layout: Layout, domain: int | None = None) -> dict[str, Access]:
     """Return what each node has, as another node sees it once nothing more comes."""
-    with running(folder, domain) as (observer, names):
+    with running(folder, layout, domain) as (observer, paths):
         found: dict[str, Access] = {}
         settled_s = end_s = time.monotonic() + _WAIT_S
         while time.monotonic() < min(settled_s, end_s):
             try:
-                now = {name: access_of(observer, name) for name in names}
+                now = {
+                    path: access_of(observer, path.rpartition("/")[2], _place(path) or "/")
+                    for path in paths
+                }
             except rclpy.node.NodeNameNonExistentError:
                 now = {}
             if now != found or not now:
                 found, settled_s = now, time.monotonic() + 1.0
             time.sleep(0.1)
-        return found
+    for path in _OF_TRANSFORMS if layout.cameras else ():
+        found[path].subscribe.add("/tf_static")
+    return found
 
 
 def main() -> int:
-    """Write the file."""
-    with tempfile.TemporaryDirectory() as folder:
-        PATH.write_text(policy(read_graph(Path(folder))), encoding="utf-8")
-    print(f"written: {PATH.relative_to(PATH.parents[1])}")
+    """Write the files."""
+    for layout in LAYOUTS:
+        with tempfile.TemporaryDirectory() as folder:
+            text = policy(read_graph(Path(folder), layout))
+        layout.path.write_text(text, encoding="utf-8")
+        print(f"written: {layout.path.relative_to(_CONFIG.parent)}")
     return 0
 
 

@@ -78,6 +78,6 @@ def describe(result: InitializationResult) -> str:
         f"{body}\n"
         f"mid-hip {100 * abs(placement.hip_height_m):.1f} cm "
         f"{'above' if placement.hip_height_m > 0 else 'below'} the camera, "
-        f"{placement.distance_m:g} m away from it\n"
+        f"{placement.distance_m:.3g} m away from it\n"
         f"{fit_text(result)}"
     )

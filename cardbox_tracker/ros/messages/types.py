@@ -30,7 +30,8 @@ def message_class(topic: str, kind: str) -> Any:
     except (ImportError, AttributeError):
         raise BagError(
             f"topic {topic} has the type {kind}, which is not installed; install the package "
-            f"'{package}' (ros-jazzy-{package.replace('_', '-')}), or play other topics with --topics"
+            f"'{package}' (ros-jazzy-{package.replace('_', '-')}), or play other topics with "
+            "--topics"
         ) from None
 
 

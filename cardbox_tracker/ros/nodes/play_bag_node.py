@@ -82,7 +82,9 @@ class PlayBagNode(CardboxNode):
         settings = self.parameters.value
         if settings.wait_for_subscribers:
             topics = ", ".join(publisher.topic_name for publisher in self._watched)
-            self._wait_for(f"a subscriber of {topics}", self._is_watched)
+            compressed = any(name.endswith("/compressed") for name in topics.split(", "))
+            hint = " (background takes it with image_transport:=compressed)" if compressed else ""
+            self._wait_for(f"a subscriber of {topics}{hint}", self._is_watched)
         for topic in map(self.resolve, settings.wait_for_topics):
             self._wait_for(f"a publisher of {topic}", partial(self.count_publishers, topic))
         self._settle(settings.delay_s)

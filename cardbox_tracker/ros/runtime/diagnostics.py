@@ -29,7 +29,9 @@ _SILENT_PERIODS = 5.0
 _ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
-_PLAYED = "play_bag plays a recording, which may be paused; if not, is every node in between running?"
+_PLAYED = (
+    "play_bag plays a recording, which may be paused; if not, is every node in between running?"
+)
 # Only a node play_bag has it.
 _PLAYING = "/play_bag/status"
 

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.errors import CardboxError  # noqa: E402
-from cardbox_tracker.ros.nodes import single_process  # noqa: E402
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.ros.nodes import single_process
 
 
 class Node:
