@@ -99,7 +99,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
             raise CardboxError(f"{path} is larger than {_LARGEST_BYTES} bytes; is it a URDF?")
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise CardboxError(f"cannot read the robot {path}: {error.strerror}") from None
+        raise CardboxError(
+            f"cannot read the robot {path}: {error.strerror}; expected a URDF file"
+        ) from None
     except UnicodeDecodeError:
         raise CardboxError(f"{path} is no text; expected the URDF of a robot") from None
     return parse_robot(text, str(path))

@@ -6,6 +6,7 @@ validated instance: a wrong value is refused with the reason and the old one sta
 
 from __future__ import annotations
 
+import difflib
 from array import array
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,12 +17,13 @@ from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
 from cardbox_tracker.settings import check
 
 T = TypeVar("T", bound=NodeParameters)
 
+_OF_QOS = "qos_overrides."
 _LIST_TYPES = {
     list[float]: Parameter.Type.DOUBLE_ARRAY,
     list[int]: Parameter.Type.INTEGER_ARRAY,
@@ -60,6 +62,7 @@ class LiveParameters(Generic[T]):
         problem = self._problem(self.value)
         if problem:
             raise self._refusal(problem)
+        self._warn_of_unknown()
         node.add_pre_set_parameters_callback(self._translate)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._apply)
@@ -115,6 +118,23 @@ class LiveParameters(Generic[T]):
         self._node.get_logger().warning(
             f"the parameter '{was}' is now called '{name}'; the old name works in this version only"
         )
+
+    def _warn_of_unknown(self) -> None:
+        """Say which names given at the start are no parameters: ROS leaves them out without a word.
+
+        No error, for a file may be for several nodes.
+        """
+        # rclpy has no public name for what was given.
+        given = getattr(self._node, "_parameter_overrides", {})
+        for name in given:
+            if self._node.has_parameter(name) or name.startswith(_OF_QOS):
+                continue
+            near = difflib.get_close_matches(name, self._specs, 1)
+            self._node.get_logger().warning(
+                f"'{cut(name)}' is no parameter of node '{self._node.get_name()}' and has no effect; "
+                + (f"did you mean '{near[0]}'? " if near else "")
+                + "'ros2 param list' and docs/parameters.md have all names"
+            )
 
     def _refusal(self, problem: str) -> CardboxError:
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, get_type_hints
 
 import pytest
@@ -57,6 +58,21 @@ class Sample(NodeParameters):
 def set_values(node: Any, **values: Any) -> tuple[bool, str]:
     result = node.set_parameters_atomically([Parameter(k, value=v) for k, v in values.items()])
     return result.successful, result.reason
+
+
+def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = ("lo:=1.5", "stale:=0.7", "nothing_like_it:=1", "use_sim_time:=false")
+    of_qos = "qos_overrides./image_raw.publisher.depth:=3"
+    node = make_node(*(word for one in (*given, of_qos) for word in ("-p", one)))
+    said: list[str] = []
+    monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=said.append))
+    assert LiveParameters(node, Sample).value == Sample(fresh=0.7)
+    said = [line for line in said if "no parameter" in line]
+    assert len(said) == 2
+    assert "'lo' is no parameter of node 'tested'" in said[0] and "mean 'low'?" in said[0]
+    assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
 
 
 def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:
