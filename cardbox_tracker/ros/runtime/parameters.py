@@ -131,7 +131,8 @@ class LiveParameters(Generic[T]):
                 continue
             near = difflib.get_close_matches(name, self._specs, 1)
             self._node.get_logger().warning(
-                f"'{cut(name)}' is no parameter of node '{self._node.get_name()}' and has no effect; "
+                f"'{cut(name)}' is no parameter of node '{self._node.get_name()}' and has no "
+                "effect; "
                 + (f"did you mean '{near[0]}'? " if near else "")
                 + "'ros2 param list' and docs/parameters.md have all names"
             )
