@@ -188,6 +188,11 @@ class BagReader:
         if len(found) != 1:
             where = f" below {folder}" if folder else ""
             advice = "" if folder or not found else "; choose one with --cameras NAMESPACE"
+            if any(name.endswith("/tracking_state") for name in self.topics):
+                advice = (
+                    " camera's: this seems to be a bag of results; give the recording that it was "
+                    "made from"
+                )
             raise BagError(
                 f"{self.path} has {len(found)} {what} topics{where}; expected one{advice}. It has "
                 f"{self._list()}"

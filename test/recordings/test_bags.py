@@ -224,6 +224,16 @@ def test_a_recording_without_images_lists_its_topics(tmp_path: Path) -> None:
     assert "/chatter (std_msgs/msg/String)" in text
 
 
+def test_a_bag_of_results_is_known_for_one(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        for name in ("/overlay", "/silhouette"):
+            bag.write_image(name, START_NS, "optical", image(0), "mono8")
+        bag.write_string("/tracking_state", START_NS, "tracking")
+    text = refusal(tmp_path / "bag")
+    assert "a bag of results; give the recording that it was made from" in text
+    assert "--cameras" not in text
+
+
 def test_several_image_topics_are_listed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         for side in ("left", "right"):

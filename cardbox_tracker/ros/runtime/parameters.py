@@ -80,6 +80,8 @@ class LiveParameters(Generic[T]):
             raise self._refusal(
                 f"{name} is '{given}'; expected {_TYPE_TEXTS[type_]}. {name} is {spec.description}"
             )
+        if given is not None:
+            self._check_limits(name, given)
         try:
             self._node.declare_parameter(
                 name,
@@ -92,6 +94,14 @@ class LiveParameters(Generic[T]):
             return []
         except Exception as error:
             raise self._refusal(f"{error}. {name} is {spec.description}") from None
+
+    def _check_limits(self, name: str, given: Any) -> None:
+        """Refuse what is out of range in our words, which rclpy would refuse in its own."""
+        try:
+            self._specs[name].check(name, given)
+        except ValueError as error:
+            text = f"{error}. {name} is {self._specs[name].description}"
+            raise self._refusal(text) from None
 
     def _given(self, name: str) -> Any:
         """Return what the command line or a file gives for ``name``; None if nothing does."""
@@ -191,9 +201,10 @@ def _both_names(was: str, name: str) -> str:
 
 
 def _as_type(type_: Any, value: Any) -> Any:
-    """Return whole numbers as floats where a float is asked for; all else as it is."""
-    if type_ is float and _is_integer(value):
-        return float(value)
+    """Return whole numbers as floats or texts where these are asked for; all else as it is."""
+    if type_ in (float, str) and _is_integer(value):
+        # ROS reads -p device:=0 as a number.
+        return type_(value)
     is_list = isinstance(value, list | tuple | array)
     if type_ == list[float] and is_list and len(value) and all(map(_is_integer, value)):
         return [float(one) for one in value]

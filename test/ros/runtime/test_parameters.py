@@ -143,12 +143,13 @@ def test_values_of_the_start_are_taken(make_node: Callable) -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("low:=-1.0", ("low", "range", "lower end")),
+        ("low:=-1.0", ("low is -1; expected 0 to 10. low is lower end",)),
         ("low:=3.0", ("low is 3", "lower it")),
         ("kind:=c", ("kind is 'c'", "a, b")),
         ("count:=many", ("count", "a count")),
         ("count:=2.0", ("count", "a count")),
         ("stale:=much", ("fresh", "a renamed one")),
+        ("stale:=2.0", ("fresh is 2; expected 0 to 1",)),
     ],
 )
 def test_wrong_value_at_the_start_says_which_and_why(
@@ -170,6 +171,16 @@ def test_a_whole_number_is_taken_for_a_float(make_node: Callable) -> None:
     assert live.value == Sample(low=2.0, times=[3.0])
     assert node.get_parameter("low").type_ == Parameter.Type.DOUBLE
     assert not set_values(node, low=True)[0]
+
+
+def test_a_whole_number_is_taken_for_a_text_where_a_text_may_be_one(make_node: Callable) -> None:
+    @dataclass(frozen=True)
+    class Device(NodeParameters):
+        """Parameters of a test."""
+
+        device: str = parameter("/dev/video0", "a device")
+
+    assert LiveParameters(make_node("-p", "device:=0"), Device).value.device == "0"
 
 
 def test_the_old_name_works_at_the_start_and_live_with_a_hint(
