@@ -82,9 +82,10 @@ def only_noted() -> Iterator[None]:
     try:
         yield
     finally:
-        if not _received.is_set():
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        for number, handler in before.items():
+            # While Python ends it has no handlers; launch and a terminal send one signal each, and
+            # the second would then kill a process that has done all it should.
+            signal.signal(number, signal.SIG_IGN if _received.is_set() else handler)
 
 
 def _give_up() -> None:
