@@ -26,4 +26,13 @@ def run(options: argparse.Namespace) -> None:
         from cardbox_tracker.ros.runtime.call import call_service
     except ImportError as error:
         raise RosMissingError(error) from None
-    print(call_service(options.service, lambda text: print(text, flush=True)))
+    said = [""]
+
+    def say(text: str) -> None:
+        said.append(text)
+        print(text, flush=True)
+
+    answer = call_service(options.service, say)
+    # Some answers are a node's last status, too.
+    if answer != said[-1]:
+        print(answer)

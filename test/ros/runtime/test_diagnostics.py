@@ -134,16 +134,23 @@ class Logged:
         self.info = self.warning = self.error = self.lines.append
 
 
-@pytest.mark.promise("A node whose input has ceased says so")
-def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
-    make_node: Callable, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    node = make_node()
+def clocked(
+    node: Any, monkeypatch: pytest.MonkeyPatch
+) -> tuple[NodeDiagnostics, Logged, list[float]]:
+    """Diagnostics of images, what ``node`` logs, and the time, in seconds, to be set."""
     diagnostics = NodeDiagnostics(node)
     logged = Logged(node, monkeypatch)
     now = [time.monotonic()]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     diagnostics.source = "images on /image_raw"
+    return diagnostics, logged, now
+
+
+@pytest.mark.promise("A node whose input has ceased says so")
+def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagnostics, logged, now = clocked(make_node(), monkeypatch)
 
     def second() -> tuple[str, str]:
         now[0] += 1.0
@@ -173,20 +180,18 @@ def test_the_pause_of_a_recording_is_no_fault(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make_node()
-    diagnostics = NodeDiagnostics(node)
-    logged = Logged(node, monkeypatch)
+    diagnostics, logged, now = clocked(node, monkeypatch)
     warned: list[str] = []
     logged.warning = warned.append
     topics: list[tuple[str, list[str]]] = [("/eye/play_bag/status", ["std_msgs/msg/String"])]
     monkeypatch.setattr(node, "get_topic_names_and_types", lambda: topics)
-    now = [time.monotonic()]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    diagnostics.source = "images"
     diagnostics.input.add(1)
     for _ in range(6):
         now[0] += 1.0
         diagnostics._tick()
-    assert logged.lines[0].startswith("images have ceased: play_bag plays a recording")
+    assert logged.lines[0].startswith(
+        "images on /image_raw have ceased: play_bag plays a recording"
+    )
     assert len(logged.lines) == 1 and not warned
     assert diagnostics._status().level == DiagnosticStatus.WARN
     topics.clear()
