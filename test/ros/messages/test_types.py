@@ -53,6 +53,10 @@ def test_a_type_that_is_none_is_refused(kind: str, words: str) -> None:
 
 
 @given(st.text(max_size=30), st.text(max_size=30))
-def test_any_type_is_refused_in_words(topic: str, kind: str) -> None:
-    with pytest.raises(BagError):
-        message_class(topic, kind)
+def test_any_type_is_refused_in_words_unless_it_is_installed(topic: str, kind: str) -> None:
+    try:
+        found = message_class(topic, kind)
+    except BagError:
+        return
+    # Hypothesis takes texts from the sources, too, where real types stand.
+    assert kind.endswith(f"_msgs/msg/{found.__name__}")
