@@ -20,12 +20,19 @@ from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 _PASSES, _SIGHTINGS, _STEPS, _HALF_STEPS = 2, 30, 6, 4
 _LEAST_SIGHTINGS = 8
+# Each reference posture counts like so many frames, and how far people are from it: they face the
+# first camera, which no outline tells so well.
+_STILL = 5
+_REFERENCE_STDDEV = np.array([0.1, 0.05, 0.08, 0.05, *[0.3] * 8, 0.1, 0.05])
+# Frames of which planes through both cameras are taken.
+_TANGENTS = 200
 
 Pair = tuple[Silhouette, Silhouette]
 
@@ -94,8 +101,11 @@ def calibrated_camera(
         InitializationError: the silhouettes do not show one person, or too few frames do.
     """
     states = reference_states(body, side_turn)
-    still = [Sighting(states[name], *pair) for name, pair in references.items()]
+    still = [Sighting(states[name], *pair, _REFERENCE_STDDEV) for name, pair in references.items()]
     pose = guessed_extrinsics(body, first, other, references, side_turn)
+    pairs = [*references.values(), *(frame.silhouettes for frame in moving)]
+    level = first.with_pitch(body.camera_pose.pitch_rad)
+    tangents = TopTangents(level, other, pairs[:: max(1, len(pairs) // _TANGENTS)])
     iou = float("nan")
     try:
         for number in range(_PASSES):
@@ -108,10 +118,13 @@ def calibrated_camera(
                     f"expected {_LEAST_SIGHTINGS} or more: let the person move for ten seconds or "
                     "longer after the reference postures, in sight of both cameras"
                 )
-            sightings = [*still, *tracked]
-            pose = _improved(body, first, other, pose, sightings, _STEPS)
+            sightings = [*still * _STILL, *tracked]
+            pose = _improved(body, first, other, pose, sightings, _STEPS, tangents)
         halves = [
-            _improved(body, first, other, pose, sightings[start::2], _HALF_STEPS)
+            _improved(
+                *(body, first, other, pose, sightings[start::2], _HALF_STEPS),
+                TopTangents(level, other, pairs[start::2]),
+            )
             for start in (0, 1)
         ]
     except (CameraError, np.linalg.LinAlgError) as error:
@@ -149,8 +162,9 @@ def _improved(
     pose: Extrinsics,
     sightings: Sequence[Sighting],
     steps: int,
+    tangents: TopTangents,
 ) -> Extrinsics:
-    problem = PoseProblem(body, first, other, pose, sightings)
+    problem = PoseProblem(body, first, other, pose, sightings, tangents)
     for _ in range(steps):
         pose = problem.step(pose).extrinsics
     return pose

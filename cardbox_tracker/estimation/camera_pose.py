@@ -32,6 +32,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
+from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
@@ -45,7 +46,7 @@ WITHOUT_ROLL = (0, 1, 3, 4, 5)
 # Standard deviation of a distance, px.
 _POINT_PX = 4.0
 # How far a state may be from the tracked one: standard deviations.
-_STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
+STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
 # Steps of the central differences, as of STATE_STEP.
 _POSE_STEP = np.array([0.015, 0.015, 0.015, 0.03, 0.03, 0.03])
 # Derivatives over whole pixels are too steep, so a plain step is too short.
@@ -62,11 +63,13 @@ class Sighting(NamedTuple):
         state: of the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
         first: silhouette of the first camera, (H, W), 0 or 255.
         other: silhouette of the further camera.
+        stddev: how far the state may be from the true one, (14,).
     """
 
     state: FloatArray
     first: Silhouette
     other: Silhouette
+    stddev: FloatArray = STATE_STDDEV
 
 
 class Step(NamedTuple):
@@ -112,6 +115,7 @@ class PoseProblem:
         other: Camera,
         extrinsics: Extrinsics,
         sightings: Sequence[Sighting],
+        tangents: TopTangents | None = None,
     ) -> None:
         """Begin at the states of ``sightings``.
 
@@ -121,17 +125,19 @@ class PoseProblem:
             other: the further camera, without its pitch.
             extrinsics: about where the further camera stands.
             sightings: of both cameras; those in which one of them shows nobody are left out.
+            tangents: of both cameras, at any times; with them a roll can be found, too.
 
         Raises:
             CameraError: the person's place is not in front of the further camera.
         """
-        self._body = body
+        self._body, self._tangents = body, tangents
         self._first = comparing(first.with_pitch(body.camera_pose.pitch_rad))
         self._other = comparing(other.with_pitch(0.0))
         self._cost = WholeBodyCost(body, self._first, WholeBodyCostConfig())
         self.states: list[FloatArray] = []
         self._seen: list[tuple[SeenOutline, SeenOutline]] = []
-        for state, seen, seen_there in sightings:
+        self._stddevs: list[FloatArray] = []
+        for state, seen, seen_there, stddev in sightings:
             hips_m = self._hips(state)
             there_m = extrinsics.rotation @ hips_m + extrinsics.translation_m
             pair = (
@@ -140,32 +146,40 @@ class PoseProblem:
             )
             if not (pair[0].is_empty or pair[1].is_empty):
                 self.states.append(state.copy())
+                self._stddevs.append(stddev)
                 self._seen.append(pair)
         self._tracked = [state.copy() for state in self.states]
 
-    def step(self, extrinsics: Extrinsics, free: Sequence[int] = WITHOUT_ROLL) -> Step:
+    def step(self, extrinsics: Extrinsics, free: Sequence[int] | None = None) -> Step:
         """Improve pose and states once.
 
         Args:
             extrinsics: the pose so far.
-            free: which numbers of the change are not 0.
+            free: which numbers of the change are not 0; by default all, without tangents all but
+                the roll.
 
         Raises:
             CameraError: the person's place is not in front of the further camera.
         """
-        here, beside = self._drawer(extrinsics), {}
+        if free is None:
+            free = WITHOUT_ROLL if self._tangents is None else range(N_POSE)
+        here, poses = self._drawer(extrinsics), {}
         for i in free:
             step = np.zeros(N_POSE)
             step[i] = _POSE_STEP[i]
-            beside[i] = (
-                self._drawer(moved_by(extrinsics, step)),
-                self._drawer(moved_by(extrinsics, -step)),
-            )
+            poses[i] = moved_by(extrinsics, step), moved_by(extrinsics, -step)
+        beside = {i: (self._drawer(more), self._drawer(less)) for i, (more, less) in poses.items()}
         said = [self._equations(number, here, beside) for number in range(len(self.states))]
         index = np.array(list(free))
         square = np.ix_(index, index)
         matrix = np.sum([one.matrix for one in said], axis=0)[square]
         right = np.sum([one.right for one in said], axis=0)[index]
+        if self._tangents is not None:
+            steps = [(*poses[i], 2.0 * float(_POSE_STEP[i])) for i in free]
+            more, more_right = self._tangents.equations(extrinsics, steps)
+            matrix = matrix + more
+            # Their derivatives are right as they are.
+            right = right + more_right / _RELAXATION
         inverse = np.linalg.inv(matrix)
         change = np.zeros(N_POSE)
         change[index] = -_RELAXATION * inverse @ right
@@ -205,8 +219,8 @@ class PoseProblem:
         weighted = jacobian * weights[:, None]
         matrix, right = jacobian.T @ weighted, weighted.T @ residual
         own = np.arange(N_STATE)
-        matrix[own, own] += 1.0 / _STATE_STDDEV**2
-        right[own] += (state - tracked) / _STATE_STDDEV**2
+        matrix[own, own] += 1.0 / self._stddevs[number] ** 2
+        right[own] += (state - tracked) / self._stddevs[number] ** 2
         across = matrix[:N_STATE, N_STATE:]
         said = np.column_stack([across, right[:N_STATE]])
         solved = np.asarray(np.linalg.solve(matrix[:N_STATE, :N_STATE], said), np.float64)
@@ -232,7 +246,7 @@ class PoseProblem:
     def _robust_cost(self, number: int, state: FloatArray, drawer: _Drawer) -> float:
         squares = self._residual(number, state, drawer) ** 2
         fit = float(np.sum(squares / (1.0 + squares / HALF_PX**2))) / _POINT_PX**2
-        return fit + float(np.sum(((state - self._tracked[number]) / _STATE_STDDEV) ** 2))
+        return fit + float(np.sum(((state - self._tracked[number]) / self._stddevs[number]) ** 2))
 
     def _drawer(self, extrinsics: Extrinsics) -> _Drawer:
         view = View.of(self._body, self._first, OtherCamera(self._other, extrinsics))

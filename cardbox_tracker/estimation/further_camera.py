@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
@@ -71,7 +72,9 @@ class FurtherCamera:
                     f"{what} of a further camera is {given.shape[:2]}; expected {self._size}"
                 )
         silhouette = view.upright(silhouette, is_mask=True)
-        image = None if image is None else view.upright(image)
+        if image is not None:
+            # What is not foreground is not asked for.
+            image = view.upright(image, box=cv2.boundingRect(silhouette))
         posture = None if before is None or len(before) != 14 else view.states(before)
         if self._region is not None:
             silhouette = self._region.select(silhouette, posture, is_sure, image)

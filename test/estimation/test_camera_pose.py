@@ -19,6 +19,7 @@ from cardbox_tracker.estimation.camera_pose import (
     turned_by,
 )
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
@@ -76,6 +77,41 @@ def test_a_turn_of_the_camera_is_found(axis: int) -> None:
     left = np.degrees(turned_by(TRUE, found))
     assert abs(left[axis]) < 1.5
     assert np.linalg.norm(left[:2]) < 1.8
+
+
+def tangents_of(frames: list[Sighting]) -> TopTangents:
+    return TopTangents(CAMERA, OTHER, [(one.first, one.other) for one in frames])
+
+
+def test_planes_through_both_cameras_touch_both_silhouettes() -> None:
+    tangents = tangents_of(sightings(waving(8)))
+    assert np.abs(tangents.heights(TRUE)).max() < 0.5
+    up, roll = (
+        tangents.heights(moved_by(TRUE, np.radians(3.0) * axis)) for axis in np.eye(6)[[0, 2]]
+    )
+    assert up.min() > 12.0
+    # A raised hand beside the head tells a roll from that.
+    assert np.ptp(roll) > 3.0
+
+
+def test_a_silhouette_that_is_cut_off_says_nothing() -> None:
+    (frame,) = sightings(waving(1))
+    cut = frame.other.copy()
+    cut[:80] = cut[100]
+    tangents = tangents_of([frame, Sighting(frame.state, frame.first, cut)])
+    assert np.isfinite(tangents.heights(TRUE)).tolist() == [True, False]
+    nobody = np.zeros_like(cut)
+    assert tangents_of([Sighting(frame.state, frame.first, nobody)]).heights(TRUE).size == 0
+
+
+def test_with_tangents_a_roll_is_found() -> None:
+    wrong = moved_by(TRUE, np.array([0.0, 0.0, np.radians(4.0), 0.0, 0.0, 0.0]))
+    frames = sightings(waving(8))
+    problem = PoseProblem(BODY, CAMERA, OTHER, wrong, frames, tangents_of(frames))
+    found = wrong
+    for _ in range(6):
+        found = problem.step(found).extrinsics
+    assert abs(np.degrees(turned_by(TRUE, found))[2]) < 2.0
 
 
 def agreement(extrinsics: Extrinsics, count: int) -> CameraAgreement:

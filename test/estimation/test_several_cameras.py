@@ -217,3 +217,16 @@ def test_a_second_camera_measures_how_far_away_the_person_is(guessed: float) -> 
     nobody = {"front": np.zeros((120, 160), np.uint8)}
     with pytest.raises(InitializationError, match="does not show the person"):
         measured_scale(BODY, CAMERA, OTHER, nobody)
+
+
+def test_of_an_image_turned_upright_only_what_is_asked_for_is_there() -> None:
+    c, s = np.cos(0.1), np.sin(0.1)
+    roll = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+    rolled = OtherCamera(CAMERA, Extrinsics(roll, np.array([0.1, 0.0, 0.0])))
+    view = View.of(BODY, CAMERA, rolled)
+    image = np.random.default_rng(0).integers(1, 255, (CAMERA.height, CAMERA.width, 3), np.uint8)
+    whole, part = view.upright(image), view.upright(image, box=(40, 30, 50, 60))
+    np.testing.assert_array_equal(part[30:90, 40:90], whole[30:90, 40:90])
+    part[30:90, 40:90] = 0
+    assert not part.any()
+    assert not view.upright(image, box=(0, 0, 0, 0)).any()

@@ -1,24 +1,33 @@
 """Compiled Gauss-Newton steps that draw the model's outline onto a silhouette's.
 
 The outline of a state (14,) are points on the edges of its patches that no other patch covers.
-Each has a distance from the silhouette's outline, r, px; with weights as of Geman and McClure, and
-kept near the state to begin with by squares in units of ``stddev``, the steps lower
+Each has a distance from the outline of its camera's silhouette, r, px; with weights as of Geman and
+McClure, and kept near the state to begin with by squares in units of ``stddev``, the steps lower
 
     INFORMATION * sum(length * r^2 / (1 + r^2 / HALF^2)) + sum(((state - begin) / stddev)^2)
 
-Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code of this file.
+Who changes ``whole_body_kernels.py`` or ``outline_points.py`` has to delete the cache of compiled
+code of this file.
 """
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
-from cardbox_tracker.estimation.cost.outline_distances import FAR_PX, HALF_PX
+from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
+from cardbox_tracker.estimation.cost.outline_points import (
+    Ints,
+    distance_at,
+    find_outline,
+    point_on_edge,
+    project_corners,
+    unmoved_patches,
+)
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     BODY_PATCHES,
     N_STATE,
@@ -27,111 +36,22 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
-# Points on each edge of a patch.
-_ON_EDGE = 6
-_POINTS = BODY_PATCHES * 4 * _ON_EDGE
+SHARES = (0.0, 0.2, 0.5, 1.0)
+"""What of a change is tried."""
+
 # What a pixel of outline says, in 1 / px^2: 312 neighbouring points do not err on their own.
 INFORMATION = 0.01
-# A point counts as covered so far inside another patch, and is no outline so near to the border.
-_COVERED_PX, _BORDER_PX = 0.5, 3.0
 _MOST_CHANGE = 0.25
 
 
 @_compile
-def _outline(corners_m: Floats, lens: Floats, corners_px: Floats, points: Floats) -> None:
-    """Write corners (13, 4, 2) and points on the edges (n, 2), px; ``lens`` is fx, fy, cx, cy."""
-    n = 0
-    for p in range(BODY_PATCHES):
-        for c in range(4):
-            x, y, z = corners_m[p, c, 0], corners_m[p, c, 1], max(corners_m[p, c, 2], 0.05)
-            corners_px[p, c, 0] = lens[0] * x / z + lens[2]
-            corners_px[p, c, 1] = lens[1] * y / z + lens[3]
-        for c in range(4):
-            d = (c + 1) % 4
-            for k in range(_ON_EDGE):
-                share = (k + 0.5) / _ON_EDGE
-                for i in range(2):
-                    begin = corners_px[p, c, i]
-                    points[n, i] = begin + share * (corners_px[p, d, i] - begin)
-                n += 1
-
-
-@_compile
-def _turns(corners_px: Floats, turns: Floats) -> None:
-    """Write whether the corners of each patch run one way round, 1, or the other, -1; (13,)."""
-    for p in range(BODY_PATCHES):
-        twice_area = 0.0
-        for c in range(4):
-            d = (c + 1) % 4
-            twice_area += (
-                corners_px[p, c, 0] * corners_px[p, d, 1]
-                - corners_px[p, d, 0] * corners_px[p, c, 1]
-            )
-        turns[p] = 1.0 if twice_area > 0.0 else -1.0
-
-
-@_compile
-def _is_inside(corners_px: Floats, p: int, turn: float, x: float, y: float) -> bool:
-    """Whether a point is well inside the convex patch ``p``, whose corners run by ``turn``."""
-    for c in range(4):
-        d = (c + 1) % 4
-        along_x = corners_px[p, d, 0] - corners_px[p, c, 0]
-        along_y = corners_px[p, d, 1] - corners_px[p, c, 1]
-        length = hypot(along_x, along_y)
-        if length < 1e-9:
-            continue
-        across = along_x * (y - corners_px[p, c, 1]) - along_y * (x - corners_px[p, c, 0])
-        if turn * across < _COVERED_PX * length:
-            return False
-    return True
-
-
-@_compile
-def _lengths(
-    corners_px: Floats, points: Floats, size: tuple[int, int], end_row: float, lengths: Floats
-) -> None:
-    """Write how much outline each point stands for, px: 0 of one that is not on it."""
-    width, height = size
-    end = min(end_row, height - _BORDER_PX)
-    turns = np.empty(BODY_PATCHES)
-    _turns(corners_px, turns)
-    n = 0
-    for p in range(BODY_PATCHES):
-        for c in range(4):
-            d = (c + 1) % 4
-            length = hypot(
-                corners_px[p, d, 0] - corners_px[p, c, 0], corners_px[p, d, 1] - corners_px[p, c, 1]
-            )
-            for _ in range(_ON_EDGE):
-                x, y = points[n, 0], points[n, 1]
-                counts = _BORDER_PX <= x <= width - 1 - _BORDER_PX and _BORDER_PX <= y < end
-                if counts:
-                    for other in range(BODY_PATCHES):
-                        if other != p and _is_inside(corners_px, other, turns[other], x, y):
-                            counts = False
-                            break
-                lengths[n] = length / _ON_EDGE if counts else 0.0
-                n += 1
-
-
-@_compile
-def _distances(field: NDArray[np.float32], points: Floats, lengths: Floats, found: Floats) -> None:
-    """Write the values of ``field`` (H, W) at points (n, 2) of the outline, linear between pixels.
-
-    Points that stand for no length get 0.
-    """
-    height, width = field.shape
-    for i in range(points.shape[0]):
-        if lengths[i] == 0.0:
-            found[i] = 0.0
-            continue
-        x = min(max(points[i, 0], 0.0), width - 1.001)
-        y = min(max(points[i, 1], 0.0), height - 1.001)
-        u, v = int(x), int(y)
-        a, b = x - u, y - v
-        upper = field[v, u] * (1.0 - a) + field[v, u + 1] * a
-        lower = field[v + 1, u] * (1.0 - a) + field[v + 1, u + 1] * a
-        found[i] = min(max(upper * (1.0 - b) + lower * b, -FAR_PX), FAR_PX)
+def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> None:
+    """Write the state (14,) as another camera has it."""
+    for j in range(N_STATE):
+        total = 0.0
+        for i in range(N_STATE):
+            total += state[i] * turned[i, j]
+        there[j] = total + moved[j]
 
 
 @_compile
@@ -155,8 +75,10 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 
 @_compile
-def fit_outline(
+def add_equations(
     state: Floats,
+    turned: Floats,
+    moved: Floats,
     parts: Floats,
     drawn: Floats,
     girdle: Floats,
@@ -165,14 +87,18 @@ def fit_outline(
     lens: Floats,
     field: NDArray[np.float32],
     end_row: float,
-    stddev: Floats,
     steps: Floats,
-    count: int,
-) -> None:
-    """Improve ``state`` (14,) in place by ``count`` steps.
+    matrix: Floats,
+    right: Floats,
+    edges: Ints,
+    points: Floats,
+) -> int:
+    """Add to the normal equations of ``state`` (14,) what one camera's outline says.
 
     Args:
-        state: to begin with.
+        state: of the first camera.
+        turned: ``state`` times this, (14, 14), plus
+        moved: this, (14,), is the state as this camera has it.
         parts: as of :func:`~.whole_body_kernels.corners_of_body`, like the next four.
         drawn: see there.
         girdle: see there.
@@ -181,62 +107,135 @@ def fit_outline(
         lens: fx, fy, cx, cy of the image of ``field``, (4,).
         field: signed distances from the silhouette's outline, (H, W), px, negative inside.
         end_row: rows from it on do not count.
-        stddev: how far the state may go, (14,).
         steps: of the central differences, (14,).
-        count: how many steps.
+        matrix: (14, 14), of which the lower triangle is used.
+        right: (14,).
+        edges: written: where the points of the outline are, (312, 2).
+        points: written: how far along their edges, and how much outline each stands for, (312, 2).
+
+    Returns:
+        How many points there are.
     """
-    begin, trial = state.copy(), state.copy()
+    trial, there = np.empty(N_STATE), np.empty(N_STATE)
     corners_m, corners_px = np.empty((BODY_PATCHES, 4, 3)), np.empty((BODY_PATCHES, 4, 2))
-    points, lengths = np.empty((_POINTS, 2)), np.empty(_POINTS)
-    now, other = np.empty(_POINTS), np.empty(_POINTS)
-    jacobian = np.empty((N_STATE, _POINTS))
-    matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
-    size = (field.shape[1], field.shape[0])
-    for _ in range(count):
-        corners_of_body(state, parts, drawn, girdle, place, view, corners_m)
-        _outline(corners_m, lens, corners_px, points)
-        _lengths(corners_px, points, size, end_row, lengths)
-        _distances(field, points, lengths, now)
-        for j in range(N_STATE):
-            trial[:] = state
-            trial[j] = state[j] + steps[j]
-            corners_of_body(trial, parts, drawn, girdle, place, view, corners_m)
-            _outline(corners_m, lens, corners_px, points)
-            _distances(field, points, lengths, jacobian[j])
-            trial[j] = state[j] - steps[j]
-            corners_of_body(trial, parts, drawn, girdle, place, view, corners_m)
-            _outline(corners_m, lens, corners_px, points)
-            _distances(field, points, lengths, other)
-            for i in range(_POINTS):
-                jacobian[j, i] = (jacobian[j, i] - other[i]) / (2.0 * steps[j])
-        for i in range(_POINTS):
-            outlying = 1.0 + (now[i] / HALF_PX) ** 2
-            other[i] = INFORMATION * lengths[i] / (outlying * outlying)
-        for j in range(N_STATE):
-            for k in range(j + 1):
-                total = 0.0
-                for i in range(_POINTS):
-                    total += other[i] * jacobian[j, i] * jacobian[k, i]
-                matrix[j, k] = total
+    less_px, same = np.empty((BODY_PATCHES, 4, 2)), np.empty(BODY_PATCHES, np.bool_)
+    _seen_from(state, turned, moved, there)
+    corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
+    project_corners(corners_m, lens, corners_px)
+    count = find_outline(corners_px, (field.shape[1], field.shape[0]), end_row, edges, points)
+    now, weights, by_state = np.empty(count), np.empty(count), np.empty(count)
+    jacobian = np.empty((N_STATE, count))
+    for i in range(count):
+        now[i] = distance_at(
+            field, *point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
+        )
+        outlying = 1.0 + (now[i] / HALF_PX) ** 2
+        weights[i] = INFORMATION * points[i, 1] / (outlying * outlying)
+    for j in range(N_STATE):
+        trial[:] = state
+        trial[j] = state[j] + steps[j]
+        _seen_from(trial, turned, moved, there)
+        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
+        project_corners(corners_m, lens, corners_px)
+        trial[j] = state[j] - steps[j]
+        _seen_from(trial, turned, moved, there)
+        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
+        project_corners(corners_m, lens, less_px)
+        unmoved_patches(corners_px, less_px, same)
+        for i in range(count):
+            p, c, share = edges[i, 0], edges[i, 1], points[i, 0]
+            if same[p]:
+                jacobian[j, i] = 0.0
+                continue
+            more = distance_at(field, *point_on_edge(corners_px, p, c, share))
+            less = distance_at(field, *point_on_edge(less_px, p, c, share))
+            jacobian[j, i] = (more - less) / (2.0 * steps[j])
+    for j in range(N_STATE):
+        total = 0.0
+        for i in range(count):
+            weighted = weights[i] * jacobian[j, i]
+            total += weighted * now[i]
+            by_state[i] = weighted
+        right[j] += total
+        for k in range(j + 1):
             total = 0.0
-            for i in range(_POINTS):
-                total += other[i] * jacobian[j, i] * now[i]
-            matrix[j, j] += 1.0 / stddev[j] ** 2
-            change[j] = -total - (state[j] - begin[j]) / stddev[j] ** 2
-        _solve(matrix, change)
-        best, best_share = np.inf, 0.0
-        for share in (0.0, 0.2, 0.5, 1.0):
-            value = 0.0
-            for j in range(N_STATE):
-                trial[j] = state[j] + share * min(max(change[j], -_MOST_CHANGE), _MOST_CHANGE)
-                value += ((trial[j] - begin[j]) / stddev[j]) ** 2
-            corners_of_body(trial, parts, drawn, girdle, place, view, corners_m)
-            _outline(corners_m, lens, corners_px, points)
-            _distances(field, points, lengths, other)
-            for i in range(_POINTS):
-                square = other[i] ** 2
-                value += INFORMATION * lengths[i] * square / (1.0 + square / HALF_PX**2)
-            if value < best:
-                best, best_share = value, share
+            for i in range(count):
+                total += by_state[i] * jacobian[k, i]
+            matrix[j, k] += total
+    return count
+
+
+@_compile
+def costs_along(
+    state: Floats,
+    change: Floats,
+    turned: Floats,
+    moved: Floats,
+    parts: Floats,
+    drawn: Floats,
+    girdle: Floats,
+    place: PlaceTuple,
+    view: ViewTuple,
+    lens: Floats,
+    field: NDArray[np.float32],
+    edges: Ints,
+    points: Floats,
+    costs: Floats,
+) -> None:
+    """Add to ``costs``, of each of ``SHARES`` of a change, what one camera's outline costs.
+
+    Args:
+        state: of the first camera, (14,).
+        change: of it, (14,).
+        turned: as of :func:`add_equations`, like the rest.
+        moved: see there.
+        parts: see there.
+        drawn: see there.
+        girdle: see there.
+        place: see there.
+        view: see there.
+        lens: see there.
+        field: see there.
+        edges: (n, 2), as written there.
+        points: (n, 2), as written there.
+        costs: one for each share.
+    """
+    trial, there = np.empty(N_STATE), np.empty(N_STATE)
+    corners_m, corners_px = np.empty((BODY_PATCHES, 4, 3)), np.empty((BODY_PATCHES, 4, 2))
+    for number in range(len(SHARES)):
         for j in range(N_STATE):
-            state[j] += best_share * min(max(change[j], -_MOST_CHANGE), _MOST_CHANGE)
+            trial[j] = state[j] + SHARES[number] * change[j]
+        _seen_from(trial, turned, moved, there)
+        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
+        project_corners(corners_m, lens, corners_px)
+        for i in range(len(points)):
+            x, y = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
+            square = distance_at(field, x, y) ** 2
+            costs[number] += INFORMATION * points[i, 1] * square / (1.0 + square / HALF_PX**2)
+
+
+@_compile
+def solve_equations(
+    state: Floats, begin: Floats, stddev: Floats, matrix: Floats, right: Floats, costs: Floats
+) -> None:
+    """Write the change of ``state`` into ``right``, and what leaving ``begin`` costs.
+
+    Args:
+        state: (14,).
+        begin: the state near which it is kept, in units of
+        stddev: these, (14,).
+        matrix: of the normal equations, (14, 14); overwritten.
+        right: their right side; overwritten by the change, (14,).
+        costs: written: of each of ``SHARES`` of the change.
+    """
+    for j in range(N_STATE):
+        matrix[j, j] += 1.0 / stddev[j] ** 2
+        right[j] = -right[j] - (state[j] - begin[j]) / stddev[j] ** 2
+    _solve(matrix, right)
+    for j in range(N_STATE):
+        right[j] = min(max(right[j], -_MOST_CHANGE), _MOST_CHANGE)
+    for number in range(len(SHARES)):
+        costs[number] = 0.0
+        for j in range(N_STATE):
+            trial = state[j] + SHARES[number] * right[j]
+            costs[number] += ((trial - begin[j]) / stddev[j]) ** 2

@@ -9,6 +9,7 @@ state (14,) then becomes another one, with other ``torso_y``, ``torso_yaw``, ``t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import asin, atan2, cos, sin
 
@@ -123,14 +124,35 @@ class View:
         moved: FloatArray = points_m @ _about_vertical(self.yaw_rad).T + self.offset_m
         return moved
 
-    def upright(self, image: ImageArray, is_mask: bool = False) -> ImageArray:
-        """Return an image (H, W) or (H, W, 3) of the camera turned upright."""
+    def upright(
+        self,
+        image: ImageArray,
+        is_mask: bool = False,
+        box: Sequence[int] | None = None,
+    ) -> ImageArray:
+        """Return an image (H, W) or (H, W, 3) of the camera turned upright.
+
+        Args:
+            image: of the camera.
+            is_mask: what is beyond the image is 0, not like its border.
+            box: column, row, width and height of what is asked for; the rest is 0.
+        """
         if self.turn is None:
             return image
         border = cv2.BORDER_CONSTANT if is_mask else cv2.BORDER_REPLICATE
+        turn = self.turn
+        if box is not None:
+            left, top, width, height = box
+            if not width:
+                return np.zeros((*turn.shape[:2], *image.shape[2:]), np.uint8)
+            turn = turn[top : top + height, left : left + width]
         # The nearest pixel does for colours, too, which are averaged over 3x3 anyway.
-        turned = cv2.remap(image, self.turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
-        return np.asarray(turned, np.uint8)
+        turned = cv2.remap(image, turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
+        if box is None:
+            return np.asarray(turned, np.uint8)
+        whole = np.zeros((*self.turn.shape[:2], *image.shape[2:]), np.uint8)
+        whole[top : top + height, left : left + width] = turned
+        return whole
 
     def level_axes(self) -> FloatArray:
         """Return the rotation (3, 3) from the first level frame into the upright optical frame."""

@@ -2,7 +2,8 @@
 
 What differs from one camera: the cost is a sum (:mod:`cardbox_tracker.estimation.cost.multi_view`);
 arms are tried for what each camera leaves uncovered, and mirrored along each one's line of sight;
-somebody who stands upright is looked for where the lines of sight meet.
+somebody who stands upright is looked for where the lines of sight meet; before all joints move
+together the best state is fitted to all outlines, and what a frame ends with joins the next one.
 """
 
 from __future__ import annotations
@@ -20,13 +21,19 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
+from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
-from cardbox_tracker.estimation.filtering.pose_filter import Sight
+from cardbox_tracker.estimation.filtering.draws import Draws
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
-# Rounds of all joints, times those of one camera; of their states, the fraction that moves by
+# States of a round of all joints, times those of one camera; the fraction that moves by
 # differences; and how the noise shrinks from one round to the next.
-_ROUNDS, _TOGETHER, _DIFFERING, _ROUND_DECAY = 3, 4, 0.8, 0.8
+_TOGETHER, _DIFFERING, _ROUND_DECAY = 4 / 3, 0.8, 0.8
+# Before all joints move together, so many states, of which so many are alike and the others so far
+# apart, m, are moved by so many Gauss-Newton steps.
+_FITTED, _FIT_STEPS = (3, 1, 0.1), 2
 # Deviation of where lines of sight meet: medians of outlines are not one point of a body.
 _CROSSING_M = 0.1
 # Lines of sight that are less apart, as the sine of the angle between them, do not measure x.
@@ -53,6 +60,8 @@ class MultiViewFilter(WholeBodyFilter):
 
     _seeing: list[int]
     """Cameras that see the person in this frame, by their number."""
+    _result: FloatArray
+    """The state (14,) that was returned last."""
 
     def __init__(
         self,
@@ -72,6 +81,12 @@ class MultiViewFilter(WholeBodyFilter):
             config.whole_body.cost,
         )
         self._cost = self._views
+        self._outline = OutlineFit(
+            self._one,
+            silhouette.camera,
+            config.whole_body.outline_steps,
+            list(zip(self._views.costs[1:], views, strict=True)),
+        )
 
     def look(self, frame: Frame) -> Sight:
         """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
@@ -93,6 +108,7 @@ class MultiViewFilter(WholeBodyFilter):
 
     def _observe(self, terms: Sequence[Term]) -> None:
         views, before = self._views, self._survivors[0]
+        self._outline.seeing = tuple(self._seeing)
         self._cross(before)
         self._step_m = 0.0
         if 0 in self._seeing:
@@ -140,12 +156,7 @@ class MultiViewFilter(WholeBodyFilter):
         self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
     ) -> FloatArray:
         views, count = self._views, len(self._seeing)
-        parts = zip(
-            self._seeing,
-            np.array_split(normals, count),
-            np.array_split(uniforms, count),
-            strict=True,
-        )
+        ends = [len(normals) * part // count for part in range(count + 1)]
         return np.concatenate(
             [
                 propose_arms(
@@ -153,13 +164,27 @@ class MultiViewFilter(WholeBodyFilter):
                     arm,
                     self._config,
                     views.costs[number],
-                    some_normals,
-                    some_uniforms,
+                    normals[begin:end],
+                    uniforms[begin:end],
                     count,
                 )
-                for number, some_normals, some_uniforms in parts
+                for number, begin, end in zip(self._seeing, ends, ends[1:], strict=False)
             ]
         )
+
+    def _together(
+        self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
+    ) -> None:
+        # Several outlines leave little that is flat: a step of Gauss and Newton is worth rounds.
+        cost = self._cost
+        kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
+        fitted = np.array(
+            [self._outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
+        )
+        fitted = np.clip(fitted, *STATE_LIMITS.T)
+        states = np.concatenate([states, fitted])
+        ratings = np.concatenate([ratings, self._cost.bodies(fitted)[0]])
+        super()._together(states, ratings, normals, uniforms)
 
     def ious(self) -> list[float | None]:
         """Return how well the last result covers each camera's silhouette of that frame.
@@ -173,11 +198,19 @@ class MultiViewFilter(WholeBodyFilter):
             if number not in self._seeing:
                 found.append(None)
                 continue
-            state = self._views.to_views[number](self._output)
+            state = self._views.to_views[number](self._result)
             _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
             both_px = float(cost.silhouette_px + drawn_px)
             found.append(float((both_px - differ_px) / (both_px + differ_px)))
         return found
+
+    def _fit(self) -> Fit:
+        fit = super()._fit()
+        if fit.offset_m is not None:
+            self._result = np.concatenate([fit.posture, fit.offset_m])
+            # The last survivor is the worst one.
+            self._survivors[-1] = self._result
+        return fit
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -186,7 +219,7 @@ class MultiViewFilter(WholeBodyFilter):
 
 
 def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
-    """Return settings for several cameras: the fit is less flat, so the search goes further.
+    """Return settings for several cameras: the fit is less flat, so steps are other ones.
 
     What was tried is in ``docs/two-cameras.md``.
     """
@@ -194,8 +227,7 @@ def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
     whole = replace(
         whole,
         smoothing=whole.smoothing / 3,
-        rounds=_ROUNDS * whole.rounds,
-        together=_TOGETHER * whole.together // 3,
+        together=round(_TOGETHER * whole.together),
         round_decay=max(whole.round_decay, _ROUND_DECAY),
         differing=max(whole.differing, _DIFFERING),
     )

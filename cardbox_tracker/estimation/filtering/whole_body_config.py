@@ -132,8 +132,8 @@ class WholeBodyConfig:
     )
     outline_steps: int = setting(
         2,
-        "Gauss-Newton steps that fit the result to the silhouette's outline; with one camera and "
-        "without depth images",
+        "Gauss-Newton steps that fit the result to the outlines of silhouettes; without "
+        "depth images",
         limits=(0, 20),
         restarts=True,
     )

@@ -1,4 +1,4 @@
-"""The result moves onto the silhouette's outline, by little, and only where it is alone."""
+"""The result moves onto the silhouettes' outlines, by little."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit, signed_distances
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45)
@@ -27,10 +29,12 @@ TRUTH = np.append(reference_posture("arms"), [0.0, 0.0])
 _FINER = 8
 
 
-def drawn(camera: Camera = CAMERA, state: np.ndarray = TRUTH) -> np.ndarray:
+def drawn(
+    camera: Camera = CAMERA, state: np.ndarray = TRUTH, cost: WholeBodyCost = COST
+) -> np.ndarray:
     """The silhouette (H, W) of a state; large at first, for a polygon is filled with its border."""
     large = np.zeros((_FINER * camera.height, _FINER * camera.width), np.uint8)
-    for patch in camera.project(COST.corners(state)):
+    for patch in camera.project(cost.corners(state)):
         cv2.fillConvexPoly(large, cv2.convexHull(np.int32(_FINER * (patch + 0.5))), 255)
     shares = cv2.resize(large, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     return np.where(shares > 127, 255, 0).astype(np.uint8)
@@ -89,6 +93,44 @@ def test_with_depth_or_without_steps_the_state_stays() -> None:
     np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 0)(seen, begin), begin)
     deep = replace(seen, depth_m=np.full((240, 320), 2.3, np.float32))
     np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 3)(deep, begin), begin)
+
+
+def aside() -> View:
+    """A camera as far from the person as the first one, 60 degrees round to their left."""
+    c, s = np.cos(np.pi / 3), np.sin(np.pi / 3)
+    turn = np.array([(c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)])
+    centre = np.array([0.0, 0.0, 2.3]) + turn.T @ [0.0, 0.0, -2.3]
+    return View.of(BODY, CAMERA, OtherCamera(CAMERA, Extrinsics(turn, -turn @ centre)))
+
+
+def test_a_second_camera_shows_what_the_first_one_does_not() -> None:
+    view = aside()
+    there = WholeBodyCost(view.body, view.camera, WholeBodyCostConfig())
+    # An arm forward, wrong by what the first camera hardly sees.
+    truth = TRUTH.copy()
+    truth[5] += 0.3
+    begin = truth.copy()
+    begin[[3, 5, 12]] += 0.1, 0.2, 0.06
+    seen = replace(
+        frame(drawn(state=truth)),
+        others=(frame(drawn(view.camera, view.states(truth), there), view.camera),),
+    )
+
+    def error(fit: OutlineFit) -> float:
+        found = COST.keypoints(fit(seen, begin)) - COST.keypoints(truth)
+        return float(np.linalg.norm(found, axis=1).mean())
+
+    both = OutlineFit(COST, CAMERA, 6, [(there, view)])
+    first, other = (OutlineFit(COST, CAMERA, 6, [(there, view)]) for _ in range(2))
+    first.seeing, other.seeing = (0,), (1,)
+    assert error(both) < 0.8 * error(first)
+    assert error(both) < error(other)
+    assert error(both) < 0.04
+    # The first camera alone is what one camera is.
+    np.testing.assert_array_equal(
+        first.fitted(seen, begin, 2),
+        OutlineFit(COST, CAMERA, 2).fitted(frame(seen.silhouette), begin, 2),
+    )
 
 
 def test_corrections_are_smoothed_until_it_is_forgotten() -> None:
