@@ -10,6 +10,8 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # On a ROS installation these come with it, so pip installs them only when asked to.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
+# Learns the correction of depth anew.
+LEARN = ["scikit-learn>=1.4,<2"]
 TEST = [
     "catkin_pkg>=1.0",
     "hypothesis>=6.100",
@@ -20,6 +22,7 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
+    *LEARN,
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",
@@ -54,7 +57,11 @@ setup(
         "Typing :: Typed",
     ],
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.estimation.cost": ["*.json"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.estimation.cost": ["*.json"],
+        f"{NAME}.estimation.filtering": ["*.npz"],
+    },
     zip_safe=False,
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -82,6 +89,7 @@ setup(
         "view": VIEW,
         "retarget": RETARGET,
         "mediapipe": ["mediapipe==0.10.21"],
+        "learn": LEARN,
     },
     entry_points={
         "console_scripts": [

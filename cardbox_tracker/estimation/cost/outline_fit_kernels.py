@@ -12,13 +12,12 @@ code of this file.
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
 from cardbox_tracker.estimation.cost.outline_points import (
     Ints,
@@ -52,26 +51,6 @@ def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> N
         for i in range(N_STATE):
             total += state[i] * turned[i, j]
         there[j] = total + moved[j]
-
-
-@_compile
-def _solve(matrix: Floats, right: Floats) -> None:
-    """Solve in place for a symmetric positive definite matrix, by Cholesky's decomposition."""
-    n = right.shape[0]
-    for i in range(n):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = sqrt(max(total, 1e-12)) if i == j else total / matrix[j, j]
-    for i in range(n):
-        for k in range(i):
-            right[i] -= matrix[i, k] * right[k]
-        right[i] /= matrix[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            right[i] -= matrix[k, i] * right[k]
-        right[i] /= matrix[i, i]
 
 
 @_compile
@@ -231,7 +210,7 @@ def solve_equations(
     for j in range(N_STATE):
         matrix[j, j] += 1.0 / stddev[j] ** 2
         right[j] = -right[j] - (state[j] - begin[j]) / stddev[j] ** 2
-    _solve(matrix, right)
+    solve(matrix, right)
     for j in range(N_STATE):
         right[j] = min(max(right[j], -_MOST_CHANGE), _MOST_CHANGE)
     for number in range(len(SHARES)):

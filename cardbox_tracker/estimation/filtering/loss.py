@@ -93,6 +93,8 @@ def evidence_of(
         age: frames.
     """
     common = 0.5 * (silhouette_px + area_px - cost_px)
+    # Of somebody at the border nothing may be left above the hips.
+    silhouette_px = max(silhouette_px, 1)
     residual = cost_px / silhouette_px
     return Evidence(
         residual=residual,

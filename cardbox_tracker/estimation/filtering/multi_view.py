@@ -24,8 +24,8 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
-from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
 # States of a round of all joints, times those of one camera; the fraction that moves by
@@ -81,12 +81,8 @@ class MultiViewFilter(WholeBodyFilter):
             config.whole_body.cost,
         )
         self._cost = self._views
-        self._outline = OutlineFit(
-            self._one,
-            silhouette.camera,
-            config.whole_body.outline_steps,
-            list(zip(self._views.costs[1:], views, strict=True)),
-        )
+        others = list(zip(self._views.costs[1:], views, strict=True))
+        self._refine = Refinement(self._one, silhouette.camera, config.whole_body, others)
 
     def look(self, frame: Frame) -> Sight:
         """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
@@ -108,7 +104,7 @@ class MultiViewFilter(WholeBodyFilter):
 
     def _observe(self, terms: Sequence[Term]) -> None:
         views, before = self._views, self._survivors[0]
-        self._outline.seeing = tuple(self._seeing)
+        self._refine.outline.seeing = tuple(self._seeing)
         self._cross(before)
         self._step_m = 0.0
         if 0 in self._seeing:
@@ -179,7 +175,7 @@ class MultiViewFilter(WholeBodyFilter):
         cost = self._cost
         kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
         fitted = np.array(
-            [self._outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
+            [self._refine.outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
         )
         fitted = np.clip(fitted, *STATE_LIMITS.T)
         states = np.concatenate([states, fitted])

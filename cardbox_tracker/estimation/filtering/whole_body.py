@@ -36,9 +36,9 @@ from cardbox_tracker.estimation.filtering.loss import (
     remembered,
     state_stddev,
 )
-from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
+from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 _HOME_LIMIT_M = 0.7
@@ -83,7 +83,7 @@ class WholeBodyFilter:
         self._body = silhouette.body
         self._one = WholeBodyCost(silhouette.body, silhouette.camera, self._config.cost)
         self._cost: WholeBodyCost | MultiViewCost = self._one
-        self._outline = OutlineFit(self._one, silhouette.camera, self._config.outline_steps)
+        self._refine = Refinement(self._one, silhouette.camera, self._config)
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
 
@@ -98,7 +98,7 @@ class WholeBodyFilter:
         self._age, self._home_m = 0, 0.0
         self._walk = Walk()
         self._output: FloatArray | None = None
-        self._outline.forget()
+        self._refine.forget()
         # Of left elbow and hand, right elbow and hand, m.
         self._arm_spread = [0.0, 0.0, 0.0, 0.0]
         self._chance: float | None = None
@@ -111,7 +111,7 @@ class WholeBodyFilter:
         self._is_lost = True
         # What was wrong is not shown, nor is the next result mixed with it.
         self._output = None
-        self._outline.forget()
+        self._refine.forget()
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
@@ -287,15 +287,14 @@ class WholeBodyFilter:
         mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
-        result = self._outline(self._frame, self._output)
+        deviations = state_stddev(stddev)
+        result = self._refine(self._frame, self._output, deviations)
         _, costs_px, areas_px = cost.bodies(np.array([mean, result]))
         total = cost.silhouette_px
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
         evidence = evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
         self._chance = remembered(chance_of_loss(evidence), self._chance)
-        deviations = state_stddev(stddev)
-        either_px = float(total + areas_px[1] + costs_px[1])  # twice what either of them covers
-        iou = 2.0 * float(total + areas_px[1]) / either_px - 1.0
+        iou = iou_of(total, areas_px[1], costs_px[1])
         return Fit(
             posture=result[:N_JOINTS],
             posture_stddev=deviations[:N_JOINTS],

@@ -137,6 +137,13 @@ class WholeBodyConfig:
         limits=(0, 20),
         restarts=True,
     )
+    depth_correction: float = setting(
+        0.8,
+        "share of the learned correction of depth in the result; with one camera and without depth "
+        "images; 0: none",
+        limits=(0.0, 1.0),
+        restarts=True,
+    )
     start_passes: int = setting(
         3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
     )

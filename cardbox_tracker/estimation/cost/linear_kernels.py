@@ -1,0 +1,35 @@
+"""Compiled solution of small systems of linear equations, without SciPy, which numba would need."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from cardbox_tracker.compiling import njit
+from cardbox_tracker.estimation.cost.kernels import Floats
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def solve(matrix: Floats, right: Floats) -> None:
+    """Solve a system of equations in place, by Cholesky's decomposition.
+
+    Args:
+        matrix: symmetric, positive definite, (n, n); its lower triangle is read, and overwritten.
+        right: right side (n,); becomes the solution.
+    """
+    n = right.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = sqrt(max(total, 1e-12)) if i == j else total / matrix[j, j]
+    for i in range(n):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]

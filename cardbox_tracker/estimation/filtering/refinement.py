@@ -1,0 +1,74 @@
+"""What is done to the result of the whole-body filter; its particles know nothing of it.
+
+1. It is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
+2. With one camera its depth is corrected (:mod:`.depth_correction`).
+3. What that moved in the image is fitted to the outline again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.depth_correction import DepthCorrection
+from cardbox_tracker.estimation.filtering.outline_fit import KEPT, OutlineFit
+from cardbox_tracker.estimation.filtering.smoothing import Smoothed
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.vision.camera import Camera
+
+# Gauss-Newton steps after the correction. Two are no better.
+_STEPS_AGAIN = 1
+
+
+class Refinement:
+    """Improves results of one body before one camera or several.
+
+    Attributes:
+        outline: the fit to the outlines.
+    """
+
+    def __init__(
+        self,
+        cost: WholeBodyCost,
+        camera: Camera,
+        config: WholeBodyConfig,
+        others: Sequence[tuple[WholeBodyCost, View]] = (),
+    ) -> None:
+        """Prepare for the body of ``cost`` before ``camera`` and ``others``."""
+        self._cost, self._share = cost, config.depth_correction
+        self._steps_again = min(config.outline_steps, _STEPS_AGAIN)
+        self.outline = OutlineFit(cost, camera, config.outline_steps, others)
+        self._depth = DepthCorrection(cost, self._share)
+        self._again = Smoothed(KEPT)
+
+    def forget(self) -> None:
+        """Begin anew: the next state is of somebody else, or of another place."""
+        self.outline.forget()
+        self._depth.forget()
+        self._again.forget()
+
+    def __call__(self, frame: Frame, state: FloatArray, stddev: FloatArray) -> FloatArray:
+        """Return a better state (14,) than ``state`` (14,) with deviations ``stddev`` (14,).
+
+        Further cameras and depth images show depth; with them it is not corrected.
+        """
+        fitted = self.outline(frame, state)
+        if self._share == 0.0 or frame.others or frame.depth_m is not None:
+            return fitted
+        _, costs_px, areas_px = self._cost.bodies(fitted[None])
+        iou = iou_of(self._cost.silhouette_px, areas_px[0], costs_px[0])
+        corrected = self._depth(fitted, stddev, iou)
+        again = self.outline.fitted(frame, corrected, self._steps_again) - corrected
+        return np.clip(corrected + self._again(again), *STATE_LIMITS.T)
+
+
+def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
+    """Return the intersection over union of silhouette and model, of which some pixels differ."""
+    twice_either = float(silhouette_px + model_px + differing_px)
+    return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0

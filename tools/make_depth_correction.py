@@ -1,0 +1,188 @@
+"""Learn the correction of depth from recorded sessions with ground truth.
+
+python -m tools.make_depth_correction SESSION... --check SESSION... --output FILE [--jobs N]
+
+Each session is a folder with ``bag/`` and ``ground_truth.json``. It is initialized and tracked
+with the preset ``default`` without the correction; the network learns what its results lack in
+depth (``cardbox_tracker/estimation/filtering/depth_correction.py``). Those after ``--check`` are
+not learned from: absolute and aligned error without the correction and with it are printed for
+them, cm. Needs scikit-learn: ``pip install '.[learn]'``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.filtering.depth_correction import (
+    Network,
+    features_of,
+    missing_depth,
+    moved_in_depth,
+)
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
+from cardbox_tracker.files import atomic_path
+
+FloatArray = NDArray[np.float64]
+
+# What the answers are divided by, m: about their deviations.
+UNIT_M = np.array([0.06, 0.05, 0.12])
+# An error beyond this is another posture, which no correction mends, m.
+MOST_M = 0.4
+# Features farther from the mean than this, in deviations, count as this.
+MOST = 2.5
+# Deviation of the noise that each copy of a sample gets: neighbours shall have similar answers.
+NOISE, COPIES = 0.4, 3
+LAYERS, NETWORKS, EPOCHS, PENALTY, RATE, BATCH = (64, 32), 4, 16, 1.0, 1e-3, 256
+
+
+class Samples(NamedTuple):
+    """Images of a session: features (n, 2, F), keypoints found and true, (n, 6, 3), metres."""
+
+    features: FloatArray
+    found_m: FloatArray
+    true_m: FloatArray
+
+
+def samples_of(folder: Path, seed: int) -> Samples:
+    """Track a session; see :class:`Samples`."""
+    session, preset = load_session(folder), PRESETS["default"]()
+    config = replace(preset, whole_body=replace(preset.whole_body, depth_correction=0.0))
+    wanted = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+    rows: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]] = []
+
+    def keep(_: int, stamp_ns: int, estimate: Estimate, __: Tracker) -> None:
+        true_m = wanted.get(stamp_ns)
+        if true_m is None or estimate.posture is None or not np.isfinite(true_m).all():
+            return
+        parts = estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
+        offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
+        state = np.concatenate([estimate.posture, offset])
+        deviations = np.concatenate([stddev, offset_stddev])
+        keypoints_m = np.asarray(estimate.keypoints_m)
+        rows.append((state, deviations, keypoints_m, true_m, float(estimate.iou or 0.0)))
+
+    track_session(session, config, (seed,), observe=keep)
+    if not rows:
+        raise SystemExit(f"{folder}: nobody was tracked; leave the session out")
+    states, stddevs, found_m, true_m, ious = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
+    return Samples(features_of(states, stddevs, found_m, ious), found_m, true_m)
+
+
+def learn(samples: Sequence[Samples], seed: int = 0) -> Network:
+    """Return the network that learned from these sessions."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.neural_network import MLPRegressor
+
+    # A few epochs are meant: more of them learn the sessions by heart.
+    warnings.simplefilter("ignore", ConvergenceWarning)
+    x = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
+    answers = [missing_depth(one.found_m, one.true_m).reshape(-1, 3) for one in samples]
+    y = np.clip(np.concatenate(answers), -MOST_M, MOST_M) / UNIT_M
+    mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-3)
+    scaled = np.clip((x - mean) / scale, -MOST, MOST)
+    rng = np.random.default_rng(seed)
+    noisy = [scaled + NOISE * rng.standard_normal(scaled.shape) for _ in range(COPIES)]
+    networks = [
+        MLPRegressor(
+            hidden_layer_sizes=LAYERS,
+            alpha=PENALTY,
+            learning_rate_init=RATE,
+            max_iter=EPOCHS,
+            batch_size=BATCH,
+            random_state=seed + number,
+        ).fit(np.concatenate(noisy), np.concatenate([y] * COPIES))
+        for number in range(NETWORKS)
+    ]
+    layers = range(len(LAYERS) + 1)
+    return Network(
+        mean,
+        scale,
+        MOST,
+        tuple(np.stack([one.coefs_[i] for one in networks]) for i in layers),
+        tuple(np.stack([one.intercepts_[i][None] for one in networks]) for i in layers),
+        UNIT_M,
+    )
+
+
+def save(network: Network, path: Path, about: str) -> None:
+    """Write a network as :func:`~.depth_correction.read_network` reads it."""
+    arrays = {
+        "about": np.array(about),
+        "mean": network.mean,
+        "scale": network.scale,
+        "most": np.array(network.most),
+        "unit_m": network.unit_m,
+    }
+    for i, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
+        arrays[f"weights{i}"], arrays[f"biases{i}"] = weights, biases
+    packed = {
+        name: array.astype(np.float32) if array.dtype.kind == "f" else array
+        for name, array in arrays.items()
+    }
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, **packed)
+
+
+def errors_cm(found_m: FloatArray, true_m: FloatArray) -> tuple[float, float]:
+    """Return the mean error of keypoints (n, 6, 3), and without that of the shoulders' middle."""
+    off = 100.0 * (found_m - true_m)
+    aligned = off - off[:, (0, 3)].mean(axis=1, keepdims=True)
+    mean, without = (float(np.linalg.norm(one, axis=2).mean()) for one in (off, aligned))
+    return mean, without
+
+
+def check(network: Network, samples: Samples, share: float) -> tuple[float, float, float, float]:
+    """Return :func:`errors_cm` without and with a share of the correction."""
+    features = samples.features
+    missing_m = share * network(features.reshape(-1, features.shape[2])).reshape(-1, 2, 3)
+    corrected_m = moved_in_depth(samples.found_m, missing_m)
+    before = errors_cm(samples.found_m, samples.true_m)
+    return *before, *errors_cm(corrected_m, samples.true_m)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Track, learn, check, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(args)
+    with ProcessPoolExecutor(given.jobs) as pool:
+        of_session = partial(samples_of, seed=given.seed)
+        samples = list(pool.map(of_session, [*given.sessions, *given.check]))
+    learned = len(given.sessions)
+    network = learn(samples[:learned], given.seed)
+    share = PRESETS["default"]().whole_body.depth_correction
+    rows = [check(network, one, share) for one in samples[learned:]]
+    for folder, row in zip(given.check, rows, strict=True):
+        print(folder.name, *(f"{value:.1f}" for value in row))
+    if rows:
+        print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
+    images = sum(len(one.true_m) for one in samples[:learned])
+    save(network, given.output, f"{given.about} {images} images of {learned} sessions".strip())
+    print(f"written: {given.output}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
