@@ -12,7 +12,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -47,6 +47,18 @@ def leave_at_once(code: int | None = None) -> None:
 
     for number in _SIGNALS:
         signal.signal(number, leave)
+
+
+def leave_interrupted() -> NoReturn:
+    """End the process with :data:`INTERRUPTED`, once what it has printed is written.
+
+    Returning to Python would not do: what it runs by ``-m`` it ends by SIGINT if Ctrl-C came within
+    exec() of a text, as the definition of a dataclass has it, even if the exception was caught.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(INTERRUPTED)
 
 
 def interrupt_commands() -> None:

@@ -106,6 +106,8 @@ def cardbox() -> int:
     code = start("cardbox", _command)
     # All is done and closed; what Python does at its end must not be interrupted.
     interrupts.leave_at_once(code)
+    if code == interrupts.INTERRUPTED:
+        interrupts.leave_interrupted()
     return code
 
 

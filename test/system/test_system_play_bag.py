@@ -71,6 +71,25 @@ def test_every_message_comes_with_its_stamp_in_order(
         graph.node.destroy_subscription(subscription)
 
 
+def test_a_second_camera_s_subscriber_that_comes_later_misses_nothing(
+    own_graph: Any, tmp_path: Path
+) -> None:
+    graph = own_graph
+    with BagWriter(tmp_path / "bag") as writer:
+        for number in range(2 * COUNT):
+            topic = f"/cam{number % 2}/image_raw"
+            image = np.full((24, 32), number, np.uint8)
+            writer.write_image(topic, START_NS + number * PERIOD_NS, "optical", image, "mono8")
+    first = graph.collect(Image, "cam0/image_raw", qos.REPLAY)
+    process = graph.start("play_bag", str(tmp_path / "bag"), "--rate", "4")
+    graph.wait(lambda: graph.node.count_publishers("cam1/image_raw"), "the publisher")
+    graph.spin(1.2)
+    assert not first
+    second = graph.collect(Image, "cam1/image_raw", qos.REPLAY)
+    assert ended(graph, process) == 0
+    graph.wait(lambda: len(first) == len(second) == COUNT, "all images")
+
+
 def test_it_pauses_where_told_and_resumes_on_call(graph: Any, bag: Path) -> None:
     images = graph.collect(Image, "image_raw", qos.REPLAY)
     statuses = graph.collect(String, "play_bag/status", qos.LATCHED)

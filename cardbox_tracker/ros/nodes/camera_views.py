@@ -27,6 +27,8 @@ from cardbox_tracker.vision.pairing import Arrivals
 # Half a period of 30 Hz, until the first camera's own is known.
 _TOLERANCE_NS = 16_000_000
 _SILENT_S = 3.0
+# The stamps of cameras are compared only while all of them send: one that pauses is behind.
+_RECENT_S = 0.5
 _OTHER_CLOCK_NS = 1_000_000_000
 
 
@@ -266,8 +268,8 @@ class CameraViews:
         for source in others:
             apart_ns = abs(source.newest_ns - first.newest_ns)
             is_stamped = source.newest_ns and first.newest_ns
-            is_alive = max(source.age_s, first.age_s) < _SILENT_S
-            if is_stamped and is_alive and apart_ns > _OTHER_CLOCK_NS:
+            is_recent = max(source.age_s, first.age_s) < _RECENT_S
+            if is_stamped and is_recent and apart_ns > _OTHER_CLOCK_NS:
                 texts[f"clock of {source.name}"] = (
                     f"the stamps on {source.topic} and {first.topic} are {apart_ns / 1e9:.1f} s "
                     "apart, so that nothing belongs together; set the clocks of both computers by "

@@ -103,7 +103,7 @@ class PlayBagParameters(NodeParameters):
     delay_s: float = parameter(
         0.5,
         "the first message is sent when no subscriber has come or gone for this time, so that "
-        "none misses the beginning",
+        "none misses the beginning; for 3 s while images of a further camera have none",
         unit="s",
         limits=(0.0, 600.0),
         read_only=True,

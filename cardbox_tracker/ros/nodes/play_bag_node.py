@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -32,6 +32,8 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _PROGRESS_S = 5.0
+# So much later may the nodes of a second camera start than those of the first.
+_OTHER_CAMERAS_S = 3.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Recorded once, when they were published; a late subscriber needs them too.
 _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
@@ -84,7 +86,7 @@ class PlayBagNode(CardboxNode):
             topics = ", ".join(publisher.topic_name for publisher in self._watched)
             compressed = any(name.endswith("/compressed") for name in topics.split(", "))
             hint = " (background takes it with image_transport:=compressed)" if compressed else ""
-            self._wait_for(f"a subscriber of {topics}{hint}", self._is_watched)
+            self._wait_for(f"a subscriber of {topics}{hint}", partial(self._is_watched, any))
         for topic in map(self.resolve, settings.wait_for_topics):
             self._wait_for(f"a publisher of {topic}", partial(self.count_publishers, topic))
         self._settle(settings.delay_s)
@@ -97,8 +99,8 @@ class PlayBagNode(CardboxNode):
         self._say("finished")
         self.get_logger().info(f"end of {settings.bag}")
 
-    def _is_watched(self) -> bool:
-        return any(publisher.get_subscription_count() for publisher in self._watched)
+    def _is_watched(self, how_many: Callable[[Iterable[bool]], bool]) -> bool:
+        return how_many(publisher.get_subscription_count() > 0 for publisher in self._watched)
 
     def _wait_for(self, what: str, is_there: Callable[[], bool | int]) -> None:
         self._say("waiting")
@@ -145,11 +147,18 @@ class PlayBagNode(CardboxNode):
         """Serve calls until no subscriber has come or gone for ``delay_s``.
 
         DDS matches a subscriber topic by topic: without the delay its first image could come before
-        its CameraInfo is matched.
+        its CameraInfo is matched. The nodes of several cameras start one after the other, so while
+        images of one of them have no subscriber yet, the delay is longer.
         """
         subscribers: list[int] = []
         since_s = time.monotonic()
-        while (left_s := since_s + delay_s - time.monotonic()) > 0:
+        is_patient = delay_s > 0.0 and self.parameters.value.wait_for_subscribers
+        while True:
+            is_complete = not is_patient or self._is_watched(all)
+            least_s = delay_s if is_complete else max(delay_s, _OTHER_CAMERAS_S)
+            left_s = since_s + least_s - time.monotonic()
+            if left_s <= 0:
+                return
             self._executor.spin_once(timeout_sec=min(left_s, 0.1))
             found = [publisher.get_subscription_count() for publisher in self._all()]
             if found != subscribers:

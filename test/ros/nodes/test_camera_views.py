@@ -240,3 +240,15 @@ def test_silence_and_other_clocks_are_said(
     assert values["right iou"] == "sees nobody"
     assert (values["left age (s)"], values["right age (s)"]) == ("0.0", "5.0")
     assert values["right rate (Hz)"] == "0.2"
+
+
+def test_a_camera_that_pauses_has_no_other_clock(
+    watching: Watching, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = camera_views.time.monotonic()
+    monkeypatch.setattr(camera_views.time, "monotonic", lambda: now_s)
+    watching.show("right", 100 * S)
+    now_s += 1.5
+    watching.show("left", 100 * S + 3 * S // 2)
+    watching.show_depth(100 * S + 3 * S // 2, np.ones((48, 64)))
+    assert not watching.source.warnings()
