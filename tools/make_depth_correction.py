@@ -33,6 +33,7 @@ from cardbox_tracker.estimation.filtering.depth_correction import (
     moved_in_depth,
 )
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
 from cardbox_tracker.files import atomic_path
@@ -143,8 +144,8 @@ def save(network: Network, path: Path, about: str) -> None:
 def errors_cm(found_m: FloatArray, true_m: FloatArray) -> tuple[float, float]:
     """Return the mean error of keypoints (n, 6, 3), and without that of the shoulders' middle."""
     off = 100.0 * (found_m - true_m)
-    aligned = off - off[:, (0, 3)].mean(axis=1, keepdims=True)
-    mean, without = (float(np.linalg.norm(one, axis=2).mean()) for one in (off, aligned))
+    each = off, beside_shoulders(off)
+    mean, without = (float(np.linalg.norm(one, axis=2).mean()) for one in each)
     return mean, without
 
 

@@ -51,11 +51,8 @@ def fit_keypoints(
         count: how many steps.
     """
     trial = state.copy()
-    now, above, below = (
-        np.empty((KEYPOINTS, 3)),
-        np.empty((KEYPOINTS, 3)),
-        np.empty((KEYPOINTS, 3)),
-    )
+    now = np.empty((KEYPOINTS, 3))
+    above, below = np.empty_like(now), np.empty_like(now)
     jacobian = np.empty((N_STATE, KEYPOINTS * 3))
     matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
     scale = 1.0 / (SPREAD_M * SPREAD_M)

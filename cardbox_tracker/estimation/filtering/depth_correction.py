@@ -176,9 +176,9 @@ class DepthCorrection:
     """Corrects the results of the whole-body filter for one body before one camera."""
 
     def __init__(self, cost: WholeBodyCost, share: float) -> None:
-        """Prepare for the body of ``cost``; so much of the correction counts, 0: nothing."""
+        """Prepare for the body of ``cost``; so much of the correction counts."""
         self._cost, self._share, self._smoothed = cost, share, Smoothed(_KEPT)
-        self._network = load_network() if share > 0.0 else None
+        self._network = load_network()
 
     def forget(self) -> None:
         """Begin anew: the next state is of somebody else, or of another place."""
@@ -192,12 +192,10 @@ class DepthCorrection:
             stddev: its deviations, (14,).
             iou: of model and silhouette.
         """
-        corrected = state.copy()
-        if self._network is None:
-            return corrected
         keypoints_m = self._cost.keypoints(state)[None]
         features = features_of(state[None], stddev[None], keypoints_m, np.array([iou]))
         missing_m = self._smoothed(self._share * self._network(features[0]))
+        corrected = state.copy()
         fit_keypoints(
             corrected,
             self._cost.parts,

@@ -3,7 +3,8 @@
 What differs from one camera: the cost is a sum (:mod:`cardbox_tracker.estimation.cost.multi_view`);
 arms are tried for what each camera leaves uncovered, and mirrored along each one's line of sight;
 somebody who stands upright is looked for where the lines of sight meet; before all joints move
-together the best state is fitted to all outlines, and what a frame ends with joins the next one.
+together three states that differ are fitted to all outlines, and what a frame ends with joins the
+next one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
-from cardbox_tracker.estimation.filtering.refinement import Refinement
+from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
 # States of a round of all joints, times those of one camera; the fraction that moves by
@@ -60,8 +61,6 @@ class MultiViewFilter(WholeBodyFilter):
 
     _seeing: list[int]
     """Cameras that see the person in this frame, by their number."""
-    _result: FloatArray
-    """The state (14,) that was returned last."""
 
     def __init__(
         self,
@@ -196,16 +195,13 @@ class MultiViewFilter(WholeBodyFilter):
                 continue
             state = self._views.to_views[number](self._result)
             _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
-            both_px = float(cost.silhouette_px + drawn_px)
-            found.append(float((both_px - differ_px) / (both_px + differ_px)))
+            found.append(iou_of(cost.silhouette_px, drawn_px, differ_px))
         return found
 
     def _fit(self) -> Fit:
         fit = super()._fit()
-        if fit.offset_m is not None:
-            self._result = np.concatenate([fit.posture, fit.offset_m])
-            # The last survivor is the worst one.
-            self._survivors[-1] = self._result
+        # The last survivor is the worst one.
+        self._survivors[-1] = self._result
         return fit
 
     def forget(self) -> None:

@@ -1,4 +1,4 @@
-"""The last step of a frame: the result is fitted to the silhouette's outline.
+"""States are fitted to the silhouette's outline.
 
 The filter counts pixels, and hair, clothes and fingers, which the model lacks, count as much as a
 torso that is too far away. Distances between outlines with robust weights tell them apart

@@ -41,25 +41,25 @@ class Refinement:
         others: Sequence[tuple[WholeBodyCost, View]] = (),
     ) -> None:
         """Prepare for the body of ``cost`` before ``camera`` and ``others``."""
-        self._cost, self._share = cost, config.depth_correction
+        self._cost = cost
         self._steps_again = min(config.outline_steps, _STEPS_AGAIN)
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
-        self._depth = DepthCorrection(cost, self._share)
+        # Further cameras and depth images show depth.
+        is_corrected = config.depth_correction > 0.0 and not others
+        self._depth = DepthCorrection(cost, config.depth_correction) if is_corrected else None
         self._again = Smoothed(KEPT)
 
     def forget(self) -> None:
         """Begin anew: the next state is of somebody else, or of another place."""
         self.outline.forget()
-        self._depth.forget()
+        if self._depth is not None:
+            self._depth.forget()
         self._again.forget()
 
     def __call__(self, frame: Frame, state: FloatArray, stddev: FloatArray) -> FloatArray:
-        """Return a better state (14,) than ``state`` (14,) with deviations ``stddev`` (14,).
-
-        Further cameras and depth images show depth; with them it is not corrected.
-        """
+        """Return a better state (14,) than ``state`` (14,) with deviations ``stddev`` (14,)."""
         fitted = self.outline(frame, state)
-        if self._share == 0.0 or frame.others or frame.depth_m is not None:
+        if self._depth is None or frame.depth_m is not None:
             return fitted
         _, costs_px, areas_px = self._cost.bodies(fitted[None])
         iou = iou_of(self._cost.silhouette_px, areas_px[0], costs_px[0])

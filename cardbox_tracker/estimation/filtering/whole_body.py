@@ -288,7 +288,7 @@ class WholeBodyFilter:
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         deviations = state_stddev(stddev)
-        result = self._refine(self._frame, self._output, deviations)
+        self._result = result = self._refine(self._frame, self._output, deviations)
         _, costs_px, areas_px = cost.bodies(np.array([mean, result]))
         total = cost.silhouette_px
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())

@@ -69,7 +69,7 @@ def comparable(session: RecordedSession, found: Container[int]) -> NDArray[np.bo
     """Return which images (n,) have a true torso and are among the stamps ``found``, ns.
 
     Raises:
-        ValueError: none.
+        ValueError: there is no such image.
     """
     known = np.array([stamp in found for stamp in session.stamps_ns.tolist()], dtype=bool)
     known &= np.isfinite(session.torso_rad).all(axis=1)

@@ -107,11 +107,6 @@ def test_the_network_averages_layers_with_rectified_inputs() -> None:
     assert np.allclose(found, [[0.2, 0.2, 0.4], [0.15, 0.15, 0.3]])
 
 
-def test_no_share_changes_nothing() -> None:
-    state = np.append(reference_posture("arms"), [0.0, 0.0])
-    assert np.array_equal(DepthCorrection(COST, 0.0)(state, np.full(14, 0.1), 0.9), state)
-
-
 @settings(max_examples=50, deadline=None)
 @given(STATES, st.floats(0.0, 1.0))
 def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:

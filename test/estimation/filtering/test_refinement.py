@@ -1,0 +1,73 @@
+"""What is done to a result: fitted, and with one camera corrected in depth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
+from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.rasterisation import render
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45)
+COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+STATE = np.append(reference_posture("arms"), [0.0, 0.0])
+STDDEV = np.full(14, 0.1)
+CONFIG = WholeBodyConfig()
+
+
+def seen(depth_m: np.ndarray | None = None) -> Frame:
+    silhouette = render(cardbox_patches(BODY, STATE[:12]), CAMERA)
+    return replace(CompiledSilhouette(BODY, CAMERA).frame(silhouette), depth_m=depth_m)
+
+
+def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
+    frame = seen(depth_m)
+    COST.see(frame.silhouette, STATE)
+    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
+
+
+def test_with_one_camera_depth_is_corrected() -> None:
+    assert CONFIG.depth_correction > 0.0
+    expected = fitted()
+    assert not np.allclose(Refinement(COST, CAMERA, CONFIG)(seen(), STATE, STDDEV), expected)
+
+
+def test_without_a_share_of_the_correction_the_result_is_only_fitted() -> None:
+    config = replace(CONFIG, depth_correction=0.0)
+    expected = fitted()
+    assert np.array_equal(Refinement(COST, CAMERA, config)(seen(), STATE, STDDEV), expected)
+
+
+def test_with_a_depth_image_the_result_is_only_fitted() -> None:
+    depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
+    expected = fitted(depth_m)
+    assert np.array_equal(Refinement(COST, CAMERA, CONFIG)(seen(depth_m), STATE, STDDEV), expected)
+
+
+def test_with_further_cameras_the_result_is_only_fitted() -> None:
+    expected = fitted()
+    same = OtherCamera(CAMERA, Extrinsics.of(np.eye(4)))
+    others = [(COST, View.of(BODY, CAMERA, same))]
+    refine = Refinement(COST, CAMERA, CONFIG, others)
+    refine.outline.seeing = (0,)
+    assert np.array_equal(refine(seen(), STATE, STDDEV), expected)
+
+
+def test_intersection_over_union() -> None:
+    # 30 pixels seen, 20 drawn, 10 of them in both: 30 differ, 40 are in either.
+    assert iou_of(30.0, 20.0, 30.0) == 0.25
+    assert iou_of(0.0, 0.0, 0.0) == 0.0
