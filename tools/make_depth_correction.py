@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import warnings
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -26,17 +25,14 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering.depth_correction import (
-    Network,
-    features_of,
-    missing_depth,
-    moved_in_depth,
-)
+from cardbox_tracker.estimation.filtering.depth_correction import missing_depth, moved_in_depth
+from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
-from cardbox_tracker.files import atomic_path
+from tools import networks
 
 FloatArray = NDArray[np.float64]
 
@@ -44,11 +40,7 @@ FloatArray = NDArray[np.float64]
 UNIT_M = np.array([0.06, 0.05, 0.12])
 # An error beyond this is another posture, which no correction mends, m.
 MOST_M = 0.4
-# Features farther from the mean than this, in deviations, count as this.
-MOST = 2.5
-# Deviation of the noise that each copy of a sample gets: neighbours shall have similar answers.
-NOISE, COPIES = 0.4, 3
-LAYERS, NETWORKS, EPOCHS, PENALTY, RATE, BATCH = (64, 32), 4, 16, 1.0, 1e-3, 256
+SHAPE = networks.Shape(layers=(256, 64), networks=4, epochs=16)
 
 
 class Samples(NamedTuple):
@@ -83,62 +75,16 @@ def samples_of(folder: Path, seed: int) -> Samples:
     states, stddevs, found_m, true_m, ious = (
         np.array(column) for column in zip(*rows, strict=True)
     )
-    return Samples(features_of(states, stddevs, found_m, ious), found_m, true_m)
+    pitch_rad = float(np.radians(session.truth.pitch_deg))
+    return Samples(features_of(states, stddevs, found_m, ious, pitch_rad), found_m, true_m)
 
 
 def learn(samples: Sequence[Samples], seed: int = 0) -> Network:
     """Return the network that learned from these sessions."""
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.neural_network import MLPRegressor
-
-    # A few epochs are meant: more of them learn the sessions by heart.
-    warnings.simplefilter("ignore", ConvergenceWarning)
-    x = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
+    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
     answers = [missing_depth(one.found_m, one.true_m).reshape(-1, 3) for one in samples]
-    y = np.clip(np.concatenate(answers), -MOST_M, MOST_M) / UNIT_M
-    mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-3)
-    scaled = np.clip((x - mean) / scale, -MOST, MOST)
-    rng = np.random.default_rng(seed)
-    noisy = [scaled + NOISE * rng.standard_normal(scaled.shape) for _ in range(COPIES)]
-    networks = [
-        MLPRegressor(
-            hidden_layer_sizes=LAYERS,
-            alpha=PENALTY,
-            learning_rate_init=RATE,
-            max_iter=EPOCHS,
-            batch_size=BATCH,
-            random_state=seed + number,
-        ).fit(np.concatenate(noisy), np.concatenate([y] * COPIES))
-        for number in range(NETWORKS)
-    ]
-    layers = range(len(LAYERS) + 1)
-    return Network(
-        mean,
-        scale,
-        MOST,
-        tuple(np.stack([one.coefs_[i] for one in networks]) for i in layers),
-        tuple(np.stack([one.intercepts_[i][None] for one in networks]) for i in layers),
-        UNIT_M,
-    )
-
-
-def save(network: Network, path: Path, about: str) -> None:
-    """Write a network as :func:`~.depth_correction.read_network` reads it."""
-    arrays = {
-        "about": np.array(about),
-        "mean": network.mean,
-        "scale": network.scale,
-        "most": np.array(network.most),
-        "unit_m": network.unit_m,
-    }
-    for i, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
-        arrays[f"weights{i}"], arrays[f"biases{i}"] = weights, biases
-    packed = {
-        name: array.astype(np.float32) if array.dtype.kind == "f" else array
-        for name, array in arrays.items()
-    }
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, allow_pickle=False, **packed)
+    missing_m = np.clip(np.concatenate(answers), -MOST_M, MOST_M)
+    return networks.learn(features, missing_m, UNIT_M, SHAPE, seed)
 
 
 def errors_cm(found_m: FloatArray, true_m: FloatArray) -> tuple[float, float]:
@@ -180,7 +126,9 @@ def main(args: list[str] | None = None) -> int:
     if rows:
         print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
     images = sum(len(one.true_m) for one in samples[:learned])
-    save(network, given.output, f"{given.about} {images} images of {learned} sessions".strip())
+    networks.save(
+        network, given.output, f"{given.about} {images} images of {learned} sessions".strip()
+    )
     print(f"written: {given.output}")
     return 0
 

@@ -23,7 +23,8 @@ class Estimate:
         state: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; the rest is None unless it is
             one of the first two.
         posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviation of each joint over the particles, weighted by fit, (12,).
+        posture_stddev: standard deviation of each joint, (12,): over the particles, weighted by
+            fit, or learned of results like this one (``filtering/deviations.py``).
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
         cost_px: equation (2) of the posture.

@@ -257,8 +257,7 @@ class Tracker:
             # Particles that are not numbers would stay so for ever.
             self.reset()
             return Estimate(LOST)
-        offset = () if fit.offset_m is None else fit.offset_m
-        self._before = np.concatenate([fit.posture, offset])
+        self._before = fit.seen
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:

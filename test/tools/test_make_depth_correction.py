@@ -10,10 +10,11 @@ import pytest
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering import depth_correction
-from cardbox_tracker.estimation.filtering.depth_correction import features_of
+from cardbox_tracker.estimation.filtering.networks import read_network
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.vision.camera import Camera
 from tools import make_depth_correction as tool
+from tools import networks
 
 COST = WholeBodyCost(
     BodyModel.of(distance_m=2.3),
@@ -30,7 +31,7 @@ def session(seed: int, images: int = 400) -> tool.Samples:
     true = found.copy()
     for hand, flexion in ((2, 5), (5, 9)):
         true[:, hand, 2] += 0.3 * states[:, flexion]
-    features = features_of(states, np.full((images, 14), 0.1), found, np.full(images, 0.9))
+    features = features_of(states, np.full((images, 14), 0.1), found, np.full(images, 0.9), 0.1)
     return tool.Samples(features, found, true)
 
 
@@ -38,13 +39,13 @@ def test_what_is_missing_is_learned_and_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("sklearn", reason="scikit-learn is not installed")
-    monkeypatch.setattr(tool, "EPOCHS", 10)
+    monkeypatch.setattr(tool, "SHAPE", networks.Shape((64, 32), 4, 10))
     network = tool.learn([session(0), session(1)])
     other = session(2)
     before, _, after, _ = tool.check(network, other, 1.0)
     assert after < 0.7 * before
-    tool.save(network, tmp_path / "network.npz", "a test")
-    stored = depth_correction.read_network(tmp_path / "network.npz")
+    networks.save(network, tmp_path / "network.npz", "a test")
+    stored = read_network(tmp_path / "network.npz")
     features = other.features[:, 0]
     assert np.allclose(stored(features), network(features), atol=1e-4)
 

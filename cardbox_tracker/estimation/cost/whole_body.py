@@ -43,6 +43,7 @@ class WholeBodyCost:
         girdle: where the shoulders are, and how they are lifted, (5,).
         place: where the hips are in the body model.
         view: the camera.
+        pitch_rad: how far the camera looks down.
         frontal_px: pixels of the model in the front reference posture.
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
@@ -63,6 +64,7 @@ class WholeBodyCost:
             ]
         )
         self.place, self.view = place_of(body), view_of(camera)
+        self.pitch_rad = camera.pitch_rad
         self._drawn = _drawn_parts(self.parts, config)
         self._rules = _rules(config)
         self._gmm = np.array(load_gmm())

@@ -11,11 +11,8 @@ it. Bones keep their lengths, so what moves in depth moves in the image too.
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import resources
 from math import sqrt
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +22,12 @@ from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.networks import load_network
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.filtering.smoothing import Smoothed
 
-_DATA = "depth_correction.npz"
+DATA = "depth_correction.npz"
+"""Name of the network's data file."""
 # Place and arms move; the torso keeps its angles.
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
 _STEPS = 2
@@ -35,94 +35,6 @@ _STEPS = 2
 _KEPT = 0.5
 # A bone that points at the camera shows no direction in the image.
 _MOST_DEPTH = 0.97
-_OTHER_ARM = np.array([0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13])
-_MIRROR = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * 10])
-_OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
-_SHOULDERS = np.array([0, 3])
-
-
-class Network(NamedTuple):
-    """Some networks of the same shape, whose answers are averaged.
-
-    Attributes:
-        mean: of the features, (F,).
-        scale: their deviations, (F,).
-        most: scaled features beyond this count as this.
-        weights: of each layer, (networks, inputs, outputs).
-        biases: of each layer, (networks, 1, outputs).
-        unit_m: of the three answers, (3,), metres.
-    """
-
-    mean: FloatArray
-    scale: FloatArray
-    most: float
-    weights: tuple[FloatArray, ...]
-    biases: tuple[FloatArray, ...]
-    unit_m: FloatArray
-
-    def __call__(self, features: FloatArray) -> FloatArray:
-        """Return what is missing in depth, (n, 3), metres, of features (n, F)."""
-        scaled = np.clip((features - self.mean) / self.scale, -self.most, self.most)
-        values = np.broadcast_to(scaled, (len(self.weights[0]), *scaled.shape))
-        for number, (weights, biases) in enumerate(zip(self.weights, self.biases, strict=True)):
-            if number > 0:
-                values = np.maximum(values, 0.0)
-            values = values @ weights + biases
-        answer: FloatArray = values.mean(axis=0) * self.unit_m
-        return answer
-
-
-@cache
-def load_network() -> Network:
-    """Return the network of the package."""
-    with resources.as_file(resources.files(__package__).joinpath(_DATA)) as path:
-        return read_network(path)
-
-
-def read_network(path: Path) -> Network:
-    """Return the network in a file that ``tools/make_depth_correction.py`` has written."""
-    with np.load(path) as stored:
-        names = [name for name in stored.files if name != "about"]
-        data = {name: np.asarray(stored[name], np.float64) for name in names}
-    layers = sum(name.startswith("weights") for name in names)
-    return Network(
-        data["mean"],
-        data["scale"],
-        float(data["most"]),
-        tuple(data[f"weights{i}"] for i in range(layers)),
-        tuple(data[f"biases{i}"] for i in range(layers)),
-        data["unit_m"],
-    )
-
-
-def features_of(
-    states: FloatArray, stddevs: FloatArray, keypoints_m: FloatArray, ious: FloatArray
-) -> FloatArray:
-    """Return what the network sees, (n, 2, F): the left arm, and the right one mirrored.
-
-    Args:
-        states: results of the filter, (n, 14).
-        stddevs: their deviations, (n, 14).
-        keypoints_m: (n, 6, 3), metres in the optical frame.
-        ious: of model and silhouette, (n,).
-    """
-    middle = keypoints_m[:, _SHOULDERS].mean(axis=1, keepdims=True)
-    arms = []
-    for is_right in (False, True):
-        state, stddev, points = states, stddevs, keypoints_m - middle
-        if is_right:
-            state, stddev = state[:, _OTHER_ARM] * _MIRROR, stddev[:, _OTHER_ARM]
-            points = points[:, _OTHER_POINTS] * (-1.0, 1.0, 1.0)
-        bones = points[:, (1, 2, 4, 5)] - points[:, (0, 1, 3, 4)]
-        bones = (bones / np.linalg.norm(bones, axis=2, keepdims=True)).reshape(len(states), -1)
-        hand = points[:, 2]
-        arms.append(
-            np.hstack([
-                *(bones, bones**2, hand, hand**2, np.abs(hand[:, :1])),
-                *(state, stddev, ious[:, None], np.abs(state[:, 3:4])),
-            ])
-        )  # fmt: skip
-    return np.stack(arms, axis=1)
 
 
 def missing_depth(keypoints_m: FloatArray, true_m: FloatArray) -> FloatArray:
@@ -178,7 +90,7 @@ class DepthCorrection:
     def __init__(self, cost: WholeBodyCost, share: float) -> None:
         """Prepare for the body of ``cost``; so much of the correction counts."""
         self._cost, self._share, self._smoothed = cost, share, Smoothed(_KEPT)
-        self._network = load_network()
+        self._network = load_network(DATA)
 
     def forget(self) -> None:
         """Begin anew: the next state is of somebody else, or of another place."""
@@ -193,7 +105,8 @@ class DepthCorrection:
             iou: of model and silhouette.
         """
         keypoints_m = self._cost.keypoints(state)[None]
-        features = features_of(state[None], stddev[None], keypoints_m, np.array([iou]))
+        pitch_rad = self._cost.pitch_rad
+        features = features_of(state[None], stddev[None], keypoints_m, np.array([iou]), pitch_rad)
         missing_m = self._smoothed(self._share * self._network(features[0]))
         corrected = state.copy()
         fit_keypoints(

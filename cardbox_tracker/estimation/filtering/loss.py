@@ -140,17 +140,12 @@ def state_stddev(stddev: FloatArray) -> FloatArray:
     return calibrated
 
 
-def calibrated_states(
-    deviations: FloatArray, rng: np.random.Generator, limits: FloatArray, around: FloatArray
-) -> FloatArray:
-    """Return states (n, 14) ``around`` a state (14,), as far apart as :func:`state_stddev` says.
+def calibrated_deviations(deviations: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return deviations (n, 14) from a result, as far apart as :func:`state_stddev` says.
 
     Args:
         deviations: of states drawn by their weights from the mean, (n, 14).
         rng: source of what the floors add.
-        limits: lowest and highest value of each, (14, 2).
-        around: the result, (14,).
     """
-    noise = _FLOORS * rng.standard_normal(deviations.shape)
-    moved: FloatArray = np.clip(around + _GAINS * deviations + noise, limits[:, 0], limits[:, 1])
-    return moved
+    calibrated: FloatArray = _GAINS * deviations + _FLOORS * rng.standard_normal(deviations.shape)
+    return calibrated

@@ -201,7 +201,7 @@ class MultiViewFilter(WholeBodyFilter):
     def _fit(self) -> Fit:
         fit = super()._fit()
         # The last survivor is the worst one.
-        self._survivors[-1] = self._result
+        self._survivors[-1] = self._result = fit.seen
         return fit
 
     def forget(self) -> None:

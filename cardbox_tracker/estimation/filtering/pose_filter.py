@@ -44,6 +44,8 @@ class Fit:
         iou: their intersection over union.
         is_uncertain: the posture may be wrong.
         is_poor: it does not fit; several such frames in a row mean that the person was lost.
+        seen: what explains the image best, before anything learned of depth was added: (14,), or
+            (12,) without an offset.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: their standard deviations, (2,), or None.
         particles: of whole states, or None from a filter that has none.
@@ -56,6 +58,7 @@ class Fit:
     iou: float
     is_uncertain: bool
     is_poor: bool
+    seen: FloatArray
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
     particles: Particles | None = None

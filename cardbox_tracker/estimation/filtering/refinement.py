@@ -3,6 +3,7 @@
 1. It is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
 2. With one camera its depth is corrected (:mod:`.depth_correction`).
 3. What that moved in the image is fitted to the outline again.
+4. How wrong it may be is estimated for such results (:mod:`.deviations`).
 """
 
 from __future__ import annotations
@@ -17,13 +18,17 @@ from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_correction import DepthCorrection
+from cardbox_tracker.estimation.filtering.deviations import deviations_of
 from cardbox_tracker.estimation.filtering.outline_fit import KEPT, OutlineFit
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.filtering.smoothing import Smoothed
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
 
 # Gauss-Newton steps after the correction. Two are no better.
 _STEPS_AGAIN = 1
+# The angles among the values of a state.
+_ANGLES = slice(1, 12)
 
 
 class Refinement:
@@ -47,6 +52,7 @@ class Refinement:
         # Further cameras and depth images show depth.
         is_corrected = config.depth_correction > 0.0 and not others
         self._depth = DepthCorrection(cost, config.depth_correction) if is_corrected else None
+        self._is_learned = is_corrected and config.learned_deviations
         self._again = Smoothed(KEPT)
 
     def forget(self) -> None:
@@ -56,16 +62,50 @@ class Refinement:
             self._depth.forget()
         self._again.forget()
 
-    def __call__(self, frame: Frame, state: FloatArray, stddev: FloatArray) -> FloatArray:
-        """Return a better state (14,) than ``state`` (14,) with deviations ``stddev`` (14,)."""
+    def __call__(
+        self, frame: Frame, state: FloatArray, stddev: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return ``state`` (14,) fitted to the outlines, (14,), and the result, (14,).
+
+        Args:
+            frame: what is seen.
+            state: to begin with, (14,).
+            stddev: its deviations, (14,).
+        """
         fitted = self.outline(frame, state)
         if self._depth is None or frame.depth_m is not None:
-            return fitted
+            return fitted, fitted
         _, costs_px, areas_px = self._cost.bodies(fitted[None])
         iou = iou_of(self._cost.silhouette_px, areas_px[0], costs_px[0])
         corrected = self._depth(fitted, stddev, iou)
         again = self.outline.fitted(frame, corrected, self._steps_again) - corrected
-        return np.clip(corrected + self._again(again), *STATE_LIMITS.T)
+        return fitted, np.clip(corrected + self._again(again), *STATE_LIMITS.T)
+
+    def deviations(
+        self,
+        frame: Frame,
+        state: FloatArray,
+        stddev: FloatArray,
+        keypoints_m: FloatArray,
+        iou: float,
+    ) -> FloatArray:
+        """Return the deviations (14,) of what was returned last: learned ones of the angles.
+
+        Results that are not corrected keep those of the filter.
+
+        Args:
+            frame: what was seen.
+            state: what was returned, (14,).
+            stddev: the filter's deviations, (14,).
+            keypoints_m: of the state, (6, 3), metres in the optical frame.
+            iou: of model and silhouette.
+        """
+        if not self._is_learned or frame.depth_m is not None:
+            return stddev
+        row = state[None], stddev[None], keypoints_m[None], np.array([iou])
+        learned = stddev.copy()
+        learned[_ANGLES] = deviations_of(features_of(*row, self._cost.pitch_rad))[0]
+        return learned
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:

@@ -2,8 +2,7 @@
 
 A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
 the best torso, then all joints together. ``docs/architecture.md`` has the steps with their numbers
-and what was tried. What proposes is in
-:mod:`cardbox_tracker.estimation.filtering.whole_body_moves`, what rates in
+and what was tried. What proposes is in :mod:`.whole_body_moves`, what rates in
 :mod:`cardbox_tracker.estimation.cost.whole_body`.
 """
 
@@ -282,28 +281,30 @@ class WholeBodyFilter:
 
     def _fit(self) -> Fit:
         """Return the smoothed mean of the best states, and how far to believe it."""
-        config, cost = self._config, self._cost
+        config, cost, frame = self._config, self._cost, self._frame
         rated = self.states, self.ratings
         mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
-        deviations = state_stddev(stddev)
-        self._result = result = self._refine(self._frame, self._output, deviations)
-        _, costs_px, areas_px = cost.bodies(np.array([mean, result]))
-        total = cost.silhouette_px
+        spread, total = state_stddev(stddev), cost.silhouette_px
+        fitted, result = self._refine(frame, self._output, spread)
+        _, costs_px, areas_px = cost.bodies(np.array([mean, fitted, result]))
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
         evidence = evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
         self._chance = remembered(chance_of_loss(evidence), self._chance)
-        iou = iou_of(total, areas_px[1], costs_px[1])
+        fit_iou, iou = (iou_of(total, areas_px[i], costs_px[i]) for i in (1, 2))
+        keypoints_m = cost.keypoints(result)
+        deviations = self._refine.deviations(frame, result, spread, keypoints_m, iou)
         return Fit(
             posture=result[:N_JOINTS],
             posture_stddev=deviations[:N_JOINTS],
-            keypoints_m=cost.keypoints(result),
-            cost_px=int(costs_px[1]),
+            keypoints_m=keypoints_m,
+            cost_px=int(costs_px[2]),
             iou=iou,
             is_uncertain=self._chance > config.uncertain_from,
-            is_poor=self._chance > config.lost_from or iou < self._lost_iou,
+            is_poor=self._chance > config.lost_from or fit_iou < self._lost_iou,
             offset_m=result[N_JOINTS:],
             offset_stddev_m=deviations[N_JOINTS:],
-            particles=Particles(self.states, self.ratings, mean, config.spread),
+            seen=fitted,
+            particles=Particles(*rated, mean, config.spread, deviations / spread),
         )

@@ -144,6 +144,12 @@ class WholeBodyConfig:
         limits=(0.0, 1.0),
         restarts=True,
     )
+    learned_deviations: bool = setting(
+        True,
+        "whether deviations of the angles are learned ones, where depth is corrected; no: those "
+        "of the particles",
+        restarts=True,
+    )
     start_passes: int = setting(
         3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
     )

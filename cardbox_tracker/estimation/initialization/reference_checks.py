@@ -256,7 +256,8 @@ def _problem_of_height(view: _View, arms: _Arms) -> str:
             return (
                 f"reference '{name}': the head is {100 * abs(shift):.0f} cm "
                 f"{'higher' if shift > 0 else 'lower'} than in 'front'; stand upright, on the "
-                f"same spot, for all three, and capture '{name}' again"
+                f"same spot, for all three, and capture '{name}' again; or the head is missing "
+                "from one silhouette, as where a shirt has the colour of the wall"
             )
     return ""
 

@@ -32,7 +32,7 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _PROGRESS_S = 5.0
-# So much later may the nodes of a second camera start than those of the first.
+# The nodes of a second camera may start so much later.
 _OTHER_CAMERAS_S = 3.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Recorded once, when they were published; a late subscriber needs them too.
@@ -90,10 +90,9 @@ class PlayBagNode(CardboxNode):
         for topic in map(self.resolve, settings.wait_for_topics):
             self._wait_for(f"a publisher of {topic}", partial(self.count_publishers, topic))
         self._settle(settings.delay_s)
-        while True:
+        self._play_once()
+        while self.parameters.value.loop:
             self._play_once()
-            if not self.parameters.value.loop:
-                break
         for publisher in self._all():
             publisher.wait_for_all_acked(Duration(seconds=5))
         self._say("finished")
@@ -146,18 +145,14 @@ class PlayBagNode(CardboxNode):
     def _settle(self, delay_s: float) -> None:
         """Serve calls until no subscriber has come or gone for ``delay_s``.
 
-        DDS matches a subscriber topic by topic: without the delay its first image could come before
-        its CameraInfo is matched. The nodes of several cameras start one after the other, so while
-        images of one of them have no subscriber yet, the delay is longer.
+        DDS matches a subscriber topic by topic, its CameraInfo perhaps last. The nodes of several
+        cameras start one after the other: while images of one have no subscriber it waits longer.
         """
-        subscribers: list[int] = []
-        since_s = time.monotonic()
-        is_patient = delay_s > 0.0 and self.parameters.value.wait_for_subscribers
+        subscribers, since_s = list[int](), time.monotonic()
+        long_s = max(delay_s, _OTHER_CAMERAS_S if self.parameters.value.wait_for_subscribers else 0)
         while True:
-            is_complete = not is_patient or self._is_watched(all)
-            least_s = delay_s if is_complete else max(delay_s, _OTHER_CAMERAS_S)
-            left_s = since_s + least_s - time.monotonic()
-            if left_s <= 0:
+            patience_s = delay_s if not delay_s or self._is_watched(all) else long_s
+            if (left_s := since_s + patience_s - time.monotonic()) <= 0:
                 return
             self._executor.spin_once(timeout_sec=min(left_s, 0.1))
             found = [publisher.get_subscription_count() for publisher in self._all()]

@@ -13,13 +13,13 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_correction import (
+    DATA,
     DepthCorrection,
-    Network,
-    features_of,
-    load_network,
     missing_depth,
     moved_in_depth,
 )
+from cardbox_tracker.estimation.filtering.networks import load_network
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -34,11 +34,6 @@ STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
 
 def bones_of(points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[..., ARMS, :] - points[..., PARENTS, :], axis=-1)
-
-
-def mirrored(points: np.ndarray) -> np.ndarray:
-    """Keypoints (6, 3) as in a mirror beside the camera."""
-    return points[[3, 4, 5, 0, 1, 2]] * (-1.0, 1.0, 1.0)
 
 
 def test_missing_depth_is_what_the_truth_is_farther_away() -> None:
@@ -76,38 +71,6 @@ def test_bones_keep_their_lengths(state: np.ndarray, missing: list[float]) -> No
 
 
 @settings(max_examples=50, deadline=None)
-@given(STATES)
-def test_the_right_arm_is_seen_as_a_left_one(state: np.ndarray) -> None:
-    other = state[[0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]]
-    other = other * [-1, -1, 1, -1, *[1] * 10]
-    stddev = np.linspace(0.1, 0.2, 14)
-    points, iou = COST.keypoints(state), np.array([0.9])
-    features = features_of(state[None], stddev[None], points[None], iou)
-    there = features_of(
-        other[None],
-        stddev[None, [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]],
-        mirrored(points)[None],
-        iou,
-    )
-    assert np.allclose(features[0, ::-1], there[0])
-
-
-def test_the_network_averages_layers_with_rectified_inputs() -> None:
-    # Two networks of one input: max(0, 2 x) + 1 and max(0, -x) - 1, in units of 0.1 m.
-    network = Network(
-        np.array([1.0]),
-        np.array([2.0]),
-        3.0,
-        (np.array([[[2.0]], [[-1.0]]]), np.ones((2, 1, 3))),
-        (np.zeros((2, 1, 1)), np.array([[[1.0] * 3], [[-1.0] * 3]])),
-        np.array([0.1, 0.1, 0.2]),
-    )
-    # x = (5 - 1) / 2 = 2: (4 + 1 + 0 - 1) / 2 = 2; (-99 - 1) / 2 counts as -3: (0 + 1 + 3 - 1) / 2.
-    found = network(np.array([[5.0], [-99.0]]))
-    assert np.allclose(found, [[0.2, 0.2, 0.4], [0.15, 0.15, 0.3]])
-
-
-@settings(max_examples=50, deadline=None)
 @given(STATES, st.floats(0.0, 1.0))
 def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:
     found = DepthCorrection(COST, 1.0)(state, np.full(14, 0.2), iou)
@@ -124,8 +87,8 @@ def test_results_come_near_the_wanted_depth() -> None:
     # Where a joint is at its limit, such as a straight elbow, it cannot go on.
     state[[7, 11]] = 0.6
     points = COST.keypoints(state)
-    features = features_of(state[None], stddev[None], points[None], np.array([0.9]))
-    wanted = moved_in_depth(points[None], load_network()(features[0])[None])[0]
+    features = features_of(state[None], stddev[None], points[None], np.array([0.9]), 0.0)
+    wanted = moved_in_depth(points[None], load_network(DATA)(features[0])[None])[0]
     found = COST.keypoints(DepthCorrection(COST, 1.0)(state, stddev, 0.9))
     off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
     assert off < 0.5 * before

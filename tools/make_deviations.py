@@ -1,0 +1,145 @@
+"""Learn from recorded sessions with ground truth how large the errors of the angles are.
+
+python -m tools.make_deviations SESSION... --check SESSION... --output FILE [--jobs N]
+
+Each session is a folder with ``bag/`` and ``ground_truth.json``. It is initialized and tracked
+with the preset ``default`` and the deviations of the particles; the network learns the logarithm of
+the error of each angle (``cardbox_tracker/estimation/filtering/deviations.py``), so make the
+correction of depth first. Those after ``--check`` are not learned from: in how many images an error
+is within two deviations, mean and least over the angles, is printed for them, %, with the
+particles' deviations and with the learned ones. Needs scikit-learn: ``pip install '.[learn]'``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.filtering.deviations import TORSO, angles_from_arms
+from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.result_features import features_of
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.metrics import angle_errors_deg
+from cardbox_tracker.evaluation.recorded.angles import true_postures
+from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
+from tools import networks
+
+FloatArray = NDArray[np.float64]
+
+SHAPE = networks.Shape(layers=(48, 24), networks=4, epochs=10)
+# Added to an error before its logarithm is taken, rad: none is so exact.
+LEAST_RAD = 0.02
+# Two deviations shall hold so many of the errors.
+HELD = 0.95
+
+
+class Errors(NamedTuple):
+    """Images of a session: features (n, 2, F), errors and particles' deviations (n, 11), rad."""
+
+    features: FloatArray
+    errors_rad: FloatArray
+    stddevs_rad: FloatArray
+
+
+def errors_of(folder: Path, seed: int) -> Errors:
+    """Track a session; see :class:`Errors`."""
+    session, preset = load_session(folder), PRESETS["default"]()
+    config = replace(preset, whole_body=replace(preset.whole_body, learned_deviations=False))
+    pitch_rad = float(np.radians(session.truth.pitch_deg))
+    known = np.isfinite(session.torso_rad).all(axis=1)
+    known &= np.isfinite(session.keypoints_m).all(axis=(1, 2))
+    stamps_ns = session.stamps_ns[known].tolist()
+    wanted = dict(zip(stamps_ns, true_postures(session)[known], strict=True))
+    rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def keep(_: int, stamp_ns: int, estimate: Estimate, __: Tracker) -> None:
+        truth = wanted.get(stamp_ns)
+        if truth is None or estimate.posture is None:
+            return
+        parts = estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
+        offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
+        features = features_of(
+            np.concatenate([estimate.posture, offset])[None],
+            np.concatenate([stddev, offset_stddev])[None],
+            np.asarray(estimate.keypoints_m)[None],
+            np.array([estimate.iou or 0.0]),
+            pitch_rad,
+        )
+        error_deg = angle_errors_deg(estimate.posture[1:], truth[1:])
+        rows.append((features[0], np.radians(error_deg), stddev[1:]))
+
+    track_session(session, config, (seed,), observe=keep)
+    if not rows:
+        raise SystemExit(f"{folder}: nobody was tracked; leave the session out")
+    return Errors(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def learn(samples: Sequence[Errors], seed: int = 0) -> Network:
+    """Return the network that learned from these sessions."""
+    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
+    errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
+    unit = np.ones(errors.shape[1])
+    network = networks.learn(features, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
+    # From the mean logarithm to the deviation of which two hold enough: a factor for each angle.
+    ratios = errors / np.exp(network(features))
+    factors = np.quantile(ratios, HELD, axis=0) / 2.0
+    *biases, last = network.biases
+    return network._replace(biases=(*biases, last + np.log(factors)))
+
+
+def _beside_arms(angles: FloatArray) -> FloatArray:
+    """Return the angles (n, 11) as the network answers: torso and one arm, (2 n, 7)."""
+    middle = TORSO + (angles.shape[1] - TORSO) // 2
+    torso, left, right = np.split(angles, (TORSO, middle), axis=1)
+    arms = np.hstack([torso, left]), np.hstack([torso, right])
+    return np.stack(arms, axis=1).reshape(-1, middle)
+
+
+def check(network: Network, errors: Errors) -> tuple[float, float, float, float]:
+    """Return mean and least share of errors within two deviations, before and after, %."""
+    logarithms = network(errors.features.reshape(-1, errors.features.shape[2]))
+    shares: list[float] = []
+    for stddevs in (errors.stddevs_rad, angles_from_arms(np.exp(logarithms))):
+        within = 100.0 * (errors.errors_rad <= 2.0 * stddevs).mean(axis=0)
+        shares += [float(within.mean()), float(within.min())]
+    return shares[0], shares[1], shares[2], shares[3]
+
+
+def main(args: list[str] | None = None) -> int:
+    """Track, learn, check, write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(args)
+    with ProcessPoolExecutor(given.jobs) as pool:
+        of_session = partial(errors_of, seed=given.seed)
+        samples = list(pool.map(of_session, [*given.sessions, *given.check]))
+    learned = len(given.sessions)
+    network = learn(samples[:learned], given.seed)
+    for folder, one in zip(given.check, samples[learned:], strict=True):
+        print(folder.name, *(f"{value:.1f}" for value in check(network, one)))
+    images = sum(len(one.errors_rad) for one in samples[:learned])
+    about = f"{given.about} {images} images of {learned} sessions".strip()
+    networks.save(network, given.output, about)
+    print(f"written: {given.output}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
