@@ -11,12 +11,9 @@ them, cm. Needs scikit-learn: ``pip install '.[learn]'``.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,6 +35,7 @@ FloatArray = NDArray[np.float64]
 
 # What the answers are divided by, m: about their deviations.
 UNIT_M = np.array([0.06, 0.05, 0.12])
+SHARE = PRESETS["default"]().whole_body.depth_correction
 # An error beyond this is another posture, which no correction mends, m.
 MOST_M = 0.4
 SHAPE = networks.Shape(layers=(256, 64), networks=4, epochs=16)
@@ -95,7 +93,9 @@ def errors_cm(found_m: FloatArray, true_m: FloatArray) -> tuple[float, float]:
     return mean, without
 
 
-def check(network: Network, samples: Samples, share: float) -> tuple[float, float, float, float]:
+def check(
+    network: Network, samples: Samples, share: float = SHARE
+) -> tuple[float, float, float, float]:
     """Return :func:`errors_cm` without and with a share of the correction."""
     features = samples.features
     missing_m = share * network(features.reshape(-1, features.shape[2])).reshape(-1, 2, 3)
@@ -106,31 +106,7 @@ def check(network: Network, samples: Samples, share: float) -> tuple[float, floa
 
 def main(args: list[str] | None = None) -> int:
     """Track, learn, check, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
-    parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    given = parser.parse_args(args)
-    with ProcessPoolExecutor(given.jobs) as pool:
-        of_session = partial(samples_of, seed=given.seed)
-        samples = list(pool.map(of_session, [*given.sessions, *given.check]))
-    learned = len(given.sessions)
-    network = learn(samples[:learned], given.seed)
-    share = PRESETS["default"]().whole_body.depth_correction
-    rows = [check(network, one, share) for one in samples[learned:]]
-    for folder, row in zip(given.check, rows, strict=True):
-        print(folder.name, *(f"{value:.1f}" for value in row))
-    if rows:
-        print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
-    images = sum(len(one.true_m) for one in samples[:learned])
-    networks.save(
-        network, given.output, f"{given.about} {images} images of {learned} sessions".strip()
-    )
-    print(f"written: {given.output}")
-    return 0
+    return networks.run(args, __doc__, samples_of, learn, check)
 
 
 if __name__ == "__main__":

@@ -12,12 +12,9 @@ particles' deviations and with the learned ones. Needs scikit-learn: ``pip insta
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -119,26 +116,7 @@ def check(network: Network, errors: Errors) -> tuple[float, float, float, float]
 
 def main(args: list[str] | None = None) -> int:
     """Track, learn, check, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
-    parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    given = parser.parse_args(args)
-    with ProcessPoolExecutor(given.jobs) as pool:
-        of_session = partial(errors_of, seed=given.seed)
-        samples = list(pool.map(of_session, [*given.sessions, *given.check]))
-    learned = len(given.sessions)
-    network = learn(samples[:learned], given.seed)
-    for folder, one in zip(given.check, samples[learned:], strict=True):
-        print(folder.name, *(f"{value:.1f}" for value in check(network, one)))
-    images = sum(len(one.errors_rad) for one in samples[:learned])
-    about = f"{given.about} {images} images of {learned} sessions".strip()
-    networks.save(network, given.output, about)
-    print(f"written: {given.output}")
-    return 0
+    return networks.run(args, __doc__, errors_of, learn, check)
 
 
 if __name__ == "__main__":

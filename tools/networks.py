@@ -5,9 +5,14 @@ Needs scikit-learn: ``pip install '.[learn]'``.
 
 from __future__ import annotations
 
+import argparse
 import warnings
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +27,17 @@ MOST = 2.5
 # Deviation of the noise that each copy of a sample gets: neighbours shall have similar answers.
 NOISE, COPIES = 0.4, 3
 PENALTY, RATE, BATCH = 1.0, 1e-3, 256
+
+
+class Images(Protocol):
+    """What the tools keep of the images of a session."""
+
+    @property
+    def features(self) -> FloatArray:
+        """What the networks see, (n, 2, F)."""
+
+
+OfSession = TypeVar("OfSession", bound=Images)
 
 
 @dataclass(frozen=True)
@@ -98,3 +114,45 @@ def save(network: Network, path: Path, about: str) -> None:
     }
     with atomic_path(path) as temporary:
         np.savez_compressed(temporary, allow_pickle=False, **packed)
+
+
+def run(
+    args: Sequence[str] | None,
+    description: str | None,
+    track: Callable[..., OfSession],
+    learn_from: Callable[[Sequence[OfSession], int], Network],
+    check: Callable[[Network, OfSession], Sequence[float]],
+) -> int:
+    """Run one of the tools: track all sessions, learn from some, check the others, write.
+
+    Args:
+        args: of the command line; None: those of the process.
+        description: of the tool.
+        track: returns what is kept of a session's folder, with ``seed``; it runs in processes of
+            their own.
+        learn_from: returns the network, with a seed.
+        check: returns the figures of a session that was not learned from.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(args)
+    with ProcessPoolExecutor(given.jobs) as pool:
+        folders = [*given.sessions, *given.check]
+        sessions = list(pool.map(partial(track, seed=given.seed), folders))
+    learned, others = sessions[: len(given.sessions)], sessions[len(given.sessions) :]
+    network = learn_from(learned, given.seed)
+    rows = [check(network, one) for one in others]
+    for folder, row in zip(given.check, rows, strict=True):
+        print(folder.name, *(f"{value:.1f}" for value in row))
+    if rows:
+        print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
+    images = sum(len(one.features) for one in learned)
+    about = f"{given.about} {images} images of {len(learned)} sessions".strip()
+    save(network, given.output, about)
+    print(f"written: {given.output}")
+    return 0
