@@ -24,7 +24,6 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.depth_correction import missing_depth, moved_in_depth
 from cardbox_tracker.estimation.filtering.networks import Network
-from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import load_session
@@ -54,35 +53,27 @@ def samples_of(folder: Path, seed: int) -> Samples:
     session, preset = load_session(folder), PRESETS["default"]()
     config = replace(preset, whole_body=replace(preset.whole_body, depth_correction=0.0))
     wanted = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
-    rows: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]] = []
+    pitch_rad = float(np.radians(session.truth.pitch_deg))
+    rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
 
     def keep(_: int, stamp_ns: int, estimate: Estimate, __: Tracker) -> None:
         true_m = wanted.get(stamp_ns)
         if true_m is None or estimate.posture is None or not np.isfinite(true_m).all():
             return
-        parts = estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
-        offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
-        state = np.concatenate([estimate.posture, offset])
-        deviations = np.concatenate([stddev, offset_stddev])
-        keypoints_m = np.asarray(estimate.keypoints_m)
-        rows.append((state, deviations, keypoints_m, true_m, float(estimate.iou or 0.0)))
+        features = networks.features_of_estimate(estimate, pitch_rad)
+        rows.append((features, np.asarray(estimate.keypoints_m), true_m))
 
     track_session(session, config, (seed,), observe=keep)
     if not rows:
         raise SystemExit(f"{folder}: nobody was tracked; leave the session out")
-    states, stddevs, found_m, true_m, ious = (
-        np.array(column) for column in zip(*rows, strict=True)
-    )
-    pitch_rad = float(np.radians(session.truth.pitch_deg))
-    return Samples(features_of(states, stddevs, found_m, ious, pitch_rad), found_m, true_m)
+    return Samples(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def learn(samples: Sequence[Samples], seed: int = 0) -> Network:
     """Return the network that learned from these sessions."""
-    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
     answers = [missing_depth(one.found_m, one.true_m).reshape(-1, 3) for one in samples]
     missing_m = np.clip(np.concatenate(answers), -MOST_M, MOST_M)
-    return networks.learn(features, missing_m, UNIT_M, SHAPE, seed)
+    return networks.learn(samples, missing_m, UNIT_M, SHAPE, seed)
 
 
 def errors_cm(found_m: FloatArray, true_m: FloatArray) -> tuple[float, float]:

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering.deviations import TORSO, angles_from_arms
+from cardbox_tracker.estimation.filtering.deviations import TORSO, deviations_of
 from cardbox_tracker.estimation.filtering.networks import Network
-from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import angle_errors_deg
 from cardbox_tracker.evaluation.recorded.angles import true_postures
@@ -65,17 +64,9 @@ def errors_of(folder: Path, seed: int) -> Errors:
         truth = wanted.get(stamp_ns)
         if truth is None or estimate.posture is None:
             return
-        parts = estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
-        offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
-        features = features_of(
-            np.concatenate([estimate.posture, offset])[None],
-            np.concatenate([stddev, offset_stddev])[None],
-            np.asarray(estimate.keypoints_m)[None],
-            np.array([estimate.iou or 0.0]),
-            pitch_rad,
-        )
-        error_deg = angle_errors_deg(estimate.posture[1:], truth[1:])
-        rows.append((features[0], np.radians(error_deg), stddev[1:]))
+        error_rad = np.radians(angle_errors_deg(estimate.posture[1:], truth[1:]))
+        stddev = np.asarray(estimate.posture_stddev)[1:]
+        rows.append((networks.features_of_estimate(estimate, pitch_rad), error_rad, stddev))
 
     track_session(session, config, (seed,), observe=keep)
     if not rows:
@@ -85,12 +76,12 @@ def errors_of(folder: Path, seed: int) -> Errors:
 
 def learn(samples: Sequence[Errors], seed: int = 0) -> Network:
     """Return the network that learned from these sessions."""
-    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
     errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
     unit = np.ones(errors.shape[1])
-    network = networks.learn(features, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
+    network = networks.learn(samples, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
     # From the mean logarithm to the deviation of which two hold enough: a factor for each angle.
-    ratios = errors / np.exp(network(features))
+    answers = [network(one.features.reshape(-1, one.features.shape[2])) for one in samples]
+    ratios = errors / np.exp(np.concatenate(answers))
     factors = np.quantile(ratios, HELD, axis=0) / 2.0
     *biases, last = network.biases
     return network._replace(biases=(*biases, last + np.log(factors)))
@@ -106,9 +97,8 @@ def _beside_arms(angles: FloatArray) -> FloatArray:
 
 def check(network: Network, errors: Errors) -> tuple[float, float, float, float]:
     """Return mean and least share of errors within two deviations, before and after, %."""
-    logarithms = network(errors.features.reshape(-1, errors.features.shape[2]))
     shares: list[float] = []
-    for stddevs in (errors.stddevs_rad, angles_from_arms(np.exp(logarithms))):
+    for stddevs in (errors.stddevs_rad, deviations_of(network, errors.features)):
         within = 100.0 * (errors.errors_rad <= 2.0 * stddevs).mean(axis=0)
         shares += [float(within.mean()), float(within.min())]
     return shares[0], shares[1], shares[2], shares[3]

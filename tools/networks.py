@@ -17,7 +17,9 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.files import atomic_path
 
 FloatArray = NDArray[np.float64]
@@ -55,14 +57,32 @@ class Shape:
     epochs: int
 
 
+def features_of_estimate(estimate: Estimate, pitch_rad: float) -> FloatArray:
+    """Return what the networks see of an estimate with a posture, (2, F)."""
+    parts = estimate.posture, estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
+    posture, offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
+    features: FloatArray = features_of(
+        np.concatenate([posture, offset])[None],
+        np.concatenate([stddev, offset_stddev])[None],
+        np.asarray(estimate.keypoints_m)[None],
+        np.array([estimate.iou or 0.0]),
+        pitch_rad,
+    )[0]
+    return features
+
+
 def learn(
-    features: FloatArray, answers: FloatArray, unit: FloatArray, shape: Shape, seed: int = 0
+    sessions: Sequence[Images],
+    answers: FloatArray,
+    unit: FloatArray,
+    shape: Shape,
+    seed: int = 0,
 ) -> Network:
-    """Return the network that gives the answers (n, A) to the features (n, F).
+    """Return the network that gives the answers (2 n, A) to the n images of the sessions.
 
     Args:
-        features: (n, F).
-        answers: (n, A).
+        sessions: one after the other.
+        answers: of the left arm, then of the right one, of each image, (2 n, A).
         unit: what the answers are divided by, (A,): about their deviations.
         shape: of the network.
         seed: of the noise and of the first weights.
@@ -71,6 +91,7 @@ def learn(
     from sklearn.neural_network import MLPRegressor
 
     warnings.simplefilter("ignore", ConvergenceWarning)
+    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
     mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
     scaled = np.clip((features - mean) / scale, -MOST, MOST)
     rng = np.random.default_rng(seed)

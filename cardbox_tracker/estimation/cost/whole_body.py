@@ -237,6 +237,12 @@ class WholeBodyCost:
         return self.parts, self._drawn, self.girdle, self.place, self.view
 
 
+def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
+    """Return the intersection over union of silhouette and model, of which some pixels differ."""
+    twice_either = float(silhouette_px + model_px + differing_px)
+    return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0
+
+
 def _drawn_parts(parts: FloatArray, config: WholeBodyCostConfig) -> FloatArray:
     """Return the parts (6, 6) whose outlines are drawn."""
     drawn = parts.copy()

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.filtering.networks import load_network
+from cardbox_tracker.estimation.filtering.networks import Network
 
 DATA = "deviations.npz"
 """Name of the network's data file."""
@@ -23,18 +23,15 @@ TORSO = 3
 _LIMITS_RAD = (0.01, 1.5)
 
 
-def deviations_of(features: FloatArray) -> FloatArray:
+def deviations_of(network: Network, features: FloatArray) -> FloatArray:
     """Return the deviations of the 11 angles of ``JOINT_NAMES[1:]``, (n, 11), rad.
 
     Args:
+        network: of the data file.
         features: (n, 2, F), see :func:`~.result_features.features_of`.
     """
-    logarithms = load_network(DATA)(features.reshape(-1, features.shape[2]))
-    return angles_from_arms(np.clip(np.exp(logarithms), *_LIMITS_RAD))
-
-
-def angles_from_arms(values: FloatArray) -> FloatArray:
-    """Return values of the 11 angles, (n, 11), from those beside each arm, (2 n, 7)."""
-    both = values.reshape(-1, 2, values.shape[1])
+    logarithms = network(features.reshape(-1, features.shape[2]))
+    stddevs = np.clip(np.exp(logarithms), *_LIMITS_RAD)
+    both = stddevs.reshape(-1, 2, stddevs.shape[1])
     torso = both[:, :, :TORSO].mean(axis=1)
     return np.hstack([torso, both[:, 0, TORSO:], both[:, 1, TORSO:]])

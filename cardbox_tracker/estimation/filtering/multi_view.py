@@ -21,12 +21,13 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.cost.whole_body import iou_of
 from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
-from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
+from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
 # States of a round of all joints, times those of one camera; the fraction that moves by

@@ -15,10 +15,11 @@ import numpy as np
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_correction import DepthCorrection
-from cardbox_tracker.estimation.filtering.deviations import deviations_of
+from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
+from cardbox_tracker.estimation.filtering.networks import load_network
 from cardbox_tracker.estimation.filtering.outline_fit import KEPT, OutlineFit
 from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.estimation.filtering.smoothing import Smoothed
@@ -52,7 +53,8 @@ class Refinement:
         # Further cameras and depth images show depth.
         is_corrected = config.depth_correction > 0.0 and not others
         self._depth = DepthCorrection(cost, config.depth_correction) if is_corrected else None
-        self._is_learned = is_corrected and config.learned_deviations
+        is_learned = is_corrected and config.learned_deviations
+        self._deviations = load_network(DATA) if is_learned else None
         self._again = Smoothed(KEPT)
 
     def forget(self) -> None:
@@ -100,15 +102,10 @@ class Refinement:
             keypoints_m: of the state, (6, 3), metres in the optical frame.
             iou: of model and silhouette.
         """
-        if not self._is_learned or frame.depth_m is not None:
+        if self._deviations is None or frame.depth_m is not None:
             return stddev
         row = state[None], stddev[None], keypoints_m[None], np.array([iou])
         learned = stddev.copy()
-        learned[_ANGLES] = deviations_of(features_of(*row, self._cost.pitch_rad))[0]
+        features = features_of(*row, self._cost.pitch_rad)
+        learned[_ANGLES] = deviations_of(self._deviations, features)[0]
         return learned
-
-
-def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
-    """Return the intersection over union of silhouette and model, of which some pixels differ."""
-    twice_either = float(silhouette_px + model_px + differing_px)
-    return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0

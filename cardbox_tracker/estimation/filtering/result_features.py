@@ -9,18 +9,17 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, YAW
 
-_STATE = 14
 _OTHER_ARM = np.array([0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13])
 _MIRROR = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * 10])
 _OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
-_YAW = 3
 # Of each bone of both arms: where it begins and ends among the keypoints.
 _BEGIN, _END = np.array([0, 1, 3, 4]), np.array([1, 2, 4, 5])
 _HAND = 2
 # Directions of four bones and the hand's place, each with its squares; how far aside the hand is;
 # the state, its deviations, IoU, size of the yaw and the camera's pitch.
-FEATURES = 2 * 12 + 2 * 3 + 1 + 2 * _STATE + 3
+FEATURES = 2 * 12 + 2 * 3 + 1 + 2 * N_STATE + 3
 
 
 def features_of(
@@ -69,12 +68,12 @@ def _fill(
                 row[24 + axis] = sideways * value if axis == 0 else value
                 row[27 + axis] = value * value
             row[30] = abs(row[24])
-            for i in range(_STATE):
+            for i in range(N_STATE):
                 if arm:
                     row[31 + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
-                    row[31 + _STATE + i] = stddevs[n, _OTHER_ARM[i]]
+                    row[31 + N_STATE + i] = stddevs[n, _OTHER_ARM[i]]
                 else:
-                    row[31 + i], row[31 + _STATE + i] = states[n, i], stddevs[n, i]
-            row[31 + 2 * _STATE] = ious[n]
-            row[32 + 2 * _STATE] = abs(states[n, _YAW])
-            row[33 + 2 * _STATE] = pitch_rad
+                    row[31 + i], row[31 + N_STATE + i] = states[n, i], stddevs[n, i]
+            row[31 + 2 * N_STATE] = ious[n]
+            row[32 + 2 * N_STATE] = abs(states[n, YAW])
+            row[33 + 2 * N_STATE] = pitch_rad

@@ -18,7 +18,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     ARM_ANGLES,
     N_STATE,
@@ -37,7 +37,7 @@ from cardbox_tracker.estimation.filtering.loss import (
 )
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
-from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
+from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 _HOME_LIMIT_M = 0.7

@@ -25,7 +25,7 @@ from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.filtering.pose_filter import Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.initialization.outline import filled
@@ -159,8 +159,7 @@ class _Search:
         postures, _ = self._postures(body)
         cost = self._cost(body, postures)
         _, costs_px, areas_px = cost.bodies(postures)
-        common = 0.5 * (cost.silhouette_px + areas_px[0] - costs_px[0])
-        iou = float(common / (cost.silhouette_px + areas_px[0] - common))
+        iou = iou_of(cost.silhouette_px, areas_px[0], costs_px[0])
         x_m, z_m = postures[0, 12:].tolist()
         place, unknown = body.placement, body.unknown
         body = body.with_values(

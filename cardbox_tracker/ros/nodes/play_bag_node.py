@@ -149,9 +149,9 @@ class PlayBagNode(CardboxNode):
         cameras start one after the other: while images of one have no subscriber it waits longer.
         """
         subscribers, since_s = list[int](), time.monotonic()
-        long_s = max(delay_s, _OTHER_CAMERAS_S if self.parameters.value.wait_for_subscribers else 0)
+        others_s = _OTHER_CAMERAS_S if delay_s and self.parameters.value.wait_for_subscribers else 0
         while True:
-            patience_s = delay_s if not delay_s or self._is_watched(all) else long_s
+            patience_s = delay_s if self._is_watched(all) else max(delay_s, others_s)
             if (left_s := since_s + patience_s - time.monotonic()) <= 0:
                 return
             self._executor.spin_once(timeout_sec=min(left_s, 0.1))

@@ -17,7 +17,7 @@ from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.pose_prior import ArmPrior
 from cardbox_tracker.estimation.cost.prior import RestPrior
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, fill_convex, snap
@@ -274,3 +274,9 @@ def test_the_front_reference_has_the_pixels_of_the_front() -> None:
     one = np.append(reference_posture("front"), [0.0, 0.0])
     of.see(np.zeros((120, 160), np.uint8), one)
     assert of.frontal_px == np.count_nonzero(drawn(of, one))
+
+
+def test_intersection_over_union() -> None:
+    # 30 pixels seen, 20 drawn, 10 of them in both: 30 differ, 40 are in either.
+    assert iou_of(30.0, 20.0, 30.0) == 0.25
+    assert iou_of(0.0, 0.0, 0.0) == 0.0

@@ -11,12 +11,14 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.filtering.deviations import angles_from_arms, deviations_of
+from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
+from cardbox_tracker.estimation.filtering.networks import Network, load_network
 from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
+UNIT = np.ones(7)
 STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
     lambda shares: STATE_LIMITS[:, 0] + np.array(shares) * np.ptp(STATE_LIMITS, axis=1)
 )
@@ -25,13 +27,15 @@ STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
 def deviations(state: np.ndarray, spread: float, iou: float = 0.9) -> np.ndarray:
     points = COST.keypoints(state)[None]
     row = state[None], np.full((1, 14), spread), points, np.array([iou])
-    return deviations_of(features_of(*row, 0.0))[0]
+    return deviations_of(load_network(DATA), features_of(*row, 0.0))[0]
 
 
 def test_the_torso_is_the_mean_of_what_is_said_beside_either_arm() -> None:
-    left, right = [1.0, 2.0, 3.0, 4, 5, 6, 7], [3.0, 2.0, 1.0, 14, 15, 16, 17]
-    found = angles_from_arms(np.array([left, right]))
-    assert np.array_equal(found, [[2, 2, 2, 4, 5, 6, 7, 14, 15, 16, 17]])
+    left, right = np.array([[1.0, 2, 3, 4, 5, 6, 7], [3.0, 2, 1, 14, 15, 16, 17]]) / 20
+    # A network that passes its seven features on.
+    same = Network(np.zeros(7), np.ones(7), 9.0, (np.eye(7)[None],), (np.zeros((1, 1, 7)),), UNIT)
+    found = deviations_of(same, np.log([[left, right]]))
+    assert np.allclose(20 * found, [[2, 2, 2, 4, 5, 6, 7, 14, 15, 16, 17]])
 
 
 @settings(max_examples=50, deadline=None)

@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
-from cardbox_tracker.estimation.filtering.refinement import Refinement, iou_of
+from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -68,9 +68,3 @@ def test_with_further_cameras_the_result_is_only_fitted() -> None:
     refine = Refinement(COST, CAMERA, CONFIG, others)
     refine.outline.seeing = (0,)
     assert np.array_equal(refine(seen(), STATE, STDDEV)[1], expected)
-
-
-def test_intersection_over_union() -> None:
-    # 30 pixels seen, 20 drawn, 10 of them in both: 30 differ, 40 are in either.
-    assert iou_of(30.0, 20.0, 30.0) == 0.25
-    assert iou_of(0.0, 0.0, 0.0) == 0.0
