@@ -10,8 +10,8 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # On a ROS installation these come with it, so pip installs them only when asked to.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
-# Learns the correction of depth anew.
-LEARN = ["scikit-learn>=1.4,<2"]
+# Learns the package's networks anew. 3 GB, so only for those who do.
+LEARN = ["torch>=2.2,<3"]
 TEST = [
     "catkin_pkg>=1.0",
     "hypothesis>=6.100",
@@ -22,7 +22,6 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
-    *LEARN,
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",

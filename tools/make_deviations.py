@@ -1,13 +1,15 @@
 """Learn from recorded sessions with ground truth how large the errors of the angles are.
 
-python -m tools.make_deviations SESSION... --check SESSION... --output FILE [--jobs N]
+python -m tools.make_deviations SESSION... --fresh SESSION... --check SESSION... --output FILE
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is initialized and tracked
 with the preset ``default`` and the deviations of the particles; the network learns the logarithm of
 the error of each angle (``cardbox_tracker/estimation/filtering/deviations.py``), so make the
-correction of depth first. Those after ``--check`` are not learned from: in how many images an error
+correction first (``tools/make_correction.py``). Its errors are smaller in sessions that it has
+learned from, so how large deviations are in the end is taken from those after ``--fresh``, which it
+must not have learned from. Those after ``--check`` are only judged: in how many images an error
 is within two deviations, mean and least over the angles, is printed for them, %, with the
-particles' deviations and with the learned ones. Needs scikit-learn: ``pip install '.[learn]'``.
+particles' deviations and with the learned ones. Needs PyTorch: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from tools import networks
 
 FloatArray = NDArray[np.float64]
 
-SHAPE = networks.Shape(layers=(48, 24), networks=4, epochs=10)
+SHAPE = networks.Shape(layers=(48, 24), networks=4, epochs=30)
 # Added to an error before its logarithm is taken, rad: none is so exact.
 LEAST_RAD = 0.02
 # Two deviations shall hold so many of the errors.
@@ -75,14 +77,17 @@ def errors_of(folder: Path, seed: int) -> Errors:
 
 
 def learn(samples: Sequence[Errors], seed: int = 0) -> Network:
-    """Return the network that learned from these sessions."""
+    """Return the network that learned the logarithms of the errors of these sessions."""
     errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
     unit = np.ones(errors.shape[1])
-    network = networks.learn(samples, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
-    # From the mean logarithm to the deviation of which two hold enough: a factor for each angle.
+    return networks.learn(samples, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
+
+
+def scaled(network: Network, samples: Sequence[Errors]) -> Network:
+    """Return the network with a factor for each angle, so that two deviations hold enough."""
+    errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
     answers = [network(one.features.reshape(-1, one.features.shape[2])) for one in samples]
-    ratios = errors / np.exp(np.concatenate(answers))
-    factors = np.quantile(ratios, HELD, axis=0) / 2.0
+    factors = np.quantile(errors / np.exp(np.concatenate(answers)), HELD, axis=0) / 2.0
     *biases, last = network.biases
     return network._replace(biases=(*biases, last + np.log(factors)))
 
@@ -106,7 +111,7 @@ def check(network: Network, errors: Errors) -> tuple[float, float, float, float]
 
 def main(args: list[str] | None = None) -> int:
     """Track, learn, check, write."""
-    return networks.run(args, __doc__, errors_of, learn, check)
+    return networks.run(args, __doc__, errors_of, learn, check, scaled)
 
 
 if __name__ == "__main__":

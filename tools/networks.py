@@ -1,24 +1,24 @@
 """Learn the small networks of the package, and write them.
 
-Needs scikit-learn: ``pip install '.[learn]'``.
+Needs PyTorch: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
 
 import argparse
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.networks import Network, RecurrentNetwork
 from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.files import atomic_path
 
@@ -26,9 +26,9 @@ FloatArray = NDArray[np.float64]
 
 # Scaled features farther from the mean than this count as this.
 MOST = 2.5
-# Deviation of the noise that each copy of a sample gets: neighbours shall have similar answers.
-NOISE, COPIES = 0.4, 3
-PENALTY, RATE, BATCH = 1.0, 1e-3, 256
+# Deviation of what is added to the features: neighbours shall have similar answers.
+NOISE = 0.4
+RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
 
 class Images(Protocol):
@@ -40,6 +40,7 @@ class Images(Protocol):
 
 
 OfSession = TypeVar("OfSession", bound=Images)
+AnyNetwork = TypeVar("AnyNetwork", Network, RecurrentNetwork)
 
 
 @dataclass(frozen=True)
@@ -87,39 +88,56 @@ def learn(
         shape: of the network.
         seed: of the noise and of the first weights.
     """
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.neural_network import MLPRegressor
-
-    warnings.simplefilter("ignore", ConvergenceWarning)
     features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
     mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
     scaled = np.clip((features - mean) / scale, -MOST, MOST)
-    rng = np.random.default_rng(seed)
-    noisy = [scaled + NOISE * rng.standard_normal(scaled.shape) for _ in range(COPIES)]
-    networks = [
-        MLPRegressor(
-            hidden_layer_sizes=shape.layers,
-            alpha=PENALTY,
-            learning_rate_init=RATE,
-            max_iter=shape.epochs,
-            batch_size=BATCH,
-            random_state=seed + number,
-        ).fit(np.concatenate(noisy), np.concatenate([answers / unit] * COPIES))
-        for number in range(shape.networks)
-    ]
-    layers = range(len(shape.layers) + 1)
+    layers = [_learned(scaled, answers / unit, shape, seed + i) for i in range(shape.networks)]
+    weights, biases = zip(*(zip(*one, strict=True) for one in layers), strict=True)
     return Network(
         mean,
         scale,
         MOST,
-        tuple(np.stack([one.coefs_[i] for one in networks]) for i in layers),
-        tuple(np.stack([one.intercepts_[i][None] for one in networks]) for i in layers),
+        tuple(np.stack(of_layer) for of_layer in zip(*weights, strict=True)),
+        tuple(np.stack(of_layer) for of_layer in zip(*biases, strict=True)),
         unit,
     )
 
 
-def save(network: Network, path: Path, about: str) -> None:
-    """Write a network as :func:`~.networks.read_network` reads it."""
+def _learned(
+    features: FloatArray, answers: FloatArray, shape: Shape, seed: int
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return weights (inputs, outputs) and biases (1, outputs) of each layer of one network."""
+    import torch
+    from torch import nn
+
+    torch.manual_seed(seed)
+    nodes = (features.shape[1], *shape.layers, answers.shape[1])
+    linear = [nn.Linear(*pair) for pair in pairwise(nodes)]
+    between = [part for layer in linear for part in (layer, nn.ReLU())][:-1]
+    network = nn.Sequential(*between)
+    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+    known, wanted = (torch.tensor(a, dtype=torch.float32) for a in (features, answers))
+    for _ in range(shape.epochs):
+        for chosen in torch.randperm(len(known)).split(BATCH):
+            noisy = known[chosen] + NOISE * torch.randn(len(chosen), known.shape[1])
+            loss = (network(noisy) - wanted[chosen]).square().mean()
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+    return [numbers_of(layer.weight, layer.bias) for layer in linear]
+
+
+def numbers_of(weight: Any, bias: Any) -> tuple[FloatArray, FloatArray]:
+    """Return PyTorch's weights of a layer, (outputs, inputs), and biases as the networks do."""
+    return weight.detach().numpy().T, bias.detach().numpy()[None]
+
+
+def save(network: Network | RecurrentNetwork, path: Path, about: str) -> None:
+    """Write a network as the functions of :mod:`~.networks` read it."""
+    if isinstance(network, Network):
+        layers = list(zip(network.weights, network.biases, strict=True))
+    else:
+        layers = [network.enter, network.receive, network.keep, *network.leave]
     arrays = {
         "about": np.array(about),
         "mean": network.mean,
@@ -127,7 +145,7 @@ def save(network: Network, path: Path, about: str) -> None:
         "most": np.array(network.most),
         "unit": network.unit,
     }
-    for i, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
+    for i, (weights, biases) in enumerate(layers):
         arrays[f"weights{i}"], arrays[f"biases{i}"] = weights, biases
     packed = {
         name: array.astype(np.float32) if array.dtype.kind == "f" else array
@@ -141,8 +159,9 @@ def run(
     args: Sequence[str] | None,
     description: str | None,
     track: Callable[..., OfSession],
-    learn_from: Callable[[Sequence[OfSession], int], Network],
-    check: Callable[[Network, OfSession], Sequence[float]],
+    learn_from: Callable[[Sequence[OfSession], int], AnyNetwork],
+    check: Callable[[AnyNetwork, OfSession], Sequence[float]],
+    adjust: Callable[[AnyNetwork, Sequence[OfSession]], AnyNetwork] | None = None,
 ) -> int:
     """Run one of the tools: track all sessions, learn from some, check the others, write.
 
@@ -151,29 +170,38 @@ def run(
         description: of the tool.
         track: returns what is kept of a session's folder, with ``seed``; it runs in processes of
             their own.
-        learn_from: returns the network, with a seed.
+        learn_from: returns the network, with the seed of the learning.
         check: returns the figures of a session that was not learned from.
+        adjust: returns the network as it shall be, given the sessions after ``--fresh``.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
     parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
+    if adjust is not None:
+        parser.add_argument("--fresh", nargs="+", type=Path, required=True, metavar="SESSION")
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of the learning")
+    parser.add_argument("--seeds", type=int, default=1, help="that each session is tracked with")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:
-        folders = [*given.sessions, *given.check]
-        sessions = list(pool.map(partial(track, seed=given.seed), folders))
-    learned, others = sessions[: len(given.sessions)], sessions[len(given.sessions) :]
+        learned: list[OfSession] = []
+        for seed in range(given.seeds):
+            learned += pool.map(partial(track, seed=seed), given.sessions)
+        fresh = list(pool.map(partial(track, seed=0), given.fresh)) if adjust else []
+        others = list(pool.map(partial(track, seed=0), given.check))
     network = learn_from(learned, given.seed)
+    if adjust is not None:
+        network = adjust(network, fresh)
     rows = [check(network, one) for one in others]
     for folder, row in zip(given.check, rows, strict=True):
         print(folder.name, *(f"{value:.1f}" for value in row))
     if rows:
         print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
     images = sum(len(one.features) for one in learned)
-    about = f"{given.about} {images} images of {len(learned)} sessions".strip()
+    what = f"{images} images of {len(given.sessions)} sessions, {given.seeds} seeds"
+    about = f"{given.about} {what}".strip()
     save(network, given.output, about)
     print(f"written: {given.output}")
     return 0

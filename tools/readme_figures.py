@@ -82,11 +82,10 @@ def sessions_section(results: Mapping[str, Any]) -> str:
     lines = [
         *_wrapped(
             f"Preset `default` on {len(sessions)} recordings, {len(results['seeds'])} seeds. "
-            "Bodies and rooms are rendered, so this is not film of people (and the correction "
-            "of depth and the deviations were learned from others of the same renderer); in "
-            "sessions named `cmu` the motions are motion capture. Aligned: after both skeletons "
-            "are shifted to the middle of their shoulders, for MediaPipe Pose (full) has no metric "
-            "place:"
+            "Bodies and rooms are rendered, so this is not film of people (and what corrects the "
+            "results was learned from others of the same renderer); in sessions named `cmu` the "
+            "motions are motion capture. Aligned: after both skeletons are shifted to the middle "
+            "of their shoulders, for MediaPipe Pose (full) has no metric place:"
         ),
         "",
         "| session | aligned error | MediaPipe Pose | absolute error | images without estimate |",

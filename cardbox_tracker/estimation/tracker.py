@@ -27,7 +27,7 @@ from cardbox_tracker.estimation.estimate import (
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, Sight
+from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Sight
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.further_camera import FurtherCamera
@@ -152,6 +152,11 @@ class Tracker:
         else:
             self._filter.configure(config)
         return is_new_start
+
+    @property
+    def filter(self) -> PoseFilter:
+        """What searches the postures; for tools that want to know more than the estimate."""
+        return self._filter
 
     @property
     def views(self) -> tuple[View, ...]:

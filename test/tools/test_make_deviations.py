@@ -22,9 +22,9 @@ def session(seed: int, images: int = 2000) -> tool.Errors:
 
 
 def test_the_size_of_errors_is_learned(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("sklearn", reason="scikit-learn is not installed")
-    monkeypatch.setattr(tool, "SHAPE", networks.Shape((16,), 2, 20))
-    network = tool.learn([session(0), session(1)])
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.setattr(tool, "SHAPE", networks.Shape((16,), 2, 60))
+    network = tool.scaled(tool.learn([session(0), session(1)]), [session(3)])
     other = session(2)
     before, _, after, least = tool.check(network, other)
     # Two deviations of a normal distribution hold 95.4 %.

@@ -1,7 +1,7 @@
 """Learned standard deviations: how wrong results like this one are.
 
 The spread of the particles says how well other postures would fit, not how wrong the model, the
-silhouette and the correction of depth are. A small neural network has learned from rendered
+silhouette and the correction of the result are. A small neural network has learned from rendered
 recordings with ground truth how large the errors of the angles are on average, given the posture
 found, the spread and the fit (``tools/make_deviations.py``; the data file names the recordings).
 It answers with logarithms, of which the exponentials are deviations: 2 of them hold 95 % of the

@@ -45,9 +45,9 @@ class Evidence(NamedTuple):
 
 _INTERCEPT = -3.936
 # What each adds to the logit; between these the area and the prior count.
-_AREA_LIMITS = (0.1, 3.0)
+AREA_LIMITS = (0.1, 3.0)
 _PRIOR_LIMITS = (-0.2, 0.3)
-_FRESH_FRAMES = 15.0
+FRESH_FRAMES = 15.0
 # Share of the chance before in the one that is judged.
 _MEMORY = 0.5
 
@@ -111,7 +111,7 @@ def evidence_of(
 
 def chance_of_loss(evidence: Evidence) -> float:
     """Return the chance, 0 to 1, that the keypoints are wrong by more than 30 cm on average."""
-    log_area = log(min(max(evidence.area, _AREA_LIMITS[0]), _AREA_LIMITS[1]))
+    log_area = log(min(max(evidence.area, AREA_LIMITS[0]), AREA_LIMITS[1]))
     logit = (
         _INTERCEPT
         + 2.574 * evidence.residual
@@ -124,7 +124,7 @@ def chance_of_loss(evidence: Evidence) -> float:
         + 49.456 * float(evidence.stddev[TORSO_X])
         + 2.136 * abs(float(evidence.mean[YAW]))
         - 0.205 * abs(float(evidence.mean[PITCH]))
-        + 0.323 * exp(-evidence.age / _FRESH_FRAMES)
+        + 0.323 * exp(-evidence.age / FRESH_FRAMES)
     )
     return 1.0 / (1.0 + exp(-logit))
 

@@ -82,7 +82,7 @@ class MultiViewFilter(WholeBodyFilter):
         )
         self._cost = self._views
         others = list(zip(self._views.costs[1:], views, strict=True))
-        self._refine = Refinement(self._one, silhouette.camera, config.whole_body, others)
+        self.refine = Refinement(self._one, silhouette.camera, config.whole_body, others)
 
     def look(self, frame: Frame) -> Sight:
         """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
@@ -104,7 +104,7 @@ class MultiViewFilter(WholeBodyFilter):
 
     def _observe(self, terms: Sequence[Term]) -> None:
         views, before = self._views, self._survivors[0]
-        self._refine.outline.seeing = tuple(self._seeing)
+        self.refine.outline.seeing = tuple(self._seeing)
         self._cross(before)
         self._step_m = 0.0
         if 0 in self._seeing:
@@ -175,7 +175,7 @@ class MultiViewFilter(WholeBodyFilter):
         cost = self._cost
         kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
         fitted = np.array(
-            [self._refine.outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
+            [self.refine.outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
         )
         fitted = np.clip(fitted, *STATE_LIMITS.T)
         states = np.concatenate([states, fitted])

@@ -1,9 +1,8 @@
 """What is done to the result of the whole-body filter; its particles know nothing of it.
 
 1. It is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
-2. With one camera its depth is corrected (:mod:`.depth_correction`).
-3. What that moved in the image is fitted to the outline again.
-4. How wrong it may be is estimated for such results (:mod:`.deviations`).
+2. With one camera it is corrected by what was learned (:mod:`.correction`).
+3. How wrong it may be is estimated for such results (:mod:`.deviations`).
 """
 
 from __future__ import annotations
@@ -16,18 +15,15 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.filtering.depth_correction import DepthCorrection
+from cardbox_tracker.estimation.filtering.correction import Correction
 from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
 from cardbox_tracker.estimation.filtering.networks import load_network
-from cardbox_tracker.estimation.filtering.outline_fit import KEPT, OutlineFit
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.result_features import features_of
-from cardbox_tracker.estimation.filtering.smoothing import Smoothed
+from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
 
-# Gauss-Newton steps after the correction. Two are no better.
-_STEPS_AGAIN = 1
 # The angles among the values of a state.
 _ANGLES = slice(1, 12)
 
@@ -37,6 +33,7 @@ class Refinement:
 
     Attributes:
         outline: the fit to the outlines.
+        correction: what was learned; None with several cameras, or if it is switched off.
     """
 
     def __init__(
@@ -48,24 +45,22 @@ class Refinement:
     ) -> None:
         """Prepare for the body of ``cost`` before ``camera`` and ``others``."""
         self._cost = cost
-        self._steps_again = min(config.outline_steps, _STEPS_AGAIN)
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
         # Further cameras and depth images show depth.
-        is_corrected = config.depth_correction > 0.0 and not others
-        self._depth = DepthCorrection(cost, config.depth_correction) if is_corrected else None
+        is_corrected = config.learned_correction and not others
+        self.correction = Correction(cost) if is_corrected else None
         is_learned = is_corrected and config.learned_deviations
         self._deviations = load_network(DATA) if is_learned else None
-        self._again = Smoothed(KEPT)
 
     def forget(self) -> None:
-        """Begin anew: the next state is of somebody else, or of another place."""
+        """Begin anew with the outline: the next state may be of another place.
+
+        What was learned goes on: it has learned from people who leave and come back.
+        """
         self.outline.forget()
-        if self._depth is not None:
-            self._depth.forget()
-        self._again.forget()
 
     def __call__(
-        self, frame: Frame, state: FloatArray, stddev: FloatArray
+        self, frame: Frame, state: FloatArray, stddev: FloatArray, search: Search
     ) -> tuple[FloatArray, FloatArray]:
         """Return ``state`` (14,) fitted to the outlines, (14,), and the result, (14,).
 
@@ -73,15 +68,14 @@ class Refinement:
             frame: what is seen.
             state: to begin with, (14,).
             stddev: its deviations, (14,).
+            search: that has found it.
         """
         fitted = self.outline(frame, state)
-        if self._depth is None or frame.depth_m is not None:
+        if self.correction is None or frame.depth_m is not None:
             return fitted, fitted
         _, costs_px, areas_px = self._cost.bodies(fitted[None])
         iou = iou_of(self._cost.silhouette_px, areas_px[0], costs_px[0])
-        corrected = self._depth(fitted, stddev, iou)
-        again = self.outline.fitted(frame, corrected, self._steps_again) - corrected
-        return fitted, np.clip(corrected + self._again(again), *STATE_LIMITS.T)
+        return fitted, self.correction(fitted, stddev, iou, search)
 
     def deviations(
         self,

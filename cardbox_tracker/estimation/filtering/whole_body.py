@@ -26,18 +26,14 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     TORSO_X,
     TORSO_Z,
 )
+from cardbox_tracker.estimation.filtering import loss
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
-from cardbox_tracker.estimation.filtering.loss import (
-    chance_of_loss,
-    evidence_of,
-    remembered,
-    state_stddev,
-)
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
 from cardbox_tracker.estimation.filtering.refinement import Refinement
+from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 _HOME_LIMIT_M = 0.7
@@ -55,7 +51,7 @@ _TORSO_UNIFORMS, _ARM_UNIFORMS, _TOGETHER_UNIFORMS = 2, 3, 2
 class WholeBodyFilter:
     """Follows states (14,); a :class:`~.pose_filter.PoseFilter`.
 
-    A state is d1..d12, ``torso_x`` and ``torso_z``.
+    A state is d1..d12, ``torso_x`` and ``torso_z``. What is done to results is in ``refine``.
     """
 
     def __init__(
@@ -82,7 +78,7 @@ class WholeBodyFilter:
         self._body = silhouette.body
         self._one = WholeBodyCost(silhouette.body, silhouette.camera, self._config.cost)
         self._cost: WholeBodyCost | MultiViewCost = self._one
-        self._refine = Refinement(self._one, silhouette.camera, self._config)
+        self.refine = Refinement(self._one, silhouette.camera, self._config)
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
 
@@ -97,7 +93,7 @@ class WholeBodyFilter:
         self._age, self._home_m = 0, 0.0
         self._walk = Walk()
         self._output: FloatArray | None = None
-        self._refine.forget()
+        self.refine.forget()
         # Of left elbow and hand, right elbow and hand, m.
         self._arm_spread = [0.0, 0.0, 0.0, 0.0]
         self._chance: float | None = None
@@ -110,7 +106,7 @@ class WholeBodyFilter:
         self._is_lost = True
         # What was wrong is not shown, nor is the next result mixed with it.
         self._output = None
-        self._refine.forget()
+        self.refine.forget()
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
@@ -286,20 +282,22 @@ class WholeBodyFilter:
         mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
-        spread, total = state_stddev(stddev), cost.silhouette_px
-        fitted, result = self._refine(frame, self._output, spread)
-        _, costs_px, areas_px = cost.bodies(np.array([mean, fitted, result]))
+        spread, total = loss.state_stddev(stddev), cost.silhouette_px
+        _, costs_px, areas_px = cost.bodies(mean[None])
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
-        evidence = evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
-        self._chance = remembered(chance_of_loss(evidence), self._chance)
-        fit_iou, iou = (iou_of(total, areas_px[i], costs_px[i]) for i in (1, 2))
+        evidence = loss.evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
+        self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
+        search = Search(*rated, config.spread, evidence, self._chance)
+        fitted, result = self.refine(frame, self._output, spread, search)
+        _, costs_px, areas_px = cost.bodies(np.array([fitted, result]))
+        fit_iou, iou = (iou_of(total, areas_px[i], costs_px[i]) for i in (0, 1))
         keypoints_m = cost.keypoints(result)
-        deviations = self._refine.deviations(frame, result, spread, keypoints_m, iou)
+        deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
         return Fit(
             posture=result[:N_JOINTS],
             posture_stddev=deviations[:N_JOINTS],
             keypoints_m=keypoints_m,
-            cost_px=int(costs_px[2]),
+            cost_px=int(costs_px[1]),
             iou=iou,
             is_uncertain=self._chance > config.uncertain_from,
             is_poor=self._chance > config.lost_from or fit_iou < self._lost_iou,

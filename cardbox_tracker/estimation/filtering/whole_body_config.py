@@ -137,16 +137,15 @@ class WholeBodyConfig:
         limits=(0, 20),
         restarts=True,
     )
-    depth_correction: float = setting(
-        0.8,
-        "share of the learned correction of depth in the result; with one camera and without depth "
-        "images; 0: none",
-        limits=(0.0, 1.0),
+    learned_correction: bool = setting(
+        True,
+        "whether the learned correction is part of the result; with one camera and without depth "
+        "images",
         restarts=True,
     )
     learned_deviations: bool = setting(
         True,
-        "whether deviations of the angles are learned ones, where depth is corrected; no: those "
+        "whether deviations of the angles are learned ones, where results are corrected; no: those "
         "of the particles",
         restarts=True,
     )

@@ -55,12 +55,14 @@ def track_session(
     seeds: tuple[int, ...],
     only: str | None = None,
     observe: Callable[[int, int, Estimate, Tracker], None] | None = None,
+    has_images: bool = True,
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
 
     Of several cameras the first one measures the person; all of them track, or the one that
     ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
-    ``observe`` is told of every estimate: seed, stamp in ns, estimate and tracker.
+    ``observe`` is told of every estimate: seed, stamp in ns, estimate and tracker. Not
+    ``has_images``: the tracker sees silhouettes alone.
 
     Raises:
         CardboxError: the recording cannot be read.
@@ -88,6 +90,8 @@ def track_session(
             for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
                 if tracker is None:
                     continue
+                if not has_images:
+                    images = [None for _ in images]
                 start = time.perf_counter()
                 estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m)
                 spent.append(1e3 * (time.perf_counter() - start))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.networks import Network, RecurrentNetwork
+
+NODES, ENTERED = 4, 5
 
 
 def test_the_network_averages_layers_with_rectified_inputs() -> None:
@@ -20,3 +23,77 @@ def test_the_network_averages_layers_with_rectified_inputs() -> None:
     # x = (5 - 1) / 2 = 2: (4 + 1 + 0 - 1) / 2 = 2; (-99 - 1) / 2 counts as -3: (0 + 1 + 3 - 1) / 2.
     found = network(np.array([[5.0], [-99.0]]))
     assert np.allclose(found, [[0.2, 0.2, 0.4], [0.15, 0.15, 0.3]])
+
+
+def recurrent(rng: np.random.Generator, networks: int = 2) -> RecurrentNetwork:
+    """A network of 3 features and 2 answers with random weights."""
+
+    def layer(inputs: int, outputs: int) -> tuple[np.ndarray, np.ndarray]:
+        shape = networks, inputs, outputs
+        return rng.standard_normal(shape), rng.standard_normal((networks, 1, outputs))
+
+    return RecurrentNetwork(
+        np.zeros(3),
+        np.ones(3),
+        2.5,
+        layer(3, ENTERED),
+        layer(ENTERED, 3 * NODES),
+        layer(NODES, 3 * NODES),
+        (layer(NODES + ENTERED, 6), layer(6, 2)),
+        np.array([0.1, 0.2]),
+    )
+
+
+def test_the_memory_by_hand() -> None:
+    """One node: half of the new value enters, and the gate for what was before is open."""
+    ones, nothing = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
+    # To reset, update, candidate: only the candidate sees the feature and, half, the memory.
+    receive = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
+    keep = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
+    only_memory = np.array([[[1.0], [0.0]]]), nothing
+    network = RecurrentNetwork(
+        np.zeros(1),
+        np.ones(1),
+        2.5,
+        (ones, nothing),
+        receive,
+        keep,
+        (only_memory, (ones, nothing)),
+        np.array([10.0]),
+    )
+    answers, memory = network(np.array([[0.5]]), network.new_memory(1))
+    first = 0.5 * np.tanh(0.5)
+    assert memory == pytest.approx(first) and answers == pytest.approx(10.0 * first)
+    answers, memory = network(np.array([[0.5]]), memory)
+    second = 0.5 * np.tanh(0.5 + 0.5 * first) + 0.5 * first
+    assert memory == pytest.approx(second) and answers == pytest.approx(10.0 * second)
+
+
+def test_rows_and_networks_do_not_mix() -> None:
+    rng = np.random.default_rng(0)
+    network = recurrent(rng)
+    features = rng.standard_normal((3, 5, 3))
+    memory = network.new_memory(5)
+    alone = network.new_memory(1)
+    for row in features:
+        answers, memory = network(row, memory)
+        one, alone = network(row[2:3], alone)
+    assert np.allclose(answers[2], one[0])
+    singles = []
+    for i in (0, 1):
+        layers = [(w[i : i + 1], b[i : i + 1]) for w, b in (*network[3:6], *network.leave)]
+        single = network._replace(
+            enter=layers[0], receive=layers[1], keep=layers[2], leave=(layers[3], layers[4])
+        )
+        memory = single.new_memory(5)
+        for row in features:
+            found, memory = single(row, memory)
+        singles.append(found)
+    assert np.allclose(answers, np.mean(singles, axis=0))
+
+
+def test_features_far_from_the_mean_count_as_the_most() -> None:
+    network = recurrent(np.random.default_rng(1))
+    far, most = np.array([[1e6, -1e6, 0.0]]), np.array([[2.5, -2.5, 0.0]])
+    found, expected = (network(f, network.new_memory(1))[0] for f in (far, most))
+    assert np.array_equal(found, expected) and np.isfinite(found).all()

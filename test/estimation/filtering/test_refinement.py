@@ -1,4 +1,4 @@
-"""What is done to a result: fitted, and with one camera corrected in depth."""
+"""What is done to a result: fitted, and with one camera corrected by what was learned."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.refinement import Refinement
+from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -27,6 +29,8 @@ COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
 STATE = np.append(reference_posture("arms"), [0.0, 0.0])
 STDDEV = np.full(14, 0.1)
 CONFIG = WholeBodyConfig()
+EVIDENCE = Evidence(0.1, 0.05, 0.05, 1.0, 0.0, 0.05, STDDEV, STATE, 100)
+SEARCH = Search(np.array([STATE, STATE + 0.05]), np.array([0.1, 0.12]), 0.02, EVIDENCE, 0.1)
 
 
 def seen(depth_m: np.ndarray | None = None) -> Frame:
@@ -40,24 +44,26 @@ def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
     return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
 
 
-def test_with_one_camera_depth_is_corrected() -> None:
-    assert CONFIG.depth_correction > 0.0
+def test_with_one_camera_the_result_is_corrected() -> None:
+    assert CONFIG.learned_correction
     expected = fitted()
-    fit, result = Refinement(COST, CAMERA, CONFIG)(seen(), STATE, STDDEV)
+    fit, result = Refinement(COST, CAMERA, CONFIG)(seen(), STATE, STDDEV, SEARCH)
     assert np.array_equal(fit, expected)
     assert not np.allclose(result, expected)
 
 
-def test_without_a_share_of_the_correction_the_result_is_only_fitted() -> None:
-    config = replace(CONFIG, depth_correction=0.0)
+def test_without_the_correction_the_result_is_only_fitted() -> None:
+    config = replace(CONFIG, learned_correction=False)
     expected = fitted()
-    assert np.array_equal(Refinement(COST, CAMERA, config)(seen(), STATE, STDDEV)[1], expected)
+    assert np.array_equal(
+        Refinement(COST, CAMERA, config)(seen(), STATE, STDDEV, SEARCH)[1], expected
+    )
 
 
 def test_with_a_depth_image_the_result_is_only_fitted() -> None:
     depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
     expected = fitted(depth_m)
-    _, result = Refinement(COST, CAMERA, CONFIG)(seen(depth_m), STATE, STDDEV)
+    _, result = Refinement(COST, CAMERA, CONFIG)(seen(depth_m), STATE, STDDEV, SEARCH)
     assert np.array_equal(result, expected)
 
 
@@ -67,4 +73,4 @@ def test_with_further_cameras_the_result_is_only_fitted() -> None:
     others = [(COST, View.of(BODY, CAMERA, same))]
     refine = Refinement(COST, CAMERA, CONFIG, others)
     refine.outline.seeing = (0,)
-    assert np.array_equal(refine(seen(), STATE, STDDEV)[1], expected)
+    assert np.array_equal(refine(seen(), STATE, STDDEV, SEARCH)[1], expected)

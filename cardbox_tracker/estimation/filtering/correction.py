@@ -1,0 +1,101 @@
+"""A learned correction of the result: where people's arms are when a search ends like this.
+
+An outline is nearly the same for many depths, and the filter's result is one of them. How wrong it
+is on average depends on the posture that was found, on what else would fit, and on what was found
+before. A small recurrent network has learned that dependence from rendered recordings with ground
+truth (``tools/make_correction.py``; the data file names them). Its memory also tells motion from
+noise, so that the result is steadier, without a filter that lags. It sees one arm as if it were
+the left one, so both arms share it, and gives for each where the middle of the shoulders is beside
+the place found, and where elbow and hand are beside that, in metres along the axes of the optical
+frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints
+from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.result_features import features_of
+from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
+
+DATA = "correction.npz"
+"""Name of the network's data file."""
+# Place and arms move; the torso keeps its angles.
+_STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
+_STEPS = 4
+# The right arm is seen in a mirror.
+_MIRRORS = np.array([[[1.0, 1.0, 1.0]], [[-1.0, 1.0, 1.0]]])
+_LEAST_BONE_M = 1e-6
+
+
+def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
+    """Return keypoints (6, 3) towards where the network says that they are, metres.
+
+    Bones keep their lengths: what is said of an elbow is a direction from the shoulder as moved,
+    what is said of a hand one from that elbow.
+
+    Args:
+        keypoints_m: (6, 3), metres in the optical frame.
+        answers_m: of the left arm and of the mirrored right one, (2, 9): the middle of the
+            shoulders, elbow and hand, x, y, z of each.
+    """
+    said = answers_m.reshape(2, 3, 3) * _MIRRORS
+    middle = 0.5 * (said[0, 0] + said[1, 0])
+    arms = keypoints_m.reshape(2, 3, 3)
+    result = arms + middle
+    for bone in (1, 2):
+        length = np.linalg.norm(arms[:, bone] - arms[:, bone - 1], axis=1)
+        ahead = arms[:, bone] + middle + said[:, bone] - result[:, bone - 1]
+        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), _LEAST_BONE_M)
+        result[:, bone] = result[:, bone - 1] + length[:, None] * ahead
+    joined: FloatArray = result.reshape(6, 3)
+    return joined
+
+
+class Correction:
+    """Corrects the results of the whole-body filter for one body before one camera.
+
+    Attributes:
+        features: what the network saw last, (2, F).
+        found_m: keypoints before the last correction, (6, 3), metres in the optical frame.
+    """
+
+    def __init__(self, cost: WholeBodyCost) -> None:
+        """Prepare for the body of ``cost``."""
+        self._cost = cost
+        self._network = load_recurrent_network(DATA)
+        # Who comes back is the same person, so nothing makes it forget.
+        self._memory = self._network.new_memory(2)
+
+    def __call__(
+        self, state: FloatArray, stddev: FloatArray, iou: float, search: Search
+    ) -> FloatArray:
+        """Return the state (14,) with its keypoints moved.
+
+        Args:
+            state: result of the filter, (14,).
+            stddev: its deviations, (14,).
+            iou: of model and silhouette.
+            search: that has found it.
+        """
+        cost = self._cost
+        self.found_m = cost.keypoints(state)
+        result = state[None], stddev[None], self.found_m[None], np.array([iou])
+        self.features = np.concatenate(
+            [
+                features_of(*result, cost.pitch_rad)[0],
+                features_of_search(search, cost, self.found_m),
+            ],
+            axis=1,
+        )
+        answers_m, self._memory = self._network(self.features, self._memory)
+        corrected = state.copy()
+        figure = cost.parts, cost.girdle, cost.place, cost.view
+        wanted = moved(self.found_m, answers_m)
+        fit_keypoints(corrected, *figure, wanted, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
+        return corrected

@@ -1,0 +1,105 @@
+"""What is learned of results moves joints, arms alike, and knows what was before."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.correction import DATA, Correction, moved
+from cardbox_tracker.estimation.filtering.loss import Evidence
+from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.search_features import Search
+from cardbox_tracker.vision.camera import Camera
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
+FRONT = np.append(reference_posture("front"), [0.0, 0.0])
+STDDEV = np.full(14, 0.1)
+ARMS = [1, 2, 4, 5]
+PARENTS = [0, 1, 3, 4]
+OTHER_ARM = [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]
+MIRROR = np.array([-1, -1, 1, -1, *[1] * 10])
+STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
+    lambda shares: STATE_LIMITS[:, 0] + np.array(shares) * np.ptp(STATE_LIMITS, axis=1)
+)
+
+
+def search(state: np.ndarray, chance: float = 0.1) -> Search:
+    """A search whose states are those around ``state``."""
+    evidence = Evidence(0.1, 0.05, 0.05, 1.0, 0.0, 0.05, STDDEV, state, 100)
+    states = np.array([state, state + 0.02, state - 0.02])
+    return Search(states, np.array([0.1, 0.12, 0.12]), 0.02, evidence, chance)
+
+
+def test_answers_are_beside_the_middle_of_the_shoulders_and_bones_keep_their_lengths() -> None:
+    # Bones of 30 cm hang down.
+    left, right = [[0.2, y, 2.0] for y in (0.0, 0.3, 0.6)], [[-0.2, y, 2.0] for y in (0, 0.3, 0.6)]
+    said_left = [0.01, 0.02, 0.03, 0.0, 0.0, 0.4, 0.3, -0.3, 0.4]
+    said_right = [0.03, 0.0, 0.01, 0.3, -0.3, 0.0, 0.6, -0.6, 0.0]
+    found = moved(np.array([*left, *right]), np.array([said_left, said_right]))
+    # In the mirror the right row's middle is 3 cm to the other side: (1 - 3) / 2 = -1 cm.
+    middle = np.array([-0.01, 0.01, 0.02])
+    assert np.allclose(found[[0, 3]] - middle, [left[0], right[0]])
+    # 0.3 down and 0.4 away is the direction 3 : 4; the elbow comes as far as the bone is long.
+    assert np.allclose(found[1] - found[0], [0.0, 0.18, 0.24])
+    # The hand is said to be 0.3 aside and 0.3 down and 0.4 away of the shoulder.
+    ahead = np.array([0.3, 0.3 - 0.18, 0.4 - 0.24])
+    assert np.allclose(found[2] - found[1], 0.3 * ahead / np.linalg.norm(ahead))
+    # The right arm is stretched aside, away from the left one.
+    assert np.allclose(found[4:] - found[3], [[-0.3, 0.0, 0.0], [-0.6, 0.0, 0.0]])
+
+
+@settings(max_examples=50, deadline=None)
+@given(STATES, st.floats(0.0, 1.0))
+def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:
+    found = Correction(COST)(state, np.full(14, 0.2), iou, search(state))
+    assert np.isfinite(found).all()
+    assert (found >= STATE_LIMITS[:, 0]).all() and (found <= STATE_LIMITS[:, 1]).all()
+    assert np.array_equal(found[1:4], state[1:4])
+    points, before = COST.keypoints(found), COST.keypoints(state)
+    assert np.linalg.norm(points - before, axis=1).max() < 1.2
+    bones, bones_before = (np.linalg.norm(p[ARMS] - p[PARENTS], axis=1) for p in (points, before))
+    assert np.allclose(bones, bones_before)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    here, there = Correction(COST), Correction(COST)
+    for _ in range(3):
+        state = FRONT + 0.1 * rng.standard_normal(14)
+        other = MIRROR * state[OTHER_ARM]
+        mirrored = search(state)._replace(states=MIRROR * search(state).states[:, OTHER_ARM])
+        found = here(state, STDDEV, 0.8, search(state))
+        found_there = there(other, STDDEV, 0.8, mirrored)
+        assert np.allclose(MIRROR * found[OTHER_ARM], found_there, atol=1e-4)
+
+
+def test_results_come_near_what_the_network_says() -> None:
+    """Bones keep their lengths, so not all the way."""
+    state = FRONT.copy()
+    # Where a joint is at its limit, such as a straight elbow, it cannot go on.
+    state[[7, 11]] = 0.6
+    correction = Correction(COST)
+    found = COST.keypoints(correction(state, STDDEV, 0.9, search(state)))
+    network = load_recurrent_network(DATA)
+    answers_m, _ = network(correction.features, network.new_memory(2))
+    points = COST.keypoints(state)
+    wanted = moved(points, answers_m)
+    off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
+    assert off < 0.5 * before
+
+
+def test_what_was_before_counts() -> None:
+    first, second = FRONT, np.append(reference_posture("arms"), [0.0, 0.0])
+    alone = Correction(COST)(second, STDDEV, 0.9, search(second))
+    correction = Correction(COST)
+    correction(first, STDDEV, 0.5, search(first))
+    assert not np.allclose(correction(second, STDDEV, 0.9, search(second)), alone)

@@ -1,0 +1,267 @@
+"""Learn the correction of the tracker's results from recorded sessions with ground truth.
+
+python -m tools.make_correction SESSION... --check SESSION... --output FILE [--jobs N]
+
+Each session is a folder with ``bag/`` and ``ground_truth.json``. It is initialized and tracked
+with the preset ``default``, with other seeds than 0 every third one without its images; the
+network learns where the keypoints are beside those found
+(``cardbox_tracker/estimation/filtering/correction.py``) and to be steady. Those after ``--check``
+are not learned from: absolute and aligned error, cm, and the error of the acceleration, m/s^2,
+are printed for them, without the correction and with it. Needs PyTorch: ``pip install '.[learn]'``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.filtering.correction import moved
+from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.metrics import beside_shoulders
+from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
+from tools import networks
+
+FloatArray = NDArray[np.float64]
+
+# Of seeds other than 0 every so many-th session has no images.
+WITHOUT_IMAGES = 3
+# About the deviations of the answers, m: middle of the shoulders, elbow, hand; x, y, z of each.
+UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
+# Nodes of the first layer, of the memory, of the last layer but one.
+ENTERED, NODES, LEFT = 128, 96, 64
+NETWORKS, EPOCHS = 4, 20
+# Images of a sequence, which begin half as many apart, and sequences of a batch.
+LENGTH, BATCH = 120, 16
+RATE, DECAY = 3e-3, 1e-3
+# Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
+NOISE = 0.25
+# Metres that a metre per second squared is worth, and periods below which it would be noise, s.
+STEADY, LEAST_PERIOD_S = 0.01, 0.05
+# Bones that are said to be shorter than this have hardly a direction, m.
+LEAST_BONE_M = 0.01
+# Errors beyond these are other postures, which no correction mends, m and m/s^2.
+MOST_M, MOST_M_S2 = 2.0, 60.0
+
+
+class Samples(NamedTuple):
+    """Images of a session, one after the other.
+
+    Attributes:
+        features: what the network sees, (n, 2, F).
+        found_m: keypoints without the correction, (n, 6, 3), metres in the optical frame.
+        true_m: true ones, nan where they are not scored.
+        stamps_ns: (n,).
+    """
+
+    features: FloatArray
+    found_m: FloatArray
+    true_m: FloatArray
+    stamps_ns: NDArray[np.int64]
+
+    @property
+    def period_s(self) -> float:
+        """Time between two images."""
+        return float(np.median(np.diff(self.stamps_ns))) / 1e9
+
+
+def samples_of(folder: Path, seed: int) -> Samples:
+    """Track a session; see :class:`Samples`."""
+    session = load_session(folder)
+    wanted = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+    unknown = np.full((6, 3), np.nan)
+    rows: list[tuple[FloatArray, FloatArray, FloatArray, int]] = []
+
+    def keep(_: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
+        if estimate.posture is None or not isinstance(tracker.filter, WholeBodyFilter):
+            return
+        correction = tracker.filter.refine.correction
+        assert correction is not None
+        true_m = wanted.get(stamp_ns, unknown)
+        rows.append((correction.features, correction.found_m, true_m, stamp_ns))
+
+    # Who sends silhouettes alone shall have a correction, too.
+    has_images = seed == 0 or crc32(folder.name.encode()) % WITHOUT_IMAGES > 0
+    track_session(session, PRESETS["default"](), (seed,), observe=keep, has_images=has_images)
+    if len(rows) < LENGTH:
+        raise SystemExit(f"{folder}: nobody was tracked for long; leave the session out")
+    features, found_m, true_m, stamps_ns = (np.array(c) for c in zip(*rows, strict=True))
+    return Samples(features, found_m, true_m, stamps_ns)
+
+
+def learn(samples: Sequence[Samples], seed: int = 0) -> RecurrentNetwork:
+    """Return the network that learned from these sessions."""
+    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
+    mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
+    sequences = _sequences(samples, mean, scale)
+    modules = [_learned(sequences, seed + number) for number in range(NETWORKS)]
+    layers = [_layers(module) for module in modules]
+    enter, receive, keep, first, last = (
+        (np.stack([one[i][0] for one in layers]), np.stack([one[i][1] for one in layers]))
+        for i in range(5)
+    )
+    return RecurrentNetwork(mean, scale, networks.MOST, enter, receive, keep, (first, last), UNIT_M)
+
+
+def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) -> list[Any]:
+    """Return tensors of sequences: features, found, true, whether it is known, period."""
+    import torch
+
+    parts: list[tuple[object, ...]] = []
+    for one in samples:
+        scaled = np.clip((one.features - mean) / scale, -networks.MOST, networks.MOST)
+        known = np.asarray(np.isfinite(one.true_m).all(axis=(1, 2)), np.float64)
+        starts = [*range(0, len(scaled) - LENGTH, LENGTH // 2), len(scaled) - LENGTH]
+        for start in starts:
+            of = slice(start, start + LENGTH)
+            true_m = np.nan_to_num(one.true_m[of])
+            period_s = max(one.period_s, LEAST_PERIOD_S)
+            parts.append((scaled[of], one.found_m[of], true_m, known[of], period_s))
+    return [torch.tensor(np.array(c), dtype=torch.float32) for c in zip(*parts, strict=True)]
+
+
+def _learned(sequences: list[Any], seed: int) -> Any:
+    """Return the modules (enter, recurrent, leave_0, leave_1) that learned from the sequences."""
+    import torch
+    from torch import nn
+
+    torch.manual_seed(seed)
+    features, found, true, known, period = sequences
+    modules = nn.ModuleList(
+        [
+            nn.Linear(features.shape[3], ENTERED),
+            nn.GRU(ENTERED, NODES, batch_first=True),
+            nn.Linear(NODES + ENTERED, LEFT),
+            nn.Linear(LEFT, len(UNIT_M)),
+        ]
+    )
+    batches = len(features) // BATCH
+    optimizer = torch.optim.AdamW(modules.parameters(), lr=RATE, weight_decay=DECAY)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, RATE, total_steps=EPOCHS * batches + 1
+    )
+    for _ in range(EPOCHS):
+        for chosen in torch.randperm(len(features))[: batches * BATCH].split(BATCH):
+            noise = NOISE * torch.randn(len(chosen), 1, 2, features.shape[3])
+            answers = _answers(modules, features[chosen] + noise)
+            off = _moved(found[chosen], answers) - true[chosen]
+            loss = _loss(off, known[chosen], period[chosen])
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(modules.parameters(), 1.0)
+            optimizer.step()
+            schedule.step()
+    return modules
+
+
+def _answers(modules: Any, features: Any) -> Any:
+    """Return the answers (B, L, 2, 9), metres, to features (B, L, 2, F)."""
+    import torch
+
+    enter, recurrent, first, last = modules
+    entered = torch.relu(enter(features))
+    batch, length = features.shape[:2]
+    # Each arm is a sequence of its own.
+    arms = entered.permute(0, 2, 1, 3).reshape(2 * batch, length, -1)
+    memory = recurrent(arms)[0]
+    scaled = last(torch.relu(first(torch.cat([memory, arms], dim=2))))
+    scaled = scaled.reshape(batch, 2, length, -1).permute(0, 2, 1, 3)
+    return scaled * torch.tensor(UNIT_M, dtype=torch.float32)
+
+
+def _moved(found: Any, answers: Any) -> Any:
+    """Return what :func:`moved` returns, of sequences."""
+    import torch
+
+    arms = answers.reshape(*answers.shape[:3], 3, 3)
+    left, right = arms[:, :, 0], arms[:, :, 1] * torch.tensor([-1.0, 1.0, 1.0])
+    middle = 0.5 * (left[:, :, :1] + right[:, :, :1])
+    parts = []
+    for arm, said in enumerate((left, right)):
+        joints = found[:, :, 3 * arm : 3 * arm + 3]
+        lengths = (joints[:, :, 1:] - joints[:, :, :-1]).norm(dim=-1, keepdim=True)
+        shoulder = joints[:, :, :1] + middle
+        elbow, hand = (joints[:, :, i : i + 1] + middle + said[:, :, i : i + 1] for i in (1, 2))
+        elbow = shoulder + lengths[:, :, :1] * _direction(elbow - shoulder)
+        hand = elbow + lengths[:, :, 1:] * _direction(hand - elbow)
+        parts += [shoulder, elbow, hand]
+    return torch.cat(parts, dim=2)
+
+
+def _direction(vectors: Any) -> Any:
+    return vectors / (vectors.square().sum(dim=-1, keepdim=True) + LEAST_BONE_M**2).sqrt()
+
+
+def _loss(off: Any, known: Any, period_s: Any) -> Any:
+    """Return absolute plus aligned error, metres, and the worth of the acceleration's error."""
+    aligned = off - 0.5 * (off[:, :, :1] + off[:, :, 3:4])
+    each = (_length(off, 1e-2) + _length(aligned, 1e-2)).clamp(max=MOST_M)
+    second = (off[:, :-2] - 2.0 * off[:, 1:-1] + off[:, 2:]) / period_s[:, None, None, None] ** 2
+    shaken = _length(second, 0.1).clamp(max=MOST_M_S2)
+    three = known[:, :-2] * known[:, 1:-1] * known[:, 2:]
+    error = (each * known).sum() / known.sum()
+    return error + STEADY * (shaken * three).sum() / three.sum()
+
+
+def _length(vectors: Any, least: float) -> Any:
+    """Return the mean length of the keypoints' vectors (B, L, 6, 3), smooth at 0."""
+    return (vectors.square().sum(dim=-1) + least**2).sqrt().mean(dim=-1)
+
+
+def _layers(modules: Any) -> list[tuple[FloatArray, FloatArray]]:
+    """Return weights and biases of the five layers as :class:`RecurrentNetwork` has them."""
+    enter, unit, first, last = modules
+    pairs = [
+        (enter.weight, enter.bias),
+        (unit.weight_ih_l0, unit.bias_ih_l0),
+        (unit.weight_hh_l0, unit.bias_hh_l0),
+        (first.weight, first.bias),
+        (last.weight, last.bias),
+    ]
+    # PyTorch's gates are reset, update, candidate, too.
+    return [networks.numbers_of(*pair) for pair in pairs]
+
+
+def corrected(network: RecurrentNetwork, samples: Samples) -> FloatArray:
+    """Return the keypoints as the network says that they are, (n, 6, 3)."""
+    memory = network.new_memory(2)
+    result = np.empty_like(samples.found_m)
+    for i, (features, found_m) in enumerate(zip(samples.features, samples.found_m, strict=True)):
+        answers_m, memory = network(features, memory)
+        result[i] = moved(found_m, answers_m)
+    return result
+
+
+def errors(found_m: FloatArray, samples: Samples) -> tuple[float, float, float]:
+    """Return absolute and aligned error, cm, and that of the acceleration, m/s^2."""
+    off = 100.0 * (found_m - samples.true_m)
+    each = off, beside_shoulders(off)
+    mean, aligned = (float(np.nanmean(np.linalg.norm(one, axis=2))) for one in each)
+    second = (off[:-2] - 2.0 * off[1:-1] + off[2:]) / (100.0 * samples.period_s**2)
+    steps_s = np.diff(samples.stamps_ns) / 1e9
+    even = (steps_s < 1.5 * samples.period_s)[:-1] & (steps_s < 1.5 * samples.period_s)[1:]
+    return mean, aligned, float(np.nanmean(np.linalg.norm(second, axis=2)[even]))
+
+
+def check(network: RecurrentNetwork, samples: Samples) -> tuple[float, ...]:
+    """Return :func:`errors` without and with the correction."""
+    return *errors(samples.found_m, samples), *errors(corrected(network, samples), samples)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Track, learn, check, write."""
+    return networks.run(args, __doc__, samples_of, learn, check)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
