@@ -12,9 +12,13 @@ frame.
 
 from __future__ import annotations
 
+from math import sqrt
+from typing import Any
+
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -28,8 +32,6 @@ DATA = "correction.npz"
 # Place and arms move; the torso keeps its angles.
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
 _STEPS = 4
-# The right arm is seen in a mirror.
-_MIRRORS = np.array([[[1.0, 1.0, 1.0]], [[-1.0, 1.0, 1.0]]])
 _LEAST_BONE_M = 1e-6
 
 
@@ -44,17 +46,35 @@ def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
         answers_m: of the left arm and of the mirrored right one, (2, 9): the middle of the
             shoulders, elbow and hand, x, y, z of each.
     """
-    said = answers_m.reshape(2, 3, 3) * _MIRRORS
-    middle = 0.5 * (said[0, 0] + said[1, 0])
-    arms = keypoints_m.reshape(2, 3, 3)
-    result = arms + middle
-    for bone in (1, 2):
-        length = np.linalg.norm(arms[:, bone] - arms[:, bone - 1], axis=1)
-        ahead = arms[:, bone] + middle + said[:, bone] - result[:, bone - 1]
-        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), _LEAST_BONE_M)
-        result[:, bone] = result[:, bone - 1] + length[:, None] * ahead
-    joined: FloatArray = result.reshape(6, 3)
-    return joined
+    result = np.empty((6, 3))
+    _move(keypoints_m, answers_m, result)
+    return result
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
+    """Write :func:`moved` to ``result``."""
+    ahead = np.empty(3)
+    for arm in range(2):
+        first = 3 * arm
+        for axis in range(3):
+            # The right arm is seen in a mirror.
+            other = -answers_m[1, axis] if axis == 0 else answers_m[1, axis]
+            middle = 0.5 * (answers_m[0, axis] + other)
+            for joint in range(first, first + 3):
+                result[joint, axis] = keypoints_m[joint, axis] + middle
+        for bone in (1, 2):
+            end, begin = first + bone, first + bone - 1
+            length, reach = 0.0, 0.0
+            for axis in range(3):
+                length += (keypoints_m[end, axis] - keypoints_m[begin, axis]) ** 2
+                said = answers_m[arm, 3 * bone + axis]
+                said = -said if arm == 1 and axis == 0 else said
+                ahead[axis] = result[end, axis] + said - result[begin, axis]
+                reach += ahead[axis] ** 2
+            scale = sqrt(length) / max(sqrt(reach), _LEAST_BONE_M)
+            for axis in range(3):
+                result[end, axis] = result[begin, axis] + scale * ahead[axis]
 
 
 class Correction:

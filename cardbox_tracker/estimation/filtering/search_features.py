@@ -17,6 +17,8 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_kernels import keypoints
 from cardbox_tracker.estimation.filtering.loss import AREA_LIMITS, FRESH_FRAMES, Evidence
 
+# States that weigh less than this, beside 1 of the best, do not count.
+_LEAST_WEIGHT = 1e-4
 # Left elbow and hand, right elbow and hand among the keypoints; shoulders.
 _MOVING = np.array([1, 2, 4, 5])
 _LEFT, _RIGHT = 0, 3
@@ -89,8 +91,10 @@ def _fill(
     sums, squares = np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
     points, seen, total, best = np.empty((6, 3)), np.empty((count + 1, 3)), 0.0, ratings.min()
     for n in range(len(states)):
-        keypoints(states[n], parts, girdle, place, view, points)
         weight = exp((best - ratings[n]) / spread)
+        if weight < _LEAST_WEIGHT:
+            continue
+        keypoints(states[n], parts, girdle, place, view, points)
         total += weight
         _beside_middle(points, seen)
         for j in range(count + 1):

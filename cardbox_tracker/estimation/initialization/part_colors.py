@@ -48,6 +48,8 @@ LEARNED_FROM = ("front", "arms")
 # A label beside those of the parts: the skin of the face, which tells much of the hands'.
 _FACE = len(PARTS)
 _FACE_SHARE = 0.5
+# Depth of the nearest points that are drawn.
+_NEAREST_M = 0.1
 # Fewer pixels than this teach nothing of a part.
 _MIN_PX = 40
 # Search of the posture: rounds, postures a round, what the noise shrinks by, and its start.
@@ -223,6 +225,8 @@ def part_labels(
 
     def pixels(points_m: FloatArray) -> FloatArray:
         optical = camera.reference_to_optical(np.asarray(points_m, dtype=np.float64))
+        # A hand may be said to be at the lens, or behind it.
+        optical[..., 2] = np.maximum(optical[..., 2], _NEAREST_M)
         return np.asarray(camera.project(optical))
 
     def upright(

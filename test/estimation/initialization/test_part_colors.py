@@ -8,6 +8,7 @@ import pytest
 
 from cardbox_tracker.body.appearance import FOREARM, HAND, HEAD, LEGS, TORSO, steps_of_levels
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.initialization.part_colors import (
@@ -69,6 +70,22 @@ def test_the_posture_really_held_is_found() -> None:
     silhouette = render(cardbox_patches(BODY, held), CAMERA)
     found = fit_posture(BODY, CAMERA, silhouette, "arms")
     assert np.degrees(np.abs(found - held)[[4, 8]]).max() < 3.0
+
+
+@pytest.mark.parametrize("depth_m", [1e-5, 1e-9, -1e-5, -0.1])
+def test_a_hand_at_the_lens_or_behind_it_is_no_error(depth_m: float) -> None:
+    posture = reference_posture("front")
+    posture[[5, 9]] = np.radians(80.0)
+
+    def hand_depth_m(body: BodyModel) -> float:
+        return float(CAMERA.reference_to_optical(keypoints_m(body, posture))[2, 2])
+
+    distance_m = 1.0 - hand_depth_m(BodyModel.of(distance_m=1.0)) + depth_m
+    body = BodyModel.of(distance_m=distance_m)
+    assert hand_depth_m(body) == pytest.approx(depth_m, abs=1e-12)
+    _, silhouette = drawn("arms")
+    labels = part_labels(body, CAMERA, posture, silhouette)
+    assert not (labels >= 0)[silhouette == 0].any()
 
 
 def test_labels_lie_inside_the_outline_and_hands_end_with_it() -> None:
