@@ -418,9 +418,10 @@ def test_the_core_for_long(request: pytest.FixtureRequest) -> None:
     for number in range(count):
         if number == count // 4:
             before = resources_of(os.getpid())
-        start_s = time.perf_counter()
+        # Of the processor, for other tests run beside this one.
+        start_s = time.thread_time()
         estimate = tracker.track(silhouettes[number % len(silhouettes)])
-        took_s[number] = time.perf_counter() - start_s
+        took_s[number] = time.thread_time() - start_s
         if estimate.posture is not None:
             assert np.isfinite(estimate.posture).all()
     request.node.user_properties.append(("tried", count))
