@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.correction import moved
-from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork
+from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, scaled_features
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.evaluation.metrics import beside_shoulders
+from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
 from tools import networks
@@ -69,11 +69,6 @@ class Samples(NamedTuple):
     true_m: FloatArray
     stamps_ns: NDArray[np.int64]
 
-    @property
-    def period_s(self) -> float:
-        """Time between two images."""
-        return float(np.median(np.diff(self.stamps_ns))) / 1e9
-
 
 def samples_of(folder: Path, seed: int) -> Samples:
     """Track a session; see :class:`Samples`."""
@@ -101,8 +96,7 @@ def samples_of(folder: Path, seed: int) -> Samples:
 
 def learn(samples: Sequence[Samples], seed: int = 0) -> RecurrentNetwork:
     """Return the network that learned from these sessions."""
-    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in samples])
-    mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
+    mean, scale = networks.mean_and_scale(networks.by_arm(samples))
     sequences = _sequences(samples, mean, scale)
     modules = [_learned(sequences, seed + number) for number in range(NETWORKS)]
     layers = [_layers(module) for module in modules]
@@ -119,13 +113,13 @@ def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) 
 
     parts: list[tuple[object, ...]] = []
     for one in samples:
-        scaled = np.clip((one.features - mean) / scale, -networks.MOST, networks.MOST)
+        scaled = scaled_features(one.features, mean, scale, networks.MOST)
+        period_s = max(float(np.median(np.diff(one.stamps_ns))) / 1e9, LEAST_PERIOD_S)
         known = np.asarray(np.isfinite(one.true_m).all(axis=(1, 2)), np.float64)
         starts = [*range(0, len(scaled) - LENGTH, LENGTH // 2), len(scaled) - LENGTH]
         for start in starts:
             of = slice(start, start + LENGTH)
             true_m = np.nan_to_num(one.true_m[of])
-            period_s = max(one.period_s, LEAST_PERIOD_S)
             parts.append((scaled[of], one.found_m[of], true_m, known[of], period_s))
     return [torch.tensor(np.array(c), dtype=torch.float32) for c in zip(*parts, strict=True)]
 
@@ -244,13 +238,10 @@ def corrected(network: RecurrentNetwork, samples: Samples) -> FloatArray:
 
 def errors(found_m: FloatArray, samples: Samples) -> tuple[float, float, float]:
     """Return absolute and aligned error, cm, and that of the acceleration, m/s^2."""
-    off = 100.0 * (found_m - samples.true_m)
-    each = off, beside_shoulders(off)
-    mean, aligned = (float(np.nanmean(np.linalg.norm(one, axis=2))) for one in each)
-    second = (off[:-2] - 2.0 * off[1:-1] + off[2:]) / (100.0 * samples.period_s**2)
-    steps_s = np.diff(samples.stamps_ns) / 1e9
-    even = (steps_s < 1.5 * samples.period_s)[:-1] & (steps_s < 1.5 * samples.period_s)[1:]
-    return mean, aligned, float(np.nanmean(np.linalg.norm(second, axis=2)[even]))
+    off_m = found_m - samples.true_m
+    each = off_m, beside_shoulders(off_m)
+    mean, aligned = (100.0 * float(np.nanmean(np.linalg.norm(one, axis=2))) for one in each)
+    return mean, aligned, acceleration_error(off_m, samples.stamps_ns)
 
 
 def check(network: RecurrentNetwork, samples: Samples) -> tuple[float, ...]:

@@ -86,8 +86,8 @@ def learn(samples: Sequence[Errors], seed: int = 0) -> Network:
 def scaled(network: Network, samples: Sequence[Errors]) -> Network:
     """Return the network with a factor for each angle, so that two deviations hold enough."""
     errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
-    answers = [network(one.features.reshape(-1, one.features.shape[2])) for one in samples]
-    factors = np.quantile(errors / np.exp(np.concatenate(answers)), HELD, axis=0) / 2.0
+    ratios = errors / np.exp(network(networks.by_arm(samples)))
+    factors = np.quantile(ratios, HELD, axis=0) / 2.0
     *biases, last = network.biases
     return network._replace(biases=(*biases, last + np.log(factors)))
 

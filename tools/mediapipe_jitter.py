@@ -11,30 +11,21 @@ somebody who is said to stand still. Needs the extra ``mediapipe``.
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.evaluation.recorded.figures import acceleration_error
+from cardbox_tracker.benchmarks.mediapipe import full_model
+from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
-from cardbox_tracker.evaluation.recorded.tracking import SessionRun
 from cardbox_tracker.recordings.bag_reader import BagReader
 
 FloatArray = NDArray[np.float64]
 
 # Shoulder, elbow and the knuckles of index and little finger, of either side.
 _JOINTS = (11,), (13,), (17, 19), (12,), (14,), (18, 20)
-_FULL = 1
-
-
-def beside_shoulders(keypoints_m: FloatArray) -> FloatArray:
-    """Return keypoints (n, 6, 3) beside the middle of their shoulders."""
-    beside: FloatArray = keypoints_m - 0.5 * (keypoints_m[:, :1] + keypoints_m[:, 3:4])
-    return beside
 
 
 def accelerations(session: RecordedSession, keypoints_m: FloatArray) -> tuple[float, float]:
@@ -42,25 +33,19 @@ def accelerations(session: RecordedSession, keypoints_m: FloatArray) -> tuple[fl
 
     Both in m/s^2, beside the middle of the shoulders.
     """
-    nothing = np.zeros((0, 12))
-    none = np.array([], np.str_)
-    aligned = replace(session, keypoints_m=beside_shoulders(session.keypoints_m))
+    truth_m = session.keypoints_m
     found, still = (
-        acceleration_error(aligned, SessionRun(None, "", none, k, nothing, nothing, np.zeros(0)))
-        for k in (beside_shoulders(keypoints_m), np.zeros_like(keypoints_m))
+        acceleration_error(beside_shoulders(off_m), session.stamps_ns)
+        for off_m in (keypoints_m - truth_m, -truth_m)
     )
     return found, still
 
 
 def mediapipe_keypoints(session: RecordedSession) -> FloatArray:
     """Return what MediaPipe finds in the images of a session, (n, 6, 3); nan where nothing."""
-    module = importlib.import_module("mediapipe.python.solutions.pose")
     rows = {stamp: row for row, stamp in enumerate(session.stamps_ns.tolist())}
     keypoints_m = np.full(session.keypoints_m.shape, np.nan)
-    with (
-        module.Pose(static_image_mode=False, model_complexity=_FULL) as pose,
-        BagReader(session.bag) as bag,
-    ):
+    with full_model() as pose, BagReader(session.bag) as bag:
         for image in bag.images():
             found = pose.process(np.ascontiguousarray(image.color[..., ::-1]))
             row = rows.get(image.stamp_ns)

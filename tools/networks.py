@@ -18,7 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering.networks import Network, RecurrentNetwork
+from cardbox_tracker.estimation.filtering.networks import (
+    Network,
+    RecurrentNetwork,
+    scaled_features,
+)
 from cardbox_tracker.estimation.filtering.result_features import features_of
 from cardbox_tracker.files import atomic_path
 
@@ -28,6 +32,7 @@ FloatArray = NDArray[np.float64]
 MOST = 2.5
 # Deviation of what is added to the features: neighbours shall have similar answers.
 NOISE = 0.4
+_LEAST_SCALE = 1e-3
 RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
 
@@ -72,6 +77,16 @@ def features_of_estimate(estimate: Estimate, pitch_rad: float) -> FloatArray:
     return features
 
 
+def by_arm(sessions: Sequence[Images]) -> FloatArray:
+    """Return the features of all images, the left arm's before the right one's, (2 n, F)."""
+    return np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
+
+
+def mean_and_scale(features: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean and deviations of features (n, F); those that do not vary have a small one."""
+    return features.mean(axis=0), np.maximum(features.std(axis=0), _LEAST_SCALE)
+
+
 def learn(
     sessions: Sequence[Images],
     answers: FloatArray,
@@ -88,9 +103,9 @@ def learn(
         shape: of the network.
         seed: of the noise and of the first weights.
     """
-    features = np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
-    mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
-    scaled = np.clip((features - mean) / scale, -MOST, MOST)
+    features = by_arm(sessions)
+    mean, scale = mean_and_scale(features)
+    scaled = scaled_features(features, mean, scale, MOST)
     layers = [_learned(scaled, answers / unit, shape, seed + i) for i in range(shape.networks)]
     weights, biases = zip(*(zip(*one, strict=True) for one in layers), strict=True)
     return Network(

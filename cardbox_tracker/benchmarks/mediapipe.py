@@ -9,12 +9,19 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 _FULL = 1
 _WARM_UP = 5
+
+
+def full_model() -> Any:
+    """Return the full model for images that follow each other, as a context; needs the extra."""
+    solutions = importlib.import_module("mediapipe.python.solutions.pose")
+    return solutions.Pose(static_image_mode=False, model_complexity=_FULL)
 
 
 def measure_mediapipe(images: NDArray[np.uint8]) -> dict[str, float] | None:
@@ -25,10 +32,9 @@ def measure_mediapipe(images: NDArray[np.uint8]) -> dict[str, float] | None:
     """
     if importlib.util.find_spec("mediapipe") is None:
         return None
-    solutions = importlib.import_module("mediapipe.python.solutions.pose")
     times = []
     found = 0
-    with solutions.Pose(static_image_mode=False, model_complexity=_FULL) as pose:
+    with full_model() as pose:
         for image in images:
             colour = np.repeat(image[..., None], 3, axis=2)
             start = time.perf_counter()

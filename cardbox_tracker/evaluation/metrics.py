@@ -62,6 +62,26 @@ def beside_shoulders(difference: FloatArray) -> FloatArray:
     return local
 
 
+def acceleration_error(difference_m: FloatArray, stamps_ns: NDArray[np.int64]) -> float:
+    """Return the mean difference of the accelerations of joints (n, k, 3), m/s^2.
+
+    By second differences over three consecutive images; where one is missing, none counts.
+
+    Args:
+        difference_m: estimate minus truth, (n, k, 3), metres; nan where there is none.
+        stamps_ns: of the images, (n,).
+
+    Returns:
+        nan if there are no three such images.
+    """
+    steps_s = np.diff(stamps_ns - stamps_ns[0]) / 1e9
+    period_s = float(np.median(steps_s))
+    is_even = np.abs(steps_s - period_s) < 0.2 * period_s
+    second = (difference_m[:-2] - 2 * difference_m[1:-1] + difference_m[2:]) / period_s**2
+    norms = np.linalg.norm(second, axis=2)[is_even[:-1] & is_even[1:]]
+    return float(np.nanmean(norms)) if np.isfinite(norms).any() else float("nan")
+
+
 def errors_along_axes_m(estimates_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
     """Return the mean absolute error along each of ``AXES`` of joints (..., k, 3), metres."""
     along = np.abs(estimates_m - truth_m).mean(axis=tuple(range(np.ndim(estimates_m) - 1)))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from cardbox_tracker.body.sizes import FloatArray
 
 Layer = tuple[FloatArray, FloatArray]
 """Weights (networks, inputs, outputs) and biases (networks, 1, outputs)."""
+
+
+Read = TypeVar("Read")
 
 
 class Network(NamedTuple):
@@ -36,7 +40,7 @@ class Network(NamedTuple):
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """Return the answers, (n, A), to features (n, F)."""
-        scaled = np.clip((features - self.mean) / self.scale, -self.most, self.most)
+        scaled = scaled_features(features, self.mean, self.scale, self.most)
         values = np.broadcast_to(scaled, (len(self.weights[0]), *scaled.shape))
         for number, (weights, biases) in enumerate(zip(self.weights, self.biases, strict=True)):
             if number > 0:
@@ -86,7 +90,7 @@ class RecurrentNetwork(NamedTuple):
     def __call__(self, features: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the answers, (rows, A), to features (rows, F), and the next memory."""
         nodes = memory.shape[2]
-        scaled = np.clip((features - self.mean) / self.scale, -self.most, self.most)
+        scaled = scaled_features(features, self.mean, self.scale, self.most)
         entered = np.maximum(scaled.astype(memory.dtype) @ self.enter[0] + self.enter[1], 0.0)
         received = entered @ self.receive[0] + self.receive[1]
         kept = memory @ self.keep[0] + self.keep[1]
@@ -100,6 +104,14 @@ class RecurrentNetwork(NamedTuple):
         return np.asarray(answers.mean(axis=0), np.float64) * self.unit, memory
 
 
+def scaled_features(
+    features: FloatArray, mean: FloatArray, scale: FloatArray, most: float
+) -> FloatArray:
+    """Return features (..., F) beside their ``mean`` in units of ``scale``, at most ``most``."""
+    scaled: FloatArray = np.clip((features - mean) / scale, -most, most)
+    return scaled
+
+
 def _sigmoid(values: FloatArray) -> FloatArray:
     # Without an overflow, whatever the value.
     result: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * values))
@@ -109,15 +121,18 @@ def _sigmoid(values: FloatArray) -> FloatArray:
 @cache
 def load_network(name: str) -> Network:
     """Return the network of the package in the data file ``name``."""
-    with resources.as_file(resources.files(__package__).joinpath(name)) as path:
-        return read_network(path)
+    return _packaged(name, read_network)
 
 
 @cache
 def load_recurrent_network(name: str) -> RecurrentNetwork:
     """Return the network with a memory of the package in the data file ``name``."""
+    return _packaged(name, read_recurrent_network)
+
+
+def _packaged(name: str, read: Callable[[Path], Read]) -> Read:
     with resources.as_file(resources.files(__package__).joinpath(name)) as path:
-        return read_recurrent_network(path)
+        return read(path)
 
 
 def read_network(path: Path) -> Network:

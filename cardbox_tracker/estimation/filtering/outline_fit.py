@@ -29,14 +29,13 @@ from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.filtering.smoothing import Smoothed
 from cardbox_tracker.vision.camera import Camera
 
 # How far a state may go: roll, pitch, yaw, arms in rad, places in m.
 _STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * 8, 0.1, 0.1])
 # Share of the last correction in the next one. Without it the error of the acceleration grows by a
 # third.
-KEPT = 0.6
+_KEPT = 0.6
 # Around the silhouette, more than the distance beyond which all are alike.
 _MARGIN_PX = 12
 
@@ -122,7 +121,6 @@ class OutlineFit:
             steps: how many.
             others: what the further cameras rate by, and how they see the body.
         """
-        self._smoothed = Smoothed(KEPT)
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))
         self._lenses = [_Lens(cost, camera, np.eye(N_STATE), np.zeros(N_STATE))]
         self._lenses += [_Lens(there, v.camera, v.turned, v.moved) for there, v in others]
@@ -130,7 +128,7 @@ class OutlineFit:
 
     def forget(self) -> None:
         """Begin anew: the next state is of somebody else, or of another place."""
-        self._smoothed.forget()
+        self._correction: FloatArray | None = None
         self._frame: Frame | None = None
         self._looking: list[_Lens] = []
 
@@ -141,8 +139,10 @@ class OutlineFit:
         """
         if self._steps == 0 or frame.depth_m is not None:
             return state.copy()
-        correction = self._smoothed(self.fitted(frame, state, self._steps) - state)
-        return np.clip(state + correction, *STATE_LIMITS.T)
+        correction = self.fitted(frame, state, self._steps) - state
+        before = correction if self._correction is None else self._correction
+        self._correction = _KEPT * before + (1.0 - _KEPT) * correction
+        return np.clip(state + self._correction, *STATE_LIMITS.T)
 
     def fitted(self, frame: Frame, state: FloatArray, steps: int) -> FloatArray:
         """Return the state (14,) that fits the silhouettes of this frame alone."""

@@ -44,8 +44,8 @@ class Fit:
         iou: their intersection over union.
         is_uncertain: the posture may be wrong.
         is_poor: it does not fit; several such frames in a row mean that the person was lost.
-        seen: what explains the image best, before anything learned of depth was added: (14,), or
-            (12,) without an offset.
+        seen: what explains the image best, before the learned correction: (14,), or (12,) without
+            an offset.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: their standard deviations, (2,), or None.
         particles: of whole states, or None from a filter that has none.

@@ -14,7 +14,7 @@ import numpy as np
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.correction import Correction
 from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
 from cardbox_tracker.estimation.filtering.networks import load_network
@@ -59,23 +59,21 @@ class Refinement:
         """
         self.outline.forget()
 
-    def __call__(
-        self, frame: Frame, state: FloatArray, stddev: FloatArray, search: Search
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return ``state`` (14,) fitted to the outlines, (14,), and the result, (14,).
+    def corrected(
+        self, frame: Frame, fitted: FloatArray, stddev: FloatArray, iou: float, search: Search
+    ) -> FloatArray:
+        """Return the result (14,): what was learned moves the state that fits the outlines.
 
         Args:
             frame: what is seen.
-            state: to begin with, (14,).
+            fitted: to the outlines, (14,).
             stddev: its deviations, (14,).
+            iou: of model and silhouette.
             search: that has found it.
         """
-        fitted = self.outline(frame, state)
         if self.correction is None or frame.depth_m is not None:
-            return fitted, fitted
-        _, costs_px, areas_px = self._cost.bodies(fitted[None])
-        iou = iou_of(self._cost.silhouette_px, areas_px[0], costs_px[0])
-        return fitted, self.correction(fitted, stddev, iou, search)
+            return fitted
+        return self.correction(fitted, stddev, iou, search)
 
     def deviations(
         self,
@@ -85,13 +83,13 @@ class Refinement:
         keypoints_m: FloatArray,
         iou: float,
     ) -> FloatArray:
-        """Return the deviations (14,) of what was returned last: learned ones of the angles.
+        """Return the deviations (14,) of the result: learned ones of the angles.
 
         Results that are not corrected keep those of the filter.
 
         Args:
-            frame: what was seen.
-            state: what was returned, (14,).
+            frame: what is seen.
+            state: the result, (14,).
             stddev: the filter's deviations, (14,).
             keypoints_m: of the state, (6, 3), metres in the optical frame.
             iou: of model and silhouette.

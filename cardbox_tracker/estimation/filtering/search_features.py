@@ -2,6 +2,8 @@
 
 Where the rated states have their elbows and hands says which other postures explain the silhouette
 nearly as well, and the evidence of loss says how well the best one does.
+
+Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code of this file.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.evaluation.metrics import (
     SHOULDERS,
+    acceleration_error,
     align,
     angle_errors_deg,
     beside_shoulders,
@@ -83,27 +84,12 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
             }
             for name in dict.fromkeys(segments.tolist())
         },
-        "acceleration": acceleration_error(session, run),
+        "acceleration": acceleration_error(
+            run.keypoints_m - session.keypoints_m, session.stamps_ns
+        ),
         "coverage": coverage(session, run),
     }
     return result
-
-
-def acceleration_error(session: RecordedSession, run: SessionRun) -> float:
-    """Mean difference of the accelerations of estimate and truth, m/s^2.
-
-    Taken by second differences over three consecutive images; where one is missing, none counts.
-    """
-    time_s = (session.stamps_ns - session.stamps_ns[0]) / 1e9
-    step_s = np.diff(time_s)
-    period_s = float(np.median(step_s))
-    even = (np.abs(step_s[:-1] - period_s) < 0.2 * period_s) & (
-        np.abs(step_s[1:] - period_s) < 0.2 * period_s
-    )
-    error = run.keypoints_m - session.keypoints_m
-    second = (error[:-2] - 2 * error[1:-1] + error[2:]) / period_s**2
-    norms = np.linalg.norm(second, axis=2)[even]
-    return float(np.nanmean(norms)) if np.isfinite(norms).any() else float("nan")
 
 
 def coverage(session: RecordedSession, run: SessionRun) -> dict[str, float]:

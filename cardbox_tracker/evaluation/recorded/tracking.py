@@ -87,11 +87,11 @@ def track_session(
         for stamp_ns, silhouettes, images, depth_m in _seen(
             source, session.start_s + offset_s, only
         ):
+            if not has_images:
+                images = [None for _ in images]
             for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
                 if tracker is None:
                     continue
-                if not has_images:
-                    images = [None for _ in images]
                 start = time.perf_counter()
                 estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m)
                 spent.append(1e3 * (time.perf_counter() - start))

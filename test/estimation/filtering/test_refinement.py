@@ -44,10 +44,16 @@ def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
     return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
 
 
+def refined(refine: Refinement, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """The state that fits the outlines, and the result."""
+    fit = refine.outline(frame, STATE)
+    return fit, refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
+
+
 def test_with_one_camera_the_result_is_corrected() -> None:
     assert CONFIG.learned_correction
     expected = fitted()
-    fit, result = Refinement(COST, CAMERA, CONFIG)(seen(), STATE, STDDEV, SEARCH)
+    fit, result = refined(Refinement(COST, CAMERA, CONFIG), seen())
     assert np.array_equal(fit, expected)
     assert not np.allclose(result, expected)
 
@@ -55,15 +61,13 @@ def test_with_one_camera_the_result_is_corrected() -> None:
 def test_without_the_correction_the_result_is_only_fitted() -> None:
     config = replace(CONFIG, learned_correction=False)
     expected = fitted()
-    assert np.array_equal(
-        Refinement(COST, CAMERA, config)(seen(), STATE, STDDEV, SEARCH)[1], expected
-    )
+    assert np.array_equal(refined(Refinement(COST, CAMERA, config), seen())[1], expected)
 
 
 def test_with_a_depth_image_the_result_is_only_fitted() -> None:
     depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
     expected = fitted(depth_m)
-    _, result = Refinement(COST, CAMERA, CONFIG)(seen(depth_m), STATE, STDDEV, SEARCH)
+    _, result = refined(Refinement(COST, CAMERA, CONFIG), seen(depth_m))
     assert np.array_equal(result, expected)
 
 
@@ -73,4 +77,4 @@ def test_with_further_cameras_the_result_is_only_fitted() -> None:
     others = [(COST, View.of(BODY, CAMERA, same))]
     refine = Refinement(COST, CAMERA, CONFIG, others)
     refine.outline.seeing = (0,)
-    assert np.array_equal(refine(seen(), STATE, STDDEV, SEARCH)[1], expected)
+    assert np.array_equal(refined(refine, seen())[1], expected)
