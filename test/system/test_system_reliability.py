@@ -413,21 +413,29 @@ def test_the_core_for_long(request: pytest.FixtureRequest) -> None:
     silhouettes = [person.silhouette(1.0 + i / 15) for i in range(120)]
     tracker = Tracker(person.body, person.camera, default_preset(), np.random.default_rng(0))
     count = max(200, EXAMPLES)
-    took_s = np.empty(count)
+    took_s, other_s = np.empty(count), np.empty(count)
+    work = np.random.default_rng(0).random(50_000)
     before = (0.0, 0, 0)
     for number in range(count):
         if number == count // 4:
             before = resources_of(os.getpid())
-        # Of the processor, for other tests run beside this one.
-        start_s = time.thread_time()
+        start_s = time.perf_counter()
         estimate = tracker.track(silhouettes[number % len(silhouettes)])
-        took_s[number] = time.thread_time() - start_s
+        took_s[number] = time.perf_counter() - start_s
+        # What slows this down, such as tests beside it, is no fault of the tracker.
+        start_s = time.perf_counter()
+        np.sort(work)
+        other_s[number] = time.perf_counter() - start_s
         if estimate.posture is not None:
             assert np.isfinite(estimate.posture).all()
     request.node.user_properties.append(("tried", count))
     after = resources_of(os.getpid())
     quarter = count // 4
-    ratio = np.percentile(took_s[-quarter:], 10) / np.percentile(took_s[1:quarter], 10)
+    early, late = (
+        np.percentile(took_s[part], 10) / np.percentile(other_s[part], 10)
+        for part in (slice(1, quarter), slice(-quarter, None))
+    )
+    ratio = late / early
     print(
         f"{count} images: {before} to {after} (MB, files, threads), time of an image x {ratio:.2f}"
     )
