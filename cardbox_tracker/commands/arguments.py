@@ -102,6 +102,18 @@ def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--seed", type=seed, default=0, help=f"random seed of {what}")
 
 
+def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
+    """Add ``--cameras`` with how many there are; ``several`` says what more than one are for."""
+    parser.add_argument(
+        "--cameras",
+        type=int,
+        choices=range(1, 5),
+        default=1,
+        metavar="N",
+        help=f"1 to 4; {several}",
+    )
+
+
 def add_camera_pitch(parser: argparse.ArgumentParser) -> None:
     """Add ``--camera-pitch-deg``."""
     parser.add_argument(

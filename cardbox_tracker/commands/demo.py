@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_preset, add_seed
+from cardbox_tracker.commands.arguments import add_camera_count, add_preset, add_seed
 
 NAME = "demo"
 HELP = "run the whole chain on a synthetic recording, with real nodes"
@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
     )
     add_preset(parser, "default")
+    add_camera_count(parser, "several see the person together, with the preset default")
     add_seed(parser, "the recording and the filters")
 
 
@@ -24,8 +25,9 @@ def run(options: argparse.Namespace) -> None:
     """Record, measure and track a synthetic person through the nodes; write the results.
 
     Raises:
-        CardboxError: the results cannot be written, ROS is missing, or a node failed.
+        CardboxError: the results cannot be written, ROS is missing, a node failed, or the preset
+            is not for several cameras.
     """
     from cardbox_tracker.demo.run import run_demo
 
-    run_demo(options.output, options.preset, options.seed)
+    run_demo(options.output, options.preset, options.seed, options.cameras)

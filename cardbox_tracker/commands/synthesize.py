@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_seed
+from cardbox_tracker.commands.arguments import add_camera_count, add_seed
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "synthesize"
@@ -33,13 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--compressed", action="store_true", help="write JPEG images instead of raw ones"
     )
-    parser.add_argument(
-        "--cameras",
-        type=int,
-        choices=range(1, 5),
-        default=1,
-        metavar="N",
-        help="1 to 4; several are cam0, cam1, ..., and BAG/extrinsics.yaml says where they stand",
+    add_camera_count(
+        parser, "several are cam0, cam1, ..., and BAG/extrinsics.yaml says where they stand"
     )
     add_force(parser)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,20 +23,30 @@ from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.measurement import mean_iou_of
+from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Those of the bag that 'cardbox track --bag' writes; /tf is made of two of them.
-TOPICS = {
+_OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
+    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
+}
+_OF_CAMERA = {
     "silhouette": (Image, qos.REPLAY),
     "silhouette/camera_info": (CameraInfo, qos.REPLAY),
     "overlay": (Image, _UNRELIABLE),
-    **{output.topic: (results.message_type(output.kind), qos.REPLAY) for output in OUTPUTS},
 }
+
+
+def topics_of(cameras: Sequence[str] = ()) -> dict[str, tuple[Any, QoSProfile]]:
+    """Return type and QoS of each topic of the results, of one camera or below namespaces."""
+    spaces = [f"{camera}/" for camera in cameras] or [""]
+    of_cameras = {f"{space}{name}": kind for space in spaces for name, kind in _OF_CAMERA.items()}
+    return {**_OF_PERSON, **of_cameras}
 
 
 class Client:
@@ -49,12 +59,13 @@ class Client:
         places_m: ``torso_x`` and ``torso_z`` (2,) by stamp, ns.
         states: tracking state of each posture by stamp, ns.
         keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
-        silhouettes: (H, W) by stamp, ns.
+        silhouettes: of the first camera, (H, W), by stamp, ns.
         arrivals_s: arrival time of each joint state, monotonic seconds.
     """
 
-    def __init__(self, nodes: Nodes, bag: BagWriter) -> None:
-        """Subscribe to everything the nodes publish."""
+    def __init__(self, nodes: Nodes, bag: BagWriter, cameras: Sequence[str] = ()) -> None:
+        """Subscribe to everything that nodes of one camera, or of several ones, publish."""
+        self._silhouettes = silhouettes_of(cameras or [""])
         self.body_model = ""
         self.initialization_iou: float | None = None
         self.postures: dict[int, NDArray[np.float64]] = {}
@@ -73,7 +84,7 @@ class Client:
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
         self._executor = make_executor()
         self._executor.add_node(self._node)
-        for topic, (kind, profile) in TOPICS.items():
+        for topic, (kind, profile) in topics_of(cameras).items():
             self._node.create_subscription(
                 kind, topic, self.recorder(topic, kind), profile, raw=True
             )
@@ -116,7 +127,7 @@ class Client:
             self.arrivals_s.append(time.monotonic())
         elif topic == "keypoints":
             self.keypoints_m[stamp] = results.points_of(message).points_m
-        elif topic == "silhouette":
+        elif topic == self._silhouettes[0]:
             pixels = np.frombuffer(message.data, np.uint8)
             self.silhouettes[stamp] = pixels.reshape(message.height, message.width)
 
@@ -145,9 +156,13 @@ class Client:
 
     def wait_for_nodes(self) -> None:
         """Wait until the nodes are connected to each other."""
-        count = self._node.count_subscribers
+        # The person is measured by the first two cameras.
+        wanted = [3, 3, 2, 2][: len(self._silhouettes)]
         self.wait(
-            lambda: count("silhouette") == 3 and self._node.count_publishers("joint_states") == 1,
+            lambda: (
+                [self._node.count_subscribers(topic) for topic in self._silhouettes] == wanted
+                and self._node.count_publishers("joint_states") == 1
+            ),
             "the nodes to find each other",
         )
 

@@ -33,9 +33,10 @@ def write_report(
 ) -> dict[str, object]:
     """Write everything into ``output``, print the table, return what report.json holds."""
     with BagReader(session) as bag:
+        first = next(iter(result.truth.cameras), None)
         height, width = next(iter(result.silhouettes.values())).shape
         pitch_rad = result.body.camera_pose.pitch_rad
-        camera = bag.calibration().camera(width, height, pitch_rad)
+        camera = bag.calibration(first).camera(width, height, pitch_rad)
     expected = [stamp for stamp in result.truth.frames if stamp >= result.start_ns]
     tracked = [stamp for stamp in expected if stamp in result.postures]
     estimates = rate(result, camera, tracked)
@@ -43,6 +44,7 @@ def write_report(
     report: dict[str, object] = {
         "preset": preset,
         "seed": seed,
+        "cameras": max(1, len(result.truth.cameras)),
         "frames": len(expected),
         "frames_tracked": len(tracked),
         "frames_uncertain": sum(result.states.get(stamp) == UNCERTAIN for stamp in tracked),
@@ -121,8 +123,9 @@ def write_overlay(
     size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
     nothing = Estimate("not_tracked")
     with BagReader(session) as bag, video_file(path, size, 15.0) as write:
-        pipeline = SilhouettePipeline(bag.calibration(), (camera.width, camera.height))
-        for image in bag.images():
+        first = next(iter(result.truth.cameras), None)
+        pipeline = SilhouettePipeline(bag.calibration(first), (camera.width, camera.height))
+        for image in bag.images(bag.image_topic(first)):
             if image.stamp_ns >= result.start_ns:
                 small = pipeline.prepare(image.as_sent)
                 estimate = estimates.get(image.stamp_ns, nothing)

@@ -11,6 +11,7 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.demo.report import write_report
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.errors import CardboxError, RosMissingError
+from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.result_bag import result_writer
@@ -18,23 +19,24 @@ from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
 from cardbox_tracker.simulation.session import synthesize_session
 
 _RATE = 2.0
-_TOPICS = ("/camera/image_raw", "/camera/camera_info")
 _NEUTRAL_S = 0.1
 
 
-def run_demo(output: Path, preset: str, seed: int) -> None:
+def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     """Run the demo and leave its results in the folder ``output``.
 
     Raises:
         CardboxError: something failed; the text says what.
     """
+    if cameras > 1 and PRESETS[preset]().filter != "whole_body":
+        raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
     session = output / "session"
     with progress_bar("synthesize") as show:
-        synthesize_session(session, "all", seed, overwrite=True, progress=show)
+        synthesize_session(session, "all", seed, cameras=cameras, overwrite=True, progress=show)
     result = track_through_nodes(session, output, preset, seed)
     write_report(result, session, output, preset, seed)
 
@@ -54,15 +56,15 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     pauses = {name: round(float(np.mean(truth.spans[name])), 3) for name in REFERENCE_NAMES}
     start_s = round(truth.spans["neutral"][0] + _NEUTRAL_S, 3)
     with running_nodes(output) as nodes, result_writer(output / "bag", overwrite=True) as bag:
-        client = Client(nodes, bag)
+        client = Client(nodes, bag, truth.cameras)
         try:
-            _start_nodes(nodes, truth, preset, seed)
+            topics = _start_nodes(nodes, truth, session, preset, seed)
             client.wait_for_nodes()
             stops = [f"{at_s:.3f}" for at_s in (*pauses.values(), start_s)]
             nodes.start(
                 "play_bag",
                 str(session),
-                *("--rate", f"{_RATE:g}", "--topics", *_TOPICS, "--pause-at", *stops),
+                *("--rate", f"{_RATE:g}", "--topics", *topics, "--pause-at", *stops),
             )
             for name, at_s in pauses.items():
                 client.wait_for_pause(at_s)
@@ -107,25 +109,40 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
     )
 
 
-def _start_nodes(nodes: Nodes, truth: GroundTruth, preset: str, seed: int) -> None:
+def _start_nodes(
+    nodes: Nodes, truth: GroundTruth, session: Path, preset: str, seed: int
+) -> list[str]:
+    """Start the nodes of one camera, or of several ones; return the topics to play."""
+
     def parameters(**values: object) -> list[str]:
         return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
+    several = [f"/{name}" for name in truth.cameras]
     # A replay must not lose images; of a live camera, old ones are better dropped.
     deep = [
         word
+        for space in several or [""]
         for topic, end in (
-            ("/camera/image_raw", "subscription"),
-            ("/silhouette", "publisher"),
-            ("/silhouette", "subscription"),
+            (f"{space or '/camera'}/image_raw", "subscription"),
+            (f"{space}/silhouette", "publisher"),
+            (f"{space}/silhouette", "subscription"),
         )
         for word in (
             *("-p", f"qos_overrides.{topic}.{end}.reliability:=reliable"),
             *("-p", f"qos_overrides.{topic}.{end}.depth:=100"),
         )
     ]
-    remap = ("-r", "image_raw:=/camera/image_raw", "-r", "camera_info:=/camera/camera_info")
-    nodes.start("background", "--ros-args", *remap, *deep)
+    for space in several:
+        called = f"background_{space[1:]}"
+        nodes.start("background", "--ros-args", "-r", f"__ns:={space}", *deep, called=called)
+    if several:
+        together = parameters(
+            cameras=f"[{', '.join(truth.cameras)}]", extrinsics_file=session / "extrinsics.yaml"
+        )
+    else:
+        together = []
+        remap = ("-r", "image_raw:=/camera/image_raw", "-r", "camera_info:=/camera/camera_info")
+        nodes.start("background", "--ros-args", *remap, *deep)
     nodes.start(
         "initializer",
         "--ros-args",
@@ -135,5 +152,8 @@ def _start_nodes(nodes: Nodes, truth: GroundTruth, preset: str, seed: int) -> No
             side_turn=truth.side_turn,
             seed=seed,
         ),
+        *together,
     )
-    nodes.start("tracker", "--ros-args", *parameters(preset=preset, seed=seed), *deep)
+    nodes.start("tracker", "--ros-args", *parameters(preset=preset, seed=seed), *together, *deep)
+    spaces = several or ["/camera"]
+    return [f"{space}/{name}" for space in spaces for name in ("image_raw", "camera_info")]

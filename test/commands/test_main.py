@@ -149,6 +149,10 @@ def test_a_full_disk_is_told_in_words(
         (("synthesize", "--storage", "tape", "--output", "FOLDER/new"), "invalid choice: 'tape'"),
         (("demo", "--output", "FOLDER/text.txt"), "cannot make the folder"),
         (("demo", "--output", "FOLDER/new", "--preset", "fast"), "invalid choice: 'fast'"),
+        (
+            ("demo", "--output", "FOLDER/new", "--preset", "paper", "--cameras", "2"),
+            "--preset paper is for one camera; leave it out with --cameras",
+        ),
         (("urdf", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory"),
         (("urdf", "FOLDER/negative.yaml"), "head_width is -0.17 m"),
         (("evaluate", "--output", "FOLDER/new", "--runs", "1"), "of 2 or more, got '1'"),

@@ -14,7 +14,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from rclpy.serialization import serialize_message
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.demo.client import TOPICS, Client
+from cardbox_tracker.demo.client import Client, topics_of
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.outputs import JOINT_STATE_NAMES, OUTPUTS
 from cardbox_tracker.recordings.result_bag import result_writer
@@ -34,7 +34,7 @@ def recorded(
     with result_writer(tmp_path / "bag") as bag:
         client: Any = Client(nodes=None, bag=bag)
         try:
-            for topic, (kind, _) in TOPICS.items():
+            for topic, (kind, _) in topics_of().items():
                 message = kind()
                 if topic.startswith("joint_states"):
                     message.name = list(JOINT_STATE_NAMES)
@@ -51,6 +51,15 @@ def recorded(
 
 def test_it_has_every_topic_by_its_full_name(recorded: dict[str, Any]) -> None:
     assert set(recorded) == {f"/{name}" for name in (*NAMES, *(o.topic for o in OUTPUTS))}
+
+
+def test_several_cameras_have_topics_below_their_namespaces() -> None:
+    names = set(topics_of(["cam0", "cam1"]))
+    of_camera = {"silhouette", "silhouette/camera_info", "overlay"}
+    assert names - set(topics_of()) == {
+        f"{c}/{name}" for c in ("cam0", "cam1") for name in of_camera
+    }
+    assert set(topics_of()) - names == of_camera
 
 
 def test_what_is_latched_is_latched_when_it_is_played(recorded: dict[str, Any]) -> None:

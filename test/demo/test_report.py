@@ -22,10 +22,12 @@ LAST = 24
 """So many images of the session's end were tracked."""
 
 
-@pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=(1, 2))
+def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of one camera, and of two."""
     folder = tmp_path_factory.mktemp("demo") / "session"
-    synthesize_session(folder, "bow", fps=4.0, width=160, height=120, body=BODY)
+    size = {"width": 160, "height": 120}
+    synthesize_session(folder, "bow", fps=4.0, body=BODY, cameras=request.param, **size)
     return folder
 
 
@@ -55,6 +57,7 @@ def test_a_perfect_result_has_no_error(
     report = json.loads((tmp_path / "report.json").read_text())
     assert report == returned
     assert (report["preset"], report["seed"]) == ("paper", 7)
+    assert report["cameras"] == 1 + (session / "extrinsics.yaml").is_file()
     assert report["frames"] == report["frames_tracked"] == LAST
     assert report["mean_3d_error_m"] == pytest.approx(0.0, abs=1e-9)
     assert (report["fps"], report["initialization_iou"]) == (29.5, 0.87)
