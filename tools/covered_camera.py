@@ -50,12 +50,8 @@ def rows_of(folder: Path, lasts_s: float, seeds: int) -> Iterator[Row]:
     """
     session = load_session(folder)
     truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
-    file = folder / "extrinsics.yaml"
     with CameraSources(
-        session.bag,
-        session.truth.cameras,
-        session.spans["empty"],
-        file if file.is_file() else None,
+        session.bag, session.truth.cameras, session.spans["empty"], session.extrinsics
     ) as source:
         bodies = [measured_body(session, source.first, seed) for seed in range(seeds)]
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9

@@ -143,9 +143,8 @@ def _start(nodes: Nodes, session: RecordedSession, body: Path, depth: str | None
         space = ("--ros-args", "-r", f"__ns:=/{camera}")
         nodes.start("background", *space, *transport, called=f"background_{camera}")
     words = ["-p", f"cameras:=[{', '.join(cameras)}]", "-p", f"model_file:={body}"]
-    extrinsics = session.bag.parent / "extrinsics.yaml"
-    if extrinsics.exists():
-        words += ["-p", f"extrinsics_file:={extrinsics}"]
+    if session.extrinsics is not None:
+        words += ["-p", f"extrinsics_file:={session.extrinsics}"]
     if depth is not None:
         names = [
             f"{side}/{topic}" for side in ("left", "right") for topic in (image, "camera_info")

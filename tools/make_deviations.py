@@ -2,14 +2,15 @@
 
 python -m tools.make_deviations SESSION... --fresh SESSION... --check SESSION... --output FILE
 
-Each session is a folder with ``bag/`` and ``ground_truth.json``. It is initialized and tracked
-with the preset ``default`` and the deviations of the particles; the network learns the logarithm of
-the error of each angle (``cardbox_tracker/estimation/filtering/deviations.py``), so make the
-correction first (``tools/make_correction.py``). Its errors are smaller in sessions that it has
-learned from, so how large deviations are in the end is taken from those after ``--fresh``, which it
-must not have learned from. Those after ``--check`` are only judged: in how many images an error
-is within two deviations, mean and least over the angles, is printed for them, %, with the
-particles' deviations and with the learned ones. Needs PyTorch: ``pip install '.[learn]'``.
+Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
+``default`` and the deviations of the particles, in as many ways as seeds are asked for
+(``tools/tracked_ways.py``); the network learns the logarithm of the error of each angle
+(``cardbox_tracker/estimation/filtering/deviations.py``), so make the correction first
+(``tools/make_correction.py``). Its errors are smaller in sessions that it has learned from, so how
+large deviations are in the end is taken from those after ``--fresh``, which it must not have
+learned from. Those after ``--check`` are only judged: in how many images an error is within two
+deviations, mean and least over the angles, is printed for them, %, with the particles' deviations
+and with the learned ones. Needs PyTorch: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.deviations import TORSO, deviations_of
 from cardbox_tracker.estimation.filtering.networks import Network
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import angle_errors_deg
 from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.evaluation.recorded.session import load_session
-from cardbox_tracker.evaluation.recorded.tracking import track_session
 from tools import networks
+from tools.tracked_ways import track
 
 FloatArray = NDArray[np.float64]
 
@@ -55,22 +57,22 @@ def errors_of(folder: Path, seed: int) -> Errors:
     """Track a session; see :class:`Errors`."""
     session, preset = load_session(folder), PRESETS["default"]()
     config = replace(preset, whole_body=replace(preset.whole_body, learned_deviations=False))
-    pitch_rad = float(np.radians(session.truth.pitch_deg))
     known = np.isfinite(session.torso_rad).all(axis=1)
     known &= np.isfinite(session.keypoints_m).all(axis=(1, 2))
     stamps_ns = session.stamps_ns[known].tolist()
     wanted = dict(zip(stamps_ns, true_postures(session)[known], strict=True))
     rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
 
-    def keep(_: int, stamp_ns: int, estimate: Estimate, __: Tracker) -> None:
+    def keep(_: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
         truth = wanted.get(stamp_ns)
         if truth is None or estimate.posture is None:
             return
+        assert isinstance(tracker.filter, WholeBodyFilter)
         error_rad = np.radians(angle_errors_deg(estimate.posture[1:], truth[1:]))
         stddev = np.asarray(estimate.posture_stddev)[1:]
-        rows.append((networks.features_of_estimate(estimate, pitch_rad), error_rad, stddev))
+        rows.append((tracker.filter.refine.features, error_rad, stddev))
 
-    track_session(session, config, (seed,), observe=keep)
+    track(session, config, seed, keep)
     if not rows:
         raise SystemExit(f"{folder}: nobody was tracked; leave the session out")
     return Errors(*(np.array(column) for column in zip(*rows, strict=True)))

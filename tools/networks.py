@@ -17,13 +17,12 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.networks import (
     Network,
     RecurrentNetwork,
     scaled_features,
 )
-from cardbox_tracker.estimation.filtering.result_features import features_of
+from cardbox_tracker.estimation.filtering.result_features import OF_CAMERAS
 from cardbox_tracker.files import atomic_path
 
 FloatArray = NDArray[np.float64]
@@ -33,6 +32,8 @@ MOST = 2.5
 # Deviation of what is added to the features: neighbours shall have similar answers.
 NOISE = 0.4
 _LEAST_SCALE = 1e-3
+# Most recordings have one camera; beside them several shall not be all alike, beyond MOST.
+_SCALE_OF_CAMERAS = 0.4
 RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
 
@@ -63,20 +64,6 @@ class Shape:
     epochs: int
 
 
-def features_of_estimate(estimate: Estimate, pitch_rad: float) -> FloatArray:
-    """Return what the networks see of an estimate with a posture, (2, F)."""
-    parts = estimate.posture, estimate.offset_m, estimate.posture_stddev, estimate.offset_stddev_m
-    posture, offset, stddev, offset_stddev = (np.asarray(part) for part in parts)
-    features: FloatArray = features_of(
-        np.concatenate([posture, offset])[None],
-        np.concatenate([stddev, offset_stddev])[None],
-        np.asarray(estimate.keypoints_m)[None],
-        np.array([estimate.iou or 0.0]),
-        pitch_rad,
-    )[0]
-    return features
-
-
 def by_arm(sessions: Sequence[Images]) -> FloatArray:
     """Return the features of all images, the left arm's before the right one's, (2 n, F)."""
     return np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
@@ -84,7 +71,9 @@ def by_arm(sessions: Sequence[Images]) -> FloatArray:
 
 def mean_and_scale(features: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return mean and deviations of features (n, F); those that do not vary have a small one."""
-    return features.mean(axis=0), np.maximum(features.std(axis=0), _LEAST_SCALE)
+    least = np.full(features.shape[1], _LEAST_SCALE)
+    least[OF_CAMERAS] = _SCALE_OF_CAMERAS
+    return features.mean(axis=0), np.maximum(features.std(axis=0), least)
 
 
 def learn(

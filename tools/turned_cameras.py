@@ -31,9 +31,8 @@ def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, flo
         CardboxError: it is no session of several cameras.
     """
     session = load_session(folder)
-    file = folder / "extrinsics.yaml"
     names, empty = session.truth.cameras[:2], session.spans["empty"]
-    with CameraSources(session.bag, names, empty, file if file.is_file() else None) as source:
+    with CameraSources(session.bag, names, empty, session.extrinsics) as source:
         body = measured_body(session, source.first, seed)
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         frames = list(source.frames(session.start_s + offset_s))

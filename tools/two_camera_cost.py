@@ -47,10 +47,9 @@ def costs_of(folder: Path, count: int) -> tuple[float, float, float]:
         CardboxError: it is no session of several cameras.
     """
     session = load_session(folder)
-    file = folder / "extrinsics.yaml"
     names, empty = session.truth.cameras, session.spans["empty"]
     cut: list[float] = []
-    with CameraSources(session.bag, names, empty, file if file.is_file() else None) as source:
+    with CameraSources(session.bag, names, empty, session.extrinsics) as source:
         body = measured_body(session, source.first, 0)
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         spent: tuple[list[float], list[float]] = [], []

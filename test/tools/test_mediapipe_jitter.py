@@ -21,7 +21,7 @@ def session(keypoints_m: np.ndarray) -> RecordedSession:
     unknown = np.full((IMAGES, 3), np.nan)
     truth = cast(GroundTruth, None)
     return RecordedSession(
-        "one", Path(), truth, {}, 0.0, stamps_ns, segments, keypoints_m, unknown, {}, None
+        "one", Path(), None, truth, {}, 0.0, stamps_ns, segments, keypoints_m, unknown, {}, None
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
@@ -44,6 +44,7 @@ class WholeBodyCost:
         place: where the hips are in the body model.
         view: the camera.
         pitch_rad: how far the camera looks down.
+        is_measured: the body was measured, not guessed from proportions.
         frontal_px: pixels of the model in the front reference posture.
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
@@ -65,6 +66,7 @@ class WholeBodyCost:
         )
         self.place, self.view = place_of(body), view_of(camera)
         self.pitch_rad = camera.pitch_rad
+        self.is_measured = body.source == MEASURED
         self._drawn = _drawn_parts(self.parts, config)
         self._rules = _rules(config)
         self._gmm = np.array(load_gmm())

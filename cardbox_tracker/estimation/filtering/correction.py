@@ -1,13 +1,13 @@
 """A learned correction of the result: where people's arms are when a search ends like this.
 
 An outline is nearly the same for many depths, and the filter's result is one of them. How wrong it
-is on average depends on the posture that was found, on what else would fit, and on what was found
-before. A small recurrent network has learned that dependence from rendered recordings with ground
-truth (``tools/make_correction.py``; the data file names them). Its memory also tells motion from
-noise, so that the result is steadier, without a filter that lags. It sees one arm as if it were
-the left one, so both arms share it, and gives for each where the middle of the shoulders is beside
-the place found, and where elbow and hand are beside that, in metres along the axes of the optical
-frame.
+is on average depends on the posture that was found, on what else would fit, on where the cameras
+stand, and on what was found before. A small recurrent network has learned that dependence from
+rendered recordings with ground truth (``tools/make_correction.py``; the data file names them). Its
+memory also tells motion from noise, so that the result is steadier, without a filter that lags. It
+sees one arm as if it were the left one, so both arms share it, and gives for each where the middle
+of the shoulders is beside the place found, and where elbow and hand are beside that, in metres
+along the axes of the optical frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
-from cardbox_tracker.estimation.filtering.result_features import features_of
+from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
 
 DATA = "correction.npz"
@@ -78,7 +78,7 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
 
 
 class Correction:
-    """Corrects the results of the whole-body filter for one body before one camera.
+    """Corrects the results of the whole-body filter for one body.
 
     Attributes:
         features: what the network saw last, (2, F).
@@ -86,14 +86,20 @@ class Correction:
     """
 
     def __init__(self, cost: WholeBodyCost) -> None:
-        """Prepare for the body of ``cost``."""
+        """Prepare for the body of ``cost``, that of the first camera."""
         self._cost = cost
         self._network = load_recurrent_network(DATA)
         # Who comes back is the same person, so nothing makes it forget.
         self._memory = self._network.new_memory(2)
+        self.features, self.found_m = np.empty((2, 0)), np.empty((6, 3))
 
     def __call__(
-        self, state: FloatArray, stddev: FloatArray, iou: float, search: Search
+        self,
+        state: FloatArray,
+        stddev: FloatArray,
+        iou: float,
+        search: Search,
+        viewpoints: Viewpoints,
     ) -> FloatArray:
         """Return the state (14,) with its keypoints moved.
 
@@ -102,13 +108,14 @@ class Correction:
             stddev: its deviations, (14,).
             iou: of model and silhouette.
             search: that has found it.
+            viewpoints: how the person was seen.
         """
         cost = self._cost
         self.found_m = cost.keypoints(state)
         result = state[None], stddev[None], self.found_m[None], np.array([iou])
         self.features = np.concatenate(
             [
-                features_of(*result, cost.pitch_rad)[0],
+                features_of(*result, viewpoints)[0],
                 features_of_search(search, cost, self.found_m),
             ],
             axis=1,

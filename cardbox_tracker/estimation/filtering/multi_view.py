@@ -104,7 +104,7 @@ class MultiViewFilter(WholeBodyFilter):
 
     def _observe(self, terms: Sequence[Term]) -> None:
         views, before = self._views, self._survivors[0]
-        self.refine.outline.seeing = tuple(self._seeing)
+        self.refine.see(self._seeing)
         self._cross(before)
         self._step_m = 0.0
         if 0 in self._seeing:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from math import sqrt
-from typing import Any
+from collections.abc import Sequence
+from math import cos, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,44 @@ _OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
 _BEGIN, _END = np.array([0, 1, 3, 4]), np.array([1, 2, 4, 5])
 _HAND = 2
 # Directions of four bones and the hand's place, each with its squares; how far aside the hand is;
-# the state, its deviations, IoU, size of the yaw and the camera's pitch.
-FEATURES = 2 * 12 + 2 * 3 + 1 + 2 * N_STATE + 3
+# the state, its deviations, IoU, size of the yaw and the viewpoints.
+_RESULT = 2 * 12 + 2 * 3 + 1
+FEATURES = _RESULT + 2 * N_STATE + 7
+OF_CAMERAS = slice(FEATURES - 4, FEATURES)
+"""Where the features are that hardly ever change: what the cameras show, and whose body it is."""
+
+
+class Viewpoints(NamedTuple):
+    """How a person was seen, and how well known the body is.
+
+    A camera shows what lies across its line of sight, so the squares of the lines' directions,
+    summed over the cameras that see, say what is shown of all directions on the floor.
+
+    Attributes:
+        pitch_rad: how far the first camera looks down.
+        aside: how much is shown of what is aside, as the first camera sees it: 1 of it alone.
+        ahead: the same of depth: 0 of the first camera alone.
+        slanting: the product of both; its sign is the side of a further camera.
+        is_measured: the body was measured, not guessed from proportions.
+    """
+
+    pitch_rad: float
+    aside: float
+    ahead: float
+    slanting: float
+    is_measured: bool
+
+    @classmethod
+    def of(cls, pitch_rad: float, yaws_rad: Sequence[float], is_measured: bool) -> Viewpoints:
+        """Return that of cameras turned by ``yaws_rad`` about the vertical: 0 is the first one."""
+        lines = [(cos(yaw_rad), sin(yaw_rad)) for yaw_rad in yaws_rad]
+        return cls(
+            pitch_rad,
+            sum(c * c for c, _ in lines),
+            sum(s * s for _, s in lines),
+            sum(c * s for c, s in lines),
+            is_measured,
+        )
 
 
 def features_of(
@@ -27,7 +64,7 @@ def features_of(
     stddevs: FloatArray,
     keypoints_m: FloatArray,
     ious: FloatArray,
-    pitch_rad: float,
+    viewpoints: Viewpoints,
 ) -> FloatArray:
     """Return what a network sees, (n, 2, F): the left arm, and the right one mirrored.
 
@@ -36,16 +73,25 @@ def features_of(
         stddevs: their deviations, (n, 14).
         keypoints_m: (n, 6, 3), metres in the optical frame.
         ious: of model and silhouette, (n,).
-        pitch_rad: how far the camera looks down.
+        viewpoints: of all of them.
     """
     features = np.empty((len(states), 2, FEATURES))
-    _fill(states, stddevs, keypoints_m, ious, pitch_rad, features)
+    _fill(states, stddevs, keypoints_m, ious, *viewpoints, features)
     return features
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
-    states: Any, stddevs: Any, keypoints_m: Any, ious: Any, pitch_rad: float, features: Any
+    states: Any,
+    stddevs: Any,
+    keypoints_m: Any,
+    ious: Any,
+    pitch_rad: float,
+    aside: float,
+    ahead: float,
+    slanting: float,
+    is_measured: bool,
+    features: Any,
 ) -> None:
     """Write :func:`features_of` to ``features``."""
     for n in range(len(states)):
@@ -70,10 +116,15 @@ def _fill(
             row[30] = abs(row[24])
             for i in range(N_STATE):
                 if arm:
-                    row[31 + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
-                    row[31 + N_STATE + i] = stddevs[n, _OTHER_ARM[i]]
+                    row[_RESULT + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
+                    row[_RESULT + N_STATE + i] = stddevs[n, _OTHER_ARM[i]]
                 else:
-                    row[31 + i], row[31 + N_STATE + i] = states[n, i], stddevs[n, i]
-            row[31 + 2 * N_STATE] = ious[n]
-            row[32 + 2 * N_STATE] = abs(states[n, YAW])
-            row[33 + 2 * N_STATE] = pitch_rad
+                    row[_RESULT + i], row[_RESULT + N_STATE + i] = states[n, i], stddevs[n, i]
+            said = row[_RESULT + 2 * N_STATE :]
+            said[0] = ious[n]
+            said[1] = abs(states[n, YAW])
+            said[2] = pitch_rad
+            said[3] = aside
+            said[4] = ahead
+            said[5] = sideways * slanting
+            said[6] = is_measured

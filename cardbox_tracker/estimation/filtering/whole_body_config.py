@@ -139,8 +139,8 @@ class WholeBodyConfig:
     )
     learned_correction: bool = setting(
         True,
-        "whether the learned correction is part of the result; with one camera and without depth "
-        "images",
+        "whether the learned correction is part of the result; not with one camera and a depth "
+        "image",
         restarts=True,
     )
     learned_deviations: bool = setting(

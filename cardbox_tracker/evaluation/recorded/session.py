@@ -1,7 +1,8 @@
 """A recorded session with ground truth as arrays, one row for each image.
 
 A session is a folder with ``bag/`` and ``ground_truth.json``, and optionally
-``peer_mediapipe.json``: what MediaPipe Pose does on the same images.
+``peer_mediapipe.json``: what MediaPipe Pose does on the same images, and ``extrinsics.yaml``:
+where several cameras stand.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class RecordedSession:
     Attributes:
         name: of its folder.
         bag: its recording.
+        extrinsics: file that says where its cameras stand; None without it.
         truth: its ground truth.
         spans: ``empty`` and the three reference postures, without their margins.
         start_s: when the motions begin, seconds from the bag's start.
@@ -49,6 +51,7 @@ class RecordedSession:
 
     name: str
     bag: Path
+    extrinsics: Path | None
     truth: GroundTruth
     spans: dict[str, TimeSpan]
     start_s: float
@@ -79,10 +82,11 @@ def load_session(folder: str | os.PathLike[str]) -> RecordedSession:
         for stamp, frame in sorted(truth.frames.items())
         if frame.is_in_sight and frame.segment not in PROTOCOL
     }
-    unknown = np.full(3, np.nan)
+    unknown, extrinsics = np.full(3, np.nan), path / "extrinsics.yaml"
     return RecordedSession(
         path.name,
         path / "bag",
+        extrinsics if extrinsics.is_file() else None,
         truth,
         {name: _inside(*truth.spans[name]) for name in REFERENCE_SPANS},
         truth.spans["neutral"][0],

@@ -56,13 +56,17 @@ def track_session(
     only: str | None = None,
     observe: Callable[[int, int, Estimate, Tracker], None] | None = None,
     has_images: bool = True,
+    body: BodyModel | None = None,
+    covered: Callable[[float], int | None] | None = None,
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
 
     Of several cameras the first one measures the person; all of them track, or the one that
     ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
     ``observe`` is told of every estimate: seed, stamp in ns, estimate and tracker. Not
-    ``has_images``: the tracker sees silhouettes alone.
+    ``has_images``: the tracker sees silhouettes alone. A ``body`` is tracked as it is, and not
+    measured. ``covered`` tells which of several cameras sees nothing, by its number, given the
+    seconds since tracking began; None: none of them.
 
     Raises:
         CardboxError: the recording cannot be read.
@@ -71,24 +75,30 @@ def track_session(
     if depth:
         config, only = replace(config, terms=(*config.terms, Depth())), None
     cameras, empty = session.truth.cameras, session.spans["empty"]
-    with open_recording(session.bag, empty, cameras, depth=depth) as source:
+    with open_recording(session.bag, empty, cameras, session.extrinsics, depth) as source:
         others = source.others if isinstance(source, CameraSources) else ()
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
-        bodies = [_measure(session, source.first, seed) for seed in seeds]
+        bodies = [
+            _measure(session, source.first, seed) if body is None else (body, "") for seed in seeds
+        ]
         trackers = [
-            Tracker(body, camera, config, np.random.default_rng(seed), others=others)
-            if body
+            Tracker(tracked, camera, config, np.random.default_rng(seed), others=others)
+            if tracked
             else None
-            for (body, _), seed in zip(bodies, seeds, strict=True)
+            for (tracked, _), seed in zip(bodies, seeds, strict=True)
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
+        started_ns: int | None = None
         for stamp_ns, silhouettes, images, depth_m in _seen(
             source, session.start_s + offset_s, only
         ):
             if not has_images:
                 images = [None for _ in images]
+            started_ns = stamp_ns if started_ns is None else started_ns
+            if covered and (number := covered((stamp_ns - started_ns) / 1e9)) is not None:
+                silhouettes[number] = images[number] = None
             for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
                 if tracker is None:
                     continue
@@ -98,8 +108,8 @@ def track_session(
                 if observe is not None:
                     observe(seed, stamp_ns, estimates[stamp_ns], tracker)
     return [
-        _run(session, body, failure, estimates, spent)
-        for (body, failure), estimates, spent in zip(bodies, found, times, strict=True)
+        _run(session, tracked, failure, estimates, spent)
+        for (tracked, failure), estimates, spent in zip(bodies, found, times, strict=True)
     ]
 
 

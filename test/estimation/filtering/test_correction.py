@@ -14,6 +14,7 @@ from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.correction import DATA, Correction, moved
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.vision.camera import Camera
 
@@ -25,6 +26,8 @@ ARMS = [1, 2, 4, 5]
 PARENTS = [0, 1, 3, 4]
 OTHER_ARM = [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]
 MIRROR = np.array([-1, -1, 1, -1, *[1] * 10])
+VIEWPOINTS = Viewpoints.of(0.0, [0.0, 1.0], is_measured=True)
+MIRRORED = VIEWPOINTS._replace(slanting=-VIEWPOINTS.slanting)
 STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
     lambda shares: STATE_LIMITS[:, 0] + np.array(shares) * np.ptp(STATE_LIMITS, axis=1)
 )
@@ -58,7 +61,7 @@ def test_answers_are_beside_the_middle_of_the_shoulders_and_bones_keep_their_len
 @settings(max_examples=50, deadline=None)
 @given(STATES, st.floats(0.0, 1.0))
 def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:
-    found = Correction(COST)(state, np.full(14, 0.2), iou, search(state))
+    found = Correction(COST)(state, np.full(14, 0.2), iou, search(state), VIEWPOINTS)
     assert np.isfinite(found).all()
     assert (found >= STATE_LIMITS[:, 0]).all() and (found <= STATE_LIMITS[:, 1]).all()
     assert np.array_equal(found[1:4], state[1:4])
@@ -77,8 +80,8 @@ def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
         state = FRONT + 0.1 * rng.standard_normal(14)
         other = MIRROR * state[OTHER_ARM]
         mirrored = search(state)._replace(states=MIRROR * search(state).states[:, OTHER_ARM])
-        found = here(state, STDDEV, 0.8, search(state))
-        found_there = there(other, STDDEV, 0.8, mirrored)
+        found = here(state, STDDEV, 0.8, search(state), VIEWPOINTS)
+        found_there = there(other, STDDEV, 0.8, mirrored, MIRRORED)
         assert np.allclose(MIRROR * found[OTHER_ARM], found_there, atol=1e-4)
 
 
@@ -88,7 +91,7 @@ def test_results_come_near_what_the_network_says() -> None:
     # Where a joint is at its limit, such as a straight elbow, it cannot go on.
     state[[7, 11]] = 0.6
     correction = Correction(COST)
-    found = COST.keypoints(correction(state, STDDEV, 0.9, search(state)))
+    found = COST.keypoints(correction(state, STDDEV, 0.9, search(state), VIEWPOINTS))
     network = load_recurrent_network(DATA)
     answers_m, _ = network(correction.features, network.new_memory(2))
     points = COST.keypoints(state)
@@ -99,7 +102,15 @@ def test_results_come_near_what_the_network_says() -> None:
 
 def test_what_was_before_counts() -> None:
     first, second = FRONT, np.append(reference_posture("arms"), [0.0, 0.0])
-    alone = Correction(COST)(second, STDDEV, 0.9, search(second))
+    alone = Correction(COST)(second, STDDEV, 0.9, search(second), VIEWPOINTS)
     correction = Correction(COST)
-    correction(first, STDDEV, 0.5, search(first))
-    assert not np.allclose(correction(second, STDDEV, 0.9, search(second)), alone)
+    correction(first, STDDEV, 0.5, search(first), VIEWPOINTS)
+    assert not np.allclose(correction(second, STDDEV, 0.9, search(second), VIEWPOINTS), alone)
+
+
+def test_cameras_that_show_depth_count() -> None:
+    several, one = (
+        Correction(COST)(FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True))
+        for yaws in ([0.0, 1.2], [0.0])
+    )
+    assert not np.allclose(several, one)

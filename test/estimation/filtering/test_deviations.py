@@ -13,12 +13,13 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
 from cardbox_tracker.estimation.filtering.networks import Network, load_network
-from cardbox_tracker.estimation.filtering.result_features import features_of
+from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
 UNIT = np.ones(7)
+VIEWPOINTS = Viewpoints.of(0.0, [0.0], is_measured=True)
 STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
     lambda shares: STATE_LIMITS[:, 0] + np.array(shares) * np.ptp(STATE_LIMITS, axis=1)
 )
@@ -27,7 +28,7 @@ STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
 def deviations(state: np.ndarray, spread: float, iou: float = 0.9) -> np.ndarray:
     points = COST.keypoints(state)[None]
     row = state[None], np.full((1, 14), spread), points, np.array([iou])
-    return deviations_of(load_network(DATA), features_of(*row, 0.0))[0]
+    return deviations_of(load_network(DATA), features_of(*row, VIEWPOINTS))[0]
 
 
 def test_the_torso_is_the_mean_of_what_is_said_beside_either_arm() -> None:

@@ -1,13 +1,15 @@
-"""What is done to a result: fitted, and with one camera corrected by what was learned."""
+"""What is done to a result: fitted, and corrected by what was learned."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
+import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import PROPORTIONS, BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame
@@ -17,6 +19,7 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.refinement import Refinement
+from cardbox_tracker.estimation.filtering.result_features import OF_CAMERAS
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
@@ -64,17 +67,51 @@ def test_without_the_correction_the_result_is_only_fitted() -> None:
     assert np.array_equal(refined(Refinement(COST, CAMERA, config), seen())[1], expected)
 
 
-def test_with_a_depth_image_the_result_is_only_fitted() -> None:
+def test_with_one_camera_and_a_depth_image_the_result_is_only_fitted() -> None:
     depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
     expected = fitted(depth_m)
     _, result = refined(Refinement(COST, CAMERA, CONFIG), seen(depth_m))
     assert np.array_equal(result, expected)
 
 
-def test_with_further_cameras_the_result_is_only_fitted() -> None:
-    expected = fitted()
+def test_with_further_cameras_those_that_see_count() -> None:
+    turn = np.eye(4)
+    turn[:3, :3] = cv2.Rodrigues(np.array([0.0, -1.0, 0.0]))[0]
+    turn[:3, 3] = np.array([0.0, 0.0, 2.3]) - turn[:3, :3] @ [0.0, 0.0, 2.3]
+    view = View.of(BODY, CAMERA, OtherCamera(CAMERA, Extrinsics.of(turn)))
+    assert abs(view.yaw_rad) == pytest.approx(1.0)
+    refine, alone = (Refinement(COST, CAMERA, CONFIG, o) for o in ([(COST, view)], ()))
+    refine.see([0])
+    frame = seen()
+    assert np.array_equal(refined(refine, frame)[1], refined(alone, frame)[1])
+    assert refine.correction is not None and alone.correction is not None
+    assert np.array_equal(refine.correction.features, alone.correction.features)
+    fit = fitted()
+    refine.see([0, 1])
+    refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
+    shown = [1.0 + np.cos(1.0) ** 2, np.sin(1.0) ** 2]
+    assert np.allclose(refine.correction.features[0, OF_CAMERAS][:2], shown)
+
+
+def test_with_further_cameras_a_depth_image_changes_nothing() -> None:
     same = OtherCamera(CAMERA, Extrinsics.of(np.eye(4)))
     others = [(COST, View.of(BODY, CAMERA, same))]
-    refine = Refinement(COST, CAMERA, CONFIG, others)
-    refine.outline.seeing = (0,)
-    assert np.array_equal(refined(refine, seen())[1], expected)
+    depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
+    fit = fitted()
+    results = [
+        Refinement(COST, CAMERA, CONFIG, others).corrected(frame, fit, STDDEV, 0.9, SEARCH)
+        for frame in (seen(), seen(depth_m))
+    ]
+    assert np.array_equal(*results)
+    assert not np.allclose(results[0], fit)
+
+
+def test_a_body_that_nobody_measured_is_known_as_such() -> None:
+    guessed = replace(BODY, source=PROPORTIONS)
+    told = []
+    for body in (BODY, guessed):
+        refine = Refinement(WholeBodyCost(body, CAMERA, WholeBodyCostConfig()), CAMERA, CONFIG)
+        keypoints_m = COST.keypoints(STATE)
+        refine.deviations(seen(), STATE, STDDEV, keypoints_m, 0.9)
+        told.append(refine.features[:, OF_CAMERAS][:, -1].tolist())
+    assert told == [[1.0, 1.0], [0.0, 0.0]]

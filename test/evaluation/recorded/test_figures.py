@@ -35,6 +35,7 @@ def session(postures: np.ndarray) -> RecordedSession:
     return RecordedSession(
         "hand_made",
         Path("bag"),
+        None,
         truth,
         {},
         0.0,
