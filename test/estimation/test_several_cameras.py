@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -144,8 +146,14 @@ def error_cm(estimate: Estimate, state: np.ndarray) -> float:
     return 100 * float(distances.mean())
 
 
-def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
-    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
+@pytest.mark.parametrize(("is_corrected", "least_iou"), [(False, 0.85), (True, 0.75)])
+def test_two_cameras_follow_and_any_of_them_may_drop_out(
+    is_corrected: bool, least_iou: float
+) -> None:
+    """People do not look as the model does, so what was learned of them fits its outline less."""
+    preset = default_preset()
+    config = replace(preset, whole_body=replace(preset.whole_body, learned_correction=is_corrected))
+    tracker = Tracker(BODY, CAMERA, config, others=[OTHER])
     errors, states = [], []
     for i in range(24):
         seeing = (0,) if 8 <= i < 12 else (1,) if 16 <= i < 20 else (0, 1)
@@ -157,7 +165,7 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
         assert [n for n, iou in enumerate(ious) if iou is not None] == list(seeing)
         if len(seeing) == 1:
             assert ious[seeing[0]] == pytest.approx(estimate.iou)
-    assert min(iou for iou in ious if iou is not None) > 0.8
+    assert min(iou for iou in ious if iou is not None) > least_iou
     assert set(states[4:]) <= {TRACKING, UNCERTAIN}
     assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
     assert max(errors[4:]) < 20.0

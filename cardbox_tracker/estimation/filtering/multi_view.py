@@ -30,9 +30,9 @@ from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
 from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 
-# States of a round of all joints, times those of one camera; the fraction that moves by
-# differences; and how the noise shrinks from one round to the next.
-_TOGETHER, _DIFFERING, _ROUND_DECAY = 4 / 3, 0.8, 0.8
+# Of the rounds of all joints: the fraction of states that moves by differences, and how the noise
+# shrinks from one round to the next.
+_DIFFERING, _ROUND_DECAY = 0.8, 0.8
 # Before all joints move together, so many states, of which so many are alike and the others so far
 # apart, m, are moved by so many Gauss-Newton steps.
 _FITTED, _FIT_STEPS = (3, 1, 0.1), 2
@@ -202,7 +202,9 @@ class MultiViewFilter(WholeBodyFilter):
     def _fit(self) -> Fit:
         fit = super()._fit()
         # The last survivor is the worst one.
-        self._survivors[-1] = self._result = fit.seen
+        self._survivors[-1] = fit.seen
+        assert fit.offset_m is not None
+        self._result = np.concatenate([fit.posture, fit.offset_m])
         return fit
 
     def forget(self) -> None:
@@ -220,7 +222,6 @@ def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
     whole = replace(
         whole,
         smoothing=whole.smoothing / 3,
-        together=round(_TOGETHER * whole.together),
         round_decay=max(whole.round_decay, _ROUND_DECAY),
         differing=max(whole.differing, _DIFFERING),
     )
