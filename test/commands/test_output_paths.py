@@ -70,7 +70,7 @@ def test_evaluate_does_not_replace_a_report_but_resumes_without_one(
 
 
 SLOW = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from cardbox_tracker.commands import main, synthesize
 from cardbox_tracker.files import atomic_path
@@ -82,6 +82,8 @@ def run(options):
         print("begun", flush=True)
         time.sleep(600)
 
+# Below nohup it is ignored, which the command respects.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 synthesize.run = run
 sys.exit(main.main(["synthesize", "--output", sys.argv[1]]))
 """
