@@ -14,16 +14,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.correction import moved
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, scaled_features
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
+from cardbox_tracker.evaluation.recorded.session import load_session
 from tools import networks
-from tools.tracked_ways import LENGTH, Samples, samples_of
+from tools.tracked_ways import track
 
 FloatArray = NDArray[np.float64]
 
@@ -32,8 +38,8 @@ UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
 # Nodes of the first layer, of the memory, of the last layer but one.
 ENTERED, NODES, LEFT = 128, 96, 64
 NETWORKS, EPOCHS = 4, 20
-# Sequences begin half as many images apart as they are long; so many are a batch.
-BATCH = 16
+# Images of a sequence, which begin half as many apart, and sequences of a batch.
+LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
 # Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
 NOISE = 0.25
@@ -43,6 +49,47 @@ STEADY, LEAST_PERIOD_S = 0.01, 0.05
 LEAST_BONE_M = 0.01
 # Errors beyond these are other postures, which no correction mends, m and m/s^2.
 MOST_M, MOST_M_S2 = 2.0, 60.0
+
+
+class Samples(NamedTuple):
+    """Images of a session, one after the other.
+
+    Attributes:
+        features: what the network sees, (n, 2, F).
+        found_m: keypoints without the correction, (n, 6, 3), metres in the optical frame.
+        true_m: true ones, nan where they are not scored.
+        stamps_ns: (n,).
+    """
+
+    features: FloatArray
+    found_m: FloatArray
+    true_m: FloatArray
+    stamps_ns: NDArray[np.int64]
+
+
+def samples_of(folder: Path, seed: int) -> Samples:
+    """Track a session; see :class:`Samples`."""
+    session = load_session(folder)
+    wanted = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
+    unknown = np.full((6, 3), np.nan)
+    rows: list[tuple[FloatArray, FloatArray, FloatArray, int]] = []
+
+    def keep(_: int, stamp_ns: int, __: Estimate, tracker: Tracker) -> None:
+        assert isinstance(tracker.filter, WholeBodyFilter)
+        correction = tracker.filter.refine.correction
+        assert correction is not None
+        # Of a lost person it sees something, too, and remembers it; of nobody it sees nothing.
+        is_new = not rows or rows[-1][0] is not correction.features
+        if not is_new or not correction.features.size:
+            return
+        true_m = wanted.get(stamp_ns, unknown)
+        rows.append((correction.features, correction.found_m, true_m, stamp_ns))
+
+    track(session, PRESETS["default"](), seed, keep)
+    if len(rows) < LENGTH:
+        raise SystemExit(f"{folder}: nobody was tracked for long; leave the session out")
+    features, found_m, true_m, stamps_ns = (np.array(c) for c in zip(*rows, strict=True))
+    return Samples(features, found_m, true_m, stamps_ns)
 
 
 def learn(samples: Sequence[Samples], seed: int = 0) -> RecurrentNetwork:

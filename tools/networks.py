@@ -159,6 +159,13 @@ def save(network: Network | RecurrentNetwork, path: Path, about: str) -> None:
         np.savez_compressed(temporary, allow_pickle=False, **packed)
 
 
+def show(folders: Sequence[Path], rows: Sequence[Sequence[float]]) -> None:
+    """Print the figures of sessions, and their means."""
+    for folder, row in zip(folders, rows, strict=True):
+        print(folder.name, *(f"{value:.1f}" for value in row))
+    print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
+
+
 def run(
     args: Sequence[str] | None,
     description: str | None,
@@ -198,11 +205,8 @@ def run(
     network = learn_from(learned, given.seed)
     if adjust is not None:
         network = adjust(network, fresh)
-    rows = [check(network, one) for one in others]
-    for folder, row in zip(given.check, rows, strict=True):
-        print(folder.name, *(f"{value:.1f}" for value in row))
-    if rows:
-        print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
+    if others:
+        show(given.check, [check(network, one) for one in others])
     images = sum(len(one.features) for one in learned)
     what = f"{images} images of {len(given.sessions)} sessions, {given.seeds} seeds"
     about = f"{given.about} {what}".strip()

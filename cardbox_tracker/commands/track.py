@@ -149,7 +149,7 @@ def track_inputs(
         print(f"{options.model}: {body.doubt}")
     config = _config(options)
     is_more = len(options.cameras) > 1 or options.depth is not None
-    if is_more and config.filter != "whole_body":
+    if is_more and not config.has_several_views:
         raise CardboxError("several cameras and depth need --preset default; paper has one outline")
     with open_recording(
         options.recording,

@@ -28,7 +28,7 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     Raises:
         CardboxError: something failed; the text says what.
     """
-    if cameras > 1 and PRESETS[preset]().filter != "whole_body":
+    if cameras > 1 and not PRESETS[preset]().has_several_views:
         raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
     try:
         output.mkdir(parents=True, exist_ok=True)

@@ -142,6 +142,11 @@ class TrackerConfig:
         limits=(1, 1_000_000),
     )
 
+    @property
+    def has_several_views(self) -> bool:
+        """Whether it may be given several cameras, or depth."""
+        return self.filter == "whole_body"
+
     def __post_init__(self) -> None:
         """Check the ranges.
 

@@ -82,7 +82,7 @@ class Tracker:
         self._rng = rng or np.random.default_rng(0)
         self._make_filter = make_filter
         self._others = tuple(others)
-        if others and (make_filter or self.config.filter != "whole_body"):
+        if others and (make_filter or not self.config.has_several_views):
             raise ValueError("several cameras need the filter whole_body: the preset default")
         self._fitting = None
         if body.unknown:

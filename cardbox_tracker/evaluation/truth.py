@@ -52,6 +52,7 @@ class GroundTruth:
         side_turn: the way the person turned for the side reference.
         cameras: namespaces of several cameras, the first camera's first; empty with one.
         is_rectified: the first two of them are a rectified pair.
+        stature_m: height of the person; None where it is not known.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -62,6 +63,7 @@ class GroundTruth:
     side_turn: str
     cameras: tuple[str, ...] = ()
     is_rectified: bool = False
+    stature_m: float | None = None
 
 
 def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
@@ -89,6 +91,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
         spans: dict[str, tuple[float, float]] = {}
         for segment in data["segments"]:
             spans.setdefault(segment["name"], (segment["start_s"], segment["end_s"]))
+        stature_m = data["person"].get("height")
         return GroundTruth(
             frames,
             spans,
@@ -98,6 +101,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             str(data["side_posture_turns_to"]),
             tuple(str(camera["name"]) for camera in data.get("cameras", ())),
             "baseline_m" in str(data.get("cameras", ())),
+            None if stature_m is None else float(stature_m),
         )
     except OSError as error:
         raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None

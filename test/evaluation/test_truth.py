@@ -60,6 +60,13 @@ def test_reading(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen.keypoints_m[2], [0.1, 0.2, 2.0])
     assert seen.posture is None
     assert seen.torso_rad is None
+    assert truth.stature_m is None
+
+
+def test_the_stature_is_read_where_it_is_known(tmp_path: Path) -> None:
+    data = truth_data()
+    data["person"]["height"] = 1.64
+    assert load_ground_truth(write(tmp_path, data)).stature_m == 1.64
 
 
 def test_joints_are_ordered_by_name_and_angles_read(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,29 +9,29 @@ import pytest
 
 from cardbox_tracker.body.model import PROPORTIONS
 from cardbox_tracker.body.proportions import sizes_of_stature
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.evaluation.truth import GroundTruth
 from tools.tracked_ways import COVERED_S, TURN_S, covered, way_of
 
 
 @pytest.fixture(params=[f"session_{number}" for number in range(9)])
-def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    path = tmp_path / request.param
-    path.mkdir()
-    truth = {"person": {"height": 1.6, "distance_m": 2.0}, "camera": {"pitch_down_deg": 6.0}}
-    (path / "ground_truth.json").write_text(json.dumps(truth), encoding="utf-8")
-    return path
+def session(request: pytest.FixtureRequest) -> RecordedSession:
+    truth = GroundTruth({}, {}, 0, 2.0, 6.0, "left", stature_m=1.6)
+    nothing = np.empty(0, np.int64), np.empty(0, np.str_), np.empty((0, 6, 3)), np.empty((0, 3))
+    return RecordedSession(request.param, Path(), None, truth, {}, 0.0, *nothing, {}, None)
 
 
-def test_the_ways_take_turns(folder: Path) -> None:
-    as_it_is, poorer, guessed = (way_of(folder, seed) for seed in range(3))
+def test_the_ways_take_turns(session: RecordedSession) -> None:
+    as_it_is, poorer, guessed = (way_of(session, seed) for seed in range(3))
     assert as_it_is.has_images and not as_it_is.covers and as_it_is.body is None
     assert poorer.covers and poorer.body is None
     assert guessed.body is not None and guessed.body.source == PROPORTIONS
-    assert way_of(folder, 3) == as_it_is
-    assert way_of(folder, 5).body != guessed.body
+    assert way_of(session, 3) == as_it_is
+    assert way_of(session, 5).body != guessed.body
 
 
-def test_people_say_about_how_tall_and_how_far_away_they_are(folder: Path) -> None:
-    body = way_of(folder, 2).body
+def test_people_say_about_how_tall_and_how_far_away_they_are(session: RecordedSession) -> None:
+    body = way_of(session, 2).body
     assert body is not None
     assert np.allclose(body.sizes, sizes_of_stature(1.6), rtol=0.1)
     assert body.camera_pose.pitch_rad == pytest.approx(np.radians(6.0))

@@ -15,7 +15,6 @@ from cardbox_tracker.body.sizes import FloatArray
 Layer = tuple[FloatArray, FloatArray]
 """Weights (networks, inputs, outputs) and biases (networks, 1, outputs)."""
 
-
 Read = TypeVar("Read")
 
 

@@ -35,7 +35,7 @@ class Refinement:
     Attributes:
         outline: the fit to the outlines.
         correction: what was learned; None if it is switched off.
-        features: what the deviations are learned from, of the last result, (2, F).
+        features: what the deviations are learned from, of the last corrected result, (2, F).
     """
 
     def __init__(
@@ -50,10 +50,8 @@ class Refinement:
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
         self._yaws_rad = [0.0, *(view.yaw_rad for _, view in others)]
         self.see(range(len(self._yaws_rad)))
-        is_corrected = config.learned_correction
-        self.correction = Correction(cost) if is_corrected else None
-        is_learned = is_corrected and config.learned_deviations
-        self._deviations = load_network(DATA) if is_learned else None
+        self.correction = Correction(cost) if config.learned_correction else None
+        self._deviations = load_network(DATA) if config.learned_deviations else None
 
     def see(self, seeing: Sequence[int]) -> None:
         """Let only the cameras of these numbers count in this frame; the first one is 0."""
@@ -80,17 +78,16 @@ class Refinement:
             iou: of model and silhouette.
             search: that has found it.
         """
-        if self.correction is None or self._is_unlike(frame):
+        if self.correction is None or not self._is_known(frame):
             return fitted
         return self.correction(fitted, stddev, iou, search, self._viewpoints)
 
-    def _is_unlike(self, frame: Frame) -> bool:
-        """Whether it is like nothing that was learned from: a depth image shows what others hide.
+    def _is_known(self, frame: Frame) -> bool:
+        """Whether such frames were learned from: a depth image shows one camera what is new to it.
 
-        Beside a further camera it changes little: 4.1 and 4.4 cm without the correction, 3.2 and
-        3.2 with it (``stereo_bumblebee``, two seeds).
+        Beside a further camera it adds little (``docs/two-cameras.md``).
         """
-        return frame.depth_m is not None and len(self._yaws_rad) == 1
+        return frame.depth_m is None or len(self._yaws_rad) > 1
 
     def deviations(
         self,
@@ -111,9 +108,11 @@ class Refinement:
             keypoints_m: of the state, (6, 3), metres in the optical frame.
             iou: of model and silhouette.
         """
+        if self.correction is None or not self._is_known(frame):
+            return stddev
         row = state[None], stddev[None], keypoints_m[None], np.array([iou])
         self.features = features_of(*row, self._viewpoints)[0]
-        if self._deviations is None or self._is_unlike(frame):
+        if self._deviations is None:
             return stddev
         learned = stddev.copy()
         learned[_ANGLES] = deviations_of(self._deviations, self.features[None])[0]

@@ -25,6 +25,9 @@ from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
 FloatArray = NDArray[np.float64]
 
+Observe = Callable[[int, int, Estimate, Tracker], None]
+"""Is told of every estimate: seed, stamp in ns, estimate and tracker."""
+
 
 @dataclass(frozen=True)
 class SessionRun:
@@ -54,7 +57,7 @@ def track_session(
     config: TrackerConfig,
     seeds: tuple[int, ...],
     only: str | None = None,
-    observe: Callable[[int, int, Estimate, Tracker], None] | None = None,
+    observe: Observe | None = None,
     has_images: bool = True,
     body: BodyModel | None = None,
     covered: Callable[[float], int | None] | None = None,
@@ -63,8 +66,7 @@ def track_session(
 
     Of several cameras the first one measures the person; all of them track, or the one that
     ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
-    ``observe`` is told of every estimate: seed, stamp in ns, estimate and tracker. Not
-    ``has_images``: the tracker sees silhouettes alone. A ``body`` is tracked as it is, and not
+    Not ``has_images``: the tracker sees silhouettes alone. A ``body`` is tracked as it is, and not
     measured. ``covered`` tells which of several cameras sees nothing, by its number, given the
     seconds since tracking began; None: none of them.
 

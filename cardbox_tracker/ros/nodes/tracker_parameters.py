@@ -166,7 +166,7 @@ class TrackerParameters(NodeParameters):
     def check(self) -> None:
         """Raise ValueError where values do not go together."""
         config = self.config()
-        if (len(self.cameras) > 1 or self.depth) and config.filter != "whole_body":
+        if (len(self.cameras) > 1 or self.depth) and not config.has_several_views:
             raise ValueError(
                 f"several cameras and depth need the preset default, but it is {self.preset}, "
                 "which has one outline"

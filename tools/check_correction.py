@@ -1,0 +1,39 @@
+"""What the package's correction brings: ``python -m tools.check_correction SESSION...``.
+
+Recorded sessions with ground truth are tracked in one of the ways of ``tools/tracked_ways.py``.
+Printed are absolute and aligned error, cm, and the error of the acceleration, m/s^2: of what the
+filter has found, and of the keypoints as the network says that they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from cardbox_tracker.estimation.filtering.correction import DATA
+from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from tools import networks
+from tools.make_correction import check, samples_of
+
+
+def figures_of(folder: Path, seed: int) -> tuple[float, ...]:
+    """Return the errors of a session, without and with the correction."""
+    return check(load_recurrent_network(DATA), samples_of(folder, seed))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Print a line for each session."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--seed", type=int, default=0, help="whose remainder by 3 is the way")
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(args)
+    with ProcessPoolExecutor(given.jobs) as pool:
+        rows = list(pool.map(partial(figures_of, seed=given.seed), given.sessions))
+    networks.show(given.sessions, rows)
+
+
+if __name__ == "__main__":
+    main()
