@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import cardbox_patches
@@ -12,6 +12,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import (
+    CROSSING_BITS,
     NEAR_PLANE_M,
     clip_near,
     fill_convex,
@@ -95,8 +96,9 @@ def test_the_order_of_the_corners_does_not_matter(corners: list[tuple[float, flo
 
 
 @given(st.lists(POINT, min_size=3, max_size=3))
+@example([(0.0, 0.0), (362 / 256, -129 / 256), (1057 / 256, 4027 / 256)])
 def test_a_triangle_covers_the_centres_inside(corners: list[tuple[float, float]]) -> None:
-    """Against half-planes; centres within 1e-6 of an edge may be either."""
+    """Against half-planes; centres as near to an edge as crossings are inexact may be either."""
     (ax, ay), (bx, by), (cx, cy) = corners
     v, u = np.mgrid[:H, :W]
     sides = np.stack(
@@ -106,8 +108,11 @@ def test_a_triangle_covers_the_centres_inside(corners: list[tuple[float, float]]
             (ax - cx) * (v - cy) - (ay - cy) * (u - cx),
         ]
     )
-    inside = np.all(sides > 1e-6, axis=0) | np.all(sides < -1e-6, axis=0)
-    outside = np.any(sides > 1e-6, axis=0) & np.any(sides < -1e-6, axis=0)
+    # First crossing and step are rounded to whole 2^-16 px, so row v is off by half of (1 + v).
+    inexact_px = 0.5 * (1 + v) / 2**CROSSING_BITS
+    near = np.abs([by - ay, cy - by, ay - cy])[:, None, None] * inexact_px + 1e-9
+    inside = np.all(sides > near, axis=0) | np.all(sides < -near, axis=0)
+    outside = np.any(sides > near, axis=0) & np.any(sides < -near, axis=0)
     mask = filled(*corners) == 255
     assert mask[inside].all()
     assert not mask[outside].any()
