@@ -27,7 +27,7 @@ def main(args: list[str] | None = None) -> None:
     """Print a line for each session."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--seed", type=int, default=0, help="whose remainder by 3 is the way")
+    parser.add_argument("--seed", type=int, default=0, help="whose remainder by 4 is the way")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:

@@ -53,6 +53,7 @@ class GroundTruth:
         cameras: namespaces of several cameras, the first camera's first; empty with one.
         is_rectified: the first two of them are a rectified pair.
         stature_m: height of the person; None where it is not known.
+        depth_topic: of depth images of the first camera's view; None without them.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -64,6 +65,7 @@ class GroundTruth:
     cameras: tuple[str, ...] = ()
     is_rectified: bool = False
     stature_m: float | None = None
+    depth_topic: str | None = None
 
 
 def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
@@ -102,6 +104,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             tuple(str(camera["name"]) for camera in data.get("cameras", ())),
             "baseline_m" in str(data.get("cameras", ())),
             None if stature_m is None else float(stature_m),
+            data.get("depth_topic"),
         )
     except OSError as error:
         raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None

@@ -22,12 +22,13 @@ def session(request: pytest.FixtureRequest) -> RecordedSession:
 
 
 def test_the_ways_take_turns(session: RecordedSession) -> None:
-    as_it_is, poorer, guessed = (way_of(session, seed) for seed in range(3))
+    as_it_is, poorer, guessed, with_depth = (way_of(session, seed) for seed in range(4))
     assert as_it_is.has_images and not as_it_is.covers and as_it_is.body is None
     assert poorer.covers and poorer.body is None
     assert guessed.body is not None and guessed.body.source == PROPORTIONS
-    assert way_of(session, 3) == as_it_is
-    assert way_of(session, 5).body != guessed.body
+    assert with_depth.has_depth and not with_depth.covers
+    assert way_of(session, 4) == as_it_is
+    assert way_of(session, 6).body != guessed.body
 
 
 def test_people_say_about_how_tall_and_how_far_away_they_are(session: RecordedSession) -> None:

@@ -12,6 +12,7 @@ along the axes of the optical frame.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -21,11 +22,14 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
+from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.depth_features import features_of_depth
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
+from cardbox_tracker.vision.camera import Camera
 
 DATA = "correction.npz"
 """Name of the network's data file."""
@@ -85,9 +89,9 @@ class Correction:
         found_m: keypoints before the last correction, (6, 3), metres in the optical frame.
     """
 
-    def __init__(self, cost: WholeBodyCost) -> None:
-        """Prepare for the body of ``cost``, that of the first camera."""
-        self._cost = cost
+    def __init__(self, cost: WholeBodyCost, camera: Camera) -> None:
+        """Prepare for the body of ``cost`` before ``camera``, the first one."""
+        self._cost, self._camera = cost, camera
         self._network = load_recurrent_network(DATA)
         # Who comes back is the same person, so nothing makes it forget.
         self._memory = self._network.new_memory(2)
@@ -95,6 +99,7 @@ class Correction:
 
     def __call__(
         self,
+        frame: Frame,
         state: FloatArray,
         stddev: FloatArray,
         iou: float,
@@ -104,6 +109,7 @@ class Correction:
         """Return the state (14,) with its keypoints moved.
 
         Args:
+            frame: what is seen; of its depth image nothing unless ``viewpoints`` say so.
             state: result of the filter, (14,).
             stddev: its deviations, (14,).
             iou: of model and silhouette.
@@ -113,10 +119,13 @@ class Correction:
         cost = self._cost
         self.found_m = cost.keypoints(state)
         result = state[None], stddev[None], self.found_m[None], np.array([iou])
+        if not viewpoints.has_depth:
+            frame = replace(frame, depth_m=None)
         self.features = np.concatenate(
             [
                 features_of(*result, viewpoints)[0],
                 features_of_search(search, cost, self.found_m),
+                features_of_depth(frame, self._camera, self.found_m),
             ],
             axis=1,
         )

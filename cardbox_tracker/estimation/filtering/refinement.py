@@ -1,8 +1,7 @@
 """What is done to the result of the whole-body filter; its particles know nothing of it.
 
 1. It is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
-2. It is corrected by what was learned (:mod:`.correction`), but not where a single camera has a
-   depth image: of those nothing was learned.
+2. It is corrected by what was learned (:mod:`.correction`).
 3. How wrong it may be is estimated for such results (:mod:`.deviations`).
 """
 
@@ -50,7 +49,7 @@ class Refinement:
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
         self._yaws_rad = [0.0, *(view.yaw_rad for _, view in others)]
         self.see(range(len(self._yaws_rad)))
-        self.correction = Correction(cost) if config.learned_correction else None
+        self.correction = Correction(cost, camera) if config.learned_correction else None
         self._deviations = load_network(DATA) if config.learned_deviations else None
 
     def see(self, seeing: Sequence[int]) -> None:
@@ -78,16 +77,15 @@ class Refinement:
             iou: of model and silhouette.
             search: that has found it.
         """
-        if self.correction is None or not self._is_known(frame):
+        if self.correction is None:
             return fitted
-        return self.correction(fitted, stddev, iou, search, self._viewpoints)
+        viewpoints = self._viewpoints_of(frame)
+        return self.correction(frame, fitted, stddev, iou, search, viewpoints)
 
-    def _is_known(self, frame: Frame) -> bool:
-        """Whether such frames were learned from: a depth image shows one camera what is new to it.
-
-        Beside a further camera it adds little (``docs/two-cameras.md``).
-        """
-        return frame.depth_m is None or len(self._yaws_rad) > 1
+    def _viewpoints_of(self, frame: Frame) -> Viewpoints:
+        # Beside a further camera a depth image adds little, and nothing was learned of both.
+        has_depth = frame.depth_m is not None and len(self._yaws_rad) == 1
+        return self._viewpoints._replace(has_depth=has_depth)
 
     def deviations(
         self,
@@ -108,10 +106,10 @@ class Refinement:
             keypoints_m: of the state, (6, 3), metres in the optical frame.
             iou: of model and silhouette.
         """
-        if self.correction is None or not self._is_known(frame):
+        if self.correction is None:
             return stddev
         row = state[None], stddev[None], keypoints_m[None], np.array([iou])
-        self.features = features_of(*row, self._viewpoints)[0]
+        self.features = features_of(*row, self._viewpoints_of(frame))[0]
         if self._deviations is None:
             return stddev
         learned = stddev.copy()

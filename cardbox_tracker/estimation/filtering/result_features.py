@@ -21,8 +21,8 @@ _HAND = 2
 # Directions of four bones and the hand's place, each with its squares; how far aside the hand is;
 # the state, its deviations, IoU, size of the yaw and the viewpoints.
 _RESULT = 2 * 12 + 2 * 3 + 1
-FEATURES = _RESULT + 2 * N_STATE + 7
-OF_CAMERAS = slice(FEATURES - 4, FEATURES)
+FEATURES = _RESULT + 2 * N_STATE + 8
+OF_CAMERAS = slice(FEATURES - 5, FEATURES)
 """Where the features are that hardly ever change: what the cameras show, and whose body it is."""
 
 
@@ -38,6 +38,7 @@ class Viewpoints(NamedTuple):
         ahead: the same of depth: 0 of the first camera alone.
         slanting: the product of both; its sign is the side of a further camera.
         is_measured: the body was measured, not guessed from proportions.
+        has_depth: a single camera has a depth image, too.
     """
 
     pitch_rad: float
@@ -45,6 +46,7 @@ class Viewpoints(NamedTuple):
     ahead: float
     slanting: float
     is_measured: bool
+    has_depth: bool = False
 
     @classmethod
     def of(cls, pitch_rad: float, yaws_rad: Sequence[float], is_measured: bool) -> Viewpoints:
@@ -91,6 +93,7 @@ def _fill(
     ahead: float,
     slanting: float,
     is_measured: bool,
+    has_depth: bool,
     features: Any,
 ) -> None:
     """Write :func:`features_of` to ``features``."""
@@ -128,3 +131,4 @@ def _fill(
             said[4] = ahead
             said[5] = sideways * slanting
             said[6] = is_measured
+            said[7] = has_depth

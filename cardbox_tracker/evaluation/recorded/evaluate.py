@@ -16,9 +16,8 @@ from cardbox_tracker.evaluation.paper.results import provenance, write_json
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
-from cardbox_tracker.evaluation.recorded.tracking import recovery_of, track_session
+from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, recovery_of, track_session
 from cardbox_tracker.files import atomic_path
-from cardbox_tracker.recordings.cameras import STEREO
 
 
 def evaluate_sessions(
@@ -82,14 +81,15 @@ def evaluate_sessions(
 def _named(only: str | None) -> str:
     if only is None:
         return ""
-    return ", with depth" if only == STEREO else f", {only} alone"
+    return ", with depth" if only == WITH_DEPTH else f", {only} alone"
 
 
 def _each_way(folder: Path) -> list[str | None]:
     """Return how a session is tracked: all its cameras, each of several alone, with depth."""
     truth = load_session(folder).truth
     alone = truth.cameras if len(truth.cameras) > 1 else ()
-    return [None, *alone, *([STEREO] if truth.is_rectified else [])]
+    has_depth = truth.is_rectified or truth.depth_topic is not None
+    return [None, *alone, *([WITH_DEPTH] if has_depth else [])]
 
 
 def evaluate_session(

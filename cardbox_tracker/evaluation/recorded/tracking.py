@@ -25,6 +25,9 @@ from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
 FloatArray = NDArray[np.float64]
 
+WITH_DEPTH = "depth"
+"""In place of a camera that tracks alone: all of them, and measured depth."""
+
 Observe = Callable[[int, int, Estimate, Tracker], None]
 """Is told of every estimate: seed, stamp in ns, estimate and tracker."""
 
@@ -65,7 +68,8 @@ def track_session(
     """Initialize and track one session with each of ``seeds``.
 
     Of several cameras the first one measures the person; all of them track, or the one that
-    ``only`` names, or with ``STEREO`` all of them with the depth of the rectified pair.
+    ``only`` names, or with ``WITH_DEPTH`` all of them with the session's depth images, or else the
+    depth of its rectified pair.
     Not ``has_images``: the tracker sees silhouettes alone. A ``body`` is tracked as it is, and not
     measured. ``covered`` tells which of several cameras sees nothing, by its number, given the
     seconds since tracking began; None: none of them.
@@ -73,9 +77,10 @@ def track_session(
     Raises:
         CardboxError: the recording cannot be read.
     """
-    depth = STEREO if only == STEREO else None
-    if depth:
-        config, only = replace(config, terms=(*config.terms, Depth())), None
+    depth = None
+    if only == WITH_DEPTH:
+        depth, only = session.truth.depth_topic or STEREO, None
+        config = replace(config, terms=(*config.terms, Depth()))
     cameras, empty = session.truth.cameras, session.spans["empty"]
     with open_recording(session.bag, empty, cameras, session.extrinsics, depth) as source:
         others = source.others if isinstance(source, CameraSources) else ()

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
@@ -22,6 +23,7 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
 FRONT = np.append(reference_posture("front"), [0.0, 0.0])
 STDDEV = np.full(14, 0.1)
+NOBODY = Frame(np.zeros((240, 320), np.uint8), 240, 0)
 ARMS = [1, 2, 4, 5]
 PARENTS = [0, 1, 3, 4]
 OTHER_ARM = [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]
@@ -61,7 +63,9 @@ def test_answers_are_beside_the_middle_of_the_shoulders_and_bones_keep_their_len
 @settings(max_examples=50, deadline=None)
 @given(STATES, st.floats(0.0, 1.0))
 def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:
-    found = Correction(COST)(state, np.full(14, 0.2), iou, search(state), VIEWPOINTS)
+    found = Correction(COST, CAMERA)(
+        NOBODY, state, np.full(14, 0.2), iou, search(state), VIEWPOINTS
+    )
     assert np.isfinite(found).all()
     assert (found >= STATE_LIMITS[:, 0]).all() and (found <= STATE_LIMITS[:, 1]).all()
     assert np.array_equal(found[1:4], state[1:4])
@@ -75,13 +79,13 @@ def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou
 @given(st.integers(0, 2**32 - 1))
 def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    here, there = Correction(COST), Correction(COST)
+    here, there = Correction(COST, CAMERA), Correction(COST, CAMERA)
     for _ in range(3):
         state = FRONT + 0.1 * rng.standard_normal(14)
         other = MIRROR * state[OTHER_ARM]
         mirrored = search(state)._replace(states=MIRROR * search(state).states[:, OTHER_ARM])
-        found = here(state, STDDEV, 0.8, search(state), VIEWPOINTS)
-        found_there = there(other, STDDEV, 0.8, mirrored, MIRRORED)
+        found = here(NOBODY, state, STDDEV, 0.8, search(state), VIEWPOINTS)
+        found_there = there(NOBODY, other, STDDEV, 0.8, mirrored, MIRRORED)
         assert np.allclose(MIRROR * found[OTHER_ARM], found_there, atol=1e-4)
 
 
@@ -90,8 +94,8 @@ def test_results_come_near_what_the_network_says() -> None:
     state = FRONT.copy()
     # Where a joint is at its limit, such as a straight elbow, it cannot go on.
     state[[7, 11]] = 0.6
-    correction = Correction(COST)
-    found = COST.keypoints(correction(state, STDDEV, 0.9, search(state), VIEWPOINTS))
+    correction = Correction(COST, CAMERA)
+    found = COST.keypoints(correction(NOBODY, state, STDDEV, 0.9, search(state), VIEWPOINTS))
     network = load_recurrent_network(DATA)
     answers_m, _ = network(correction.features, network.new_memory(2))
     points = COST.keypoints(state)
@@ -102,15 +106,19 @@ def test_results_come_near_what_the_network_says() -> None:
 
 def test_what_was_before_counts() -> None:
     first, second = FRONT, np.append(reference_posture("arms"), [0.0, 0.0])
-    alone = Correction(COST)(second, STDDEV, 0.9, search(second), VIEWPOINTS)
-    correction = Correction(COST)
-    correction(first, STDDEV, 0.5, search(first), VIEWPOINTS)
-    assert not np.allclose(correction(second, STDDEV, 0.9, search(second), VIEWPOINTS), alone)
+    alone = Correction(COST, CAMERA)(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS)
+    correction = Correction(COST, CAMERA)
+    correction(NOBODY, first, STDDEV, 0.5, search(first), VIEWPOINTS)
+    assert not np.allclose(
+        correction(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS), alone
+    )
 
 
 def test_cameras_that_show_depth_count() -> None:
     several, one = (
-        Correction(COST)(FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True))
+        Correction(COST, CAMERA)(
+            NOBODY, FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True)
+        )
         for yaws in ([0.0, 1.2], [0.0])
     )
     assert not np.allclose(several, one)

@@ -16,6 +16,7 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.refinement import Refinement
@@ -67,11 +68,20 @@ def test_without_the_correction_the_result_is_only_fitted() -> None:
     assert np.array_equal(refined(Refinement(COST, CAMERA, config), seen())[1], expected)
 
 
-def test_with_one_camera_and_a_depth_image_the_result_is_only_fitted() -> None:
+def test_with_one_camera_a_depth_image_counts() -> None:
     depth_m = np.full((CAMERA.height, CAMERA.width), 2.3, np.float32)
-    expected = fitted(depth_m)
-    _, result = refined(Refinement(COST, CAMERA, CONFIG), seen(depth_m))
-    assert np.array_equal(result, expected)
+    refine = Refinement(COST, CAMERA, CONFIG)
+    fit, _ = refined(refine, seen(depth_m))
+    # What was measured says more of the distance than an outline.
+    assert np.array_equal(fit, STATE)
+    assert refine.correction is not None
+    assert refine.correction.features[:, OF_CAMERAS][:, -1].tolist() == [1.0, 1.0]
+    measured = refine.correction.features[:, -DEPTH_FEATURES:]
+    assert measured[:, 3:].all()
+    # The arms are in the plane of the shoulders.
+    assert np.allclose(measured[:, :3], 2.3 - COST.keypoints(STATE)[:, 2].reshape(2, 3), atol=1e-6)
+    refined(refine, seen())
+    assert not refine.correction.features[:, -DEPTH_FEATURES:].any()
 
 
 def test_with_further_cameras_those_that_see_count() -> None:
@@ -113,5 +123,5 @@ def test_a_body_that_nobody_measured_is_known_as_such() -> None:
         refine = Refinement(WholeBodyCost(body, CAMERA, WholeBodyCostConfig()), CAMERA, CONFIG)
         keypoints_m = COST.keypoints(STATE)
         refine.deviations(seen(), STATE, STDDEV, keypoints_m, 0.9)
-        told.append(refine.features[:, OF_CAMERAS][:, -1].tolist())
+        told.append(refine.features[:, OF_CAMERAS][:, -2].tolist())
     assert told == [[1.0, 1.0], [0.0, 0.0]]

@@ -42,21 +42,21 @@ def test_bones_hand_state_deviations_and_the_rest() -> None:
     squares = np.square([*bones, *aside])
     hand = np.array([0.2, 0.3, -0.2])
     expected = [*bones, *aside, *squares, *hand, *hand**2, 0.2, *state, *stddev]
-    expected += [0.9, 3.0, 0.25, 1.0, 0.5, 0.2, 1.0]
+    expected += [0.9, 3.0, 0.25, 1.0, 0.5, 0.2, 1.0, 0.0]
     assert np.allclose(both[0, 0], expected)
     # In the mirror the right arm points to the other side, and the left one hangs as before.
     assert np.allclose(both[0, 1, :12], [1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, -1])
     assert np.allclose(both[0, 1, 24:27], [0.7, 0, 0])
     # A further camera is on the other side, too.
-    assert np.allclose(both[0, 1, OF_CAMERAS], [1.0, 0.5, -0.2, 1.0])
+    assert np.allclose(both[0, 1, OF_CAMERAS], [1.0, 0.5, -0.2, 1.0, 0.0])
 
 
 def test_cameras_show_what_lies_across_their_lines_of_sight() -> None:
     alone = Viewpoints.of(0.1, [0.0], is_measured=True)
-    assert alone == (0.1, 1.0, 0.0, 0.0, True)
+    assert alone == (0.1, 1.0, 0.0, 0.0, True, False)
     # 30 degrees to a side show a quarter of the depth, 90 degrees all of it.
     assert np.allclose(Viewpoints.of(0.1, [np.radians(30)], True)[1:4], [0.75, 0.25, 0.75**0.5 / 2])
-    assert np.allclose(Viewpoints.of(0.1, [0.0, np.pi / 2], False), [0.1, 1.0, 1.0, 0.0, 0.0])
+    assert np.allclose(Viewpoints.of(0.1, [0.0, np.pi / 2], False), [0.1, 1.0, 1.0, 0.0, 0.0, 0.0])
     right, left = (Viewpoints.of(0.0, [0.0, yaw], True) for yaw in (0.5, -0.5))
     assert right.slanting == -left.slanting != 0.0
 

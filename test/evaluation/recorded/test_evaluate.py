@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.evaluation.recorded.evaluate import evaluate_session
+from cardbox_tracker.evaluation.recorded.evaluate import evaluate_session, evaluate_sessions
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.session import synthesize_session
 
 LARGEST_ERROR_CM = 25.0
@@ -55,6 +58,28 @@ def test_the_command_writes_report_and_numbers(
     assert report == sessions_report(results)
     assert "| waves |" in report
     assert "9.9" in report
+
+
+def test_a_session_with_depth_images_is_tracked_with_them_too(
+    session: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "ranged"
+    folder.mkdir()
+    data = json.loads((session / "ground_truth.json").read_text())
+    data |= {"cameras": [{"name": "camera"}], "depth_topic": "/camera/depth"}
+    (folder / "ground_truth.json").write_text(json.dumps(data))
+    # Whoever waves has arms and chest about as far away.
+    surface_mm = 1000 * data["person"]["distance_m"] - 50
+    depth = np.full((data["camera"]["height"], data["camera"]["width"]), surface_mm, np.uint16)
+    with BagReader(session / "bag") as old, BagWriter(folder / "bag") as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for entry in data["frames"]:
+            new.write_image("/camera/depth", entry["stamp_ns"], "camera", depth, "16UC1")
+    results = evaluate_sessions([folder], tmp_path / "out", "default", (0,), jobs=1)
+    alone, ranged = results["sessions"]
+    assert (alone["name"], ranged["name"]) == ("ranged", "ranged, with depth")
+    assert alone["runs"][0]["aligned"] != ranged["runs"][0]["aligned"] < LARGEST_ERROR_CM
 
 
 def test_the_same_seed_gives_the_same_figures(session: Path) -> None:
