@@ -59,8 +59,9 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
         "--depth",
         default=None,
         metavar="TOPIC",
-        help="depth images (16UC1 or 32FC1) that cover the same view as the first of --cameras; "
-        "'stereo' measures depth in the first two of them, a rectified pair, left first",
+        help="depth images (16UC1, 32FC1 or compressedDepth) that cover the same view as the first "
+        "of --cameras; 'stereo' measures depth in the first two of them, a rectified pair, left "
+        "first",
     )
     parser.add_argument(
         "--model",

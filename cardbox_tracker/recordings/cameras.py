@@ -13,7 +13,7 @@ import numpy as np
 
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
+from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader, stamp_ns_of
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
@@ -157,6 +157,12 @@ class CameraSources:
             return
         camera = self.first.camera
         with BagReader(self._path) as bag:
+            kind = bag.topics.get(self._depth, IMAGE_TYPES[0])
+            if kind not in IMAGE_TYPES:
+                raise BagError(
+                    f"{self._depth} has messages of {kind}; expected depth images: "
+                    f"{' or '.join(IMAGE_TYPES)} (compressedDepth)"
+                )
             for message in bag.messages([self._depth]):
                 image = bag.deserialize(message)
                 depth_m = at_size(depth_from_image(image), camera.width, camera.height)

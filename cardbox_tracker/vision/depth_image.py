@@ -1,7 +1,11 @@
-"""Depth images as ROS has them (REP 118): 16UC1 in millimetres, 32FC1 in metres."""
+"""Depth images as ROS has them (REP 118): 16UC1 in millimetres, 32FC1 in metres.
+
+Or packed, as image_transport's plugin ``compressedDepth`` sends them.
+"""
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import cv2
@@ -15,6 +19,10 @@ from cardbox_tracker.vision.encodings import image_parts
 DepthImage = NDArray[np.float32]
 
 _LONGEST_PX = 32_766
+# What is before the PNG of a compressedDepth message: a number of the format, and two parameters of
+# inverse depths, in which 32FC1 is packed.
+_PACKED = struct.Struct("<iff")
+_PNG = b"\x89PNG"
 _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
 
 
@@ -44,12 +52,49 @@ def decode_depth(
     return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
 
 
-def depth_from_image(message: Any) -> DepthImage:
-    """Return the depth (H, W), metres, in a sensor_msgs/Image, of rclpy or of a recording.
+def unpack_depth(data: Any, encoding: str) -> DepthImage:
+    """Return the depth image (H, W), metres, in the bytes of a ``compressedDepth`` message.
+
+    Metres of 32FC1 are packed as whole numbers n = a / z + b; 0 is unknown.
+
+    Args:
+        data: of the message.
+        encoding: its ``format``, such as ``16UC1; compressedDepth png``.
 
     Raises:
-        EncodingError: as :func:`decode_depth`.
+        EncodingError: it is none, or packed in another way than as PNG.
     """
+    kind, _, how = encoding.partition(";")
+    raw = bytes(data)
+    pixels = None
+    if "compressedDepth" in how and raw[_PACKED.size :].startswith(_PNG):
+        packed = np.frombuffer(raw, np.uint8, offset=_PACKED.size)
+        pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
+    if kind not in _KINDS or pixels is None or pixels.dtype != np.uint16 or pixels.ndim != 2:
+        raise EncodingError(
+            f"a compressed image of the format '{encoding}' is no depth that can be read; expected "
+            "'16UC1; compressedDepth png' or '32FC1; compressedDepth png'"
+        )
+    if kind != "32FC1":
+        return np.asarray(pixels, np.float32) * np.float32(_KINDS[kind][1])
+    _, a, b = _PACKED.unpack_from(raw)
+    numbers = pixels.astype(np.float64) - b
+    is_known = (pixels > 0) & (numbers > 0.0)
+    depth = np.divide(a, numbers, out=np.zeros(pixels.shape), where=is_known)
+    return np.where(np.isfinite(depth) & (depth > 0.0), depth, 0.0).astype(np.float32)
+
+
+def depth_from_image(message: Any) -> DepthImage:
+    """Return the depth (H, W), metres, in a message, of rclpy or of a recording.
+
+    Args:
+        message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
+
+    Raises:
+        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`.
+    """
+    if hasattr(message, "format"):
+        return unpack_depth(message.data, message.format)
     return decode_depth(*image_parts(message))
 
 

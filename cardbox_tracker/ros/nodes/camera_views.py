@@ -6,9 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError, CardboxError
@@ -27,6 +28,7 @@ from cardbox_tracker.vision.pairing import Arrivals
 # Half a period of 30 Hz, until the first camera's own is known.
 _TOLERANCE_NS = 16_000_000
 _SILENT_S = 3.0
+_PACKED = "/compressedDepth"
 # The stamps of cameras are compared only while all of them send: one that pauses is behind.
 _RECENT_S = 0.5
 _OTHER_CLOCK_NS = 1_000_000_000
@@ -137,9 +139,11 @@ class CameraViews:
                 node.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
             node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
         if depth:
-            info = f"{depth}/camera_info"
+            # As image_transport names its topics: the camera is that of the one without it.
+            kind: Any = CompressedImage if depth.endswith(_PACKED) else Image
+            info = f"{depth.removesuffix(_PACKED)}/camera_info"
             node.subscribe(CameraInfo, info, self._on_depth_info, qos.SENSOR_DATA)
-            node.subscribe(Image, depth, self._on_depth, qos.SENSOR_DATA)
+            node.subscribe(kind, depth, self._on_depth, qos.SENSOR_DATA)
 
     @property
     def topics(self) -> list[str]:
@@ -164,7 +168,7 @@ class CameraViews:
     def _on_depth_info(self, message: CameraInfo, _: int) -> None:
         self._sources[-1].camera = conversions.depth_camera_of(message)
 
-    def _on_depth(self, message: Image, sent_ns: int) -> None:
+    def _on_depth(self, message: Any, sent_ns: int) -> None:
         self._add(self._count, message, None, sent_ns)
 
     def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:

@@ -130,8 +130,8 @@ class TrackerParameters(NodeParameters):
     extrinsics_file: str = extrinsics_parameter()
     depth: str = parameter(
         "",
-        "topic of depth images (16UC1 or 32FC1) from where the first camera is, of its view or "
-        "with a CameraInfo on TOPIC/camera_info; empty: none",
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the first camera is, "
+        "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
         read_only=True,
     )
 

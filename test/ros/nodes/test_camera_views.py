@@ -5,13 +5,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image  # noqa: E402
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.errors import CameraError  # noqa: E402
@@ -33,12 +34,14 @@ class Ears:
 
     def __init__(self) -> None:
         self.callbacks: dict[str, Any] = {}
+        self.kinds: dict[str, Any] = {}
 
     def resolve(self, topic: str) -> str:
         return f"/{topic.lstrip('/')}"
 
     def subscribe(self, kind: Any, topic: str, callback: Any, profile: Any) -> None:
         self.callbacks[self.resolve(topic)] = callback
+        self.kinds[self.resolve(topic)] = kind
 
     def hear(self, topic: str, message: Any) -> None:
         self.callbacks[topic](message, 1)
@@ -136,10 +139,10 @@ def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPat
 class Watching:
     """What two cameras and a depth image showed together."""
 
-    def __init__(self) -> None:
+    def __init__(self, depth: str = "depth") -> None:
         self.node = Ears()
         self.views: list[Views] = []
-        self.source = CameraViews(self.node, ["left", "right"], "depth", False, self._take)  # type: ignore[arg-type]
+        self.source = CameraViews(self.node, ["left", "right"], depth, False, self._take)  # type: ignore[arg-type]
 
     def _take(self, lead: Image, seen: Any) -> None:
         self.views.append(self.source.views(seen, [CAMERA, CAMERA], "left_frame"))
@@ -172,6 +175,22 @@ def test_what_belongs_to_one_time_comes_together(watching: Watching) -> None:
     assert views.depth_m is not None
     assert views.depth_m.shape == (48, 64)
     assert np.all(views.depth_m == 2.0)
+
+
+def test_packed_depth_is_read_too() -> None:
+    watching = Watching("depth/compressedDepth")
+    assert watching.node.kinds["/depth/compressedDepth"] is CompressedImage
+    png = cv2.imencode(".png", np.full((48, 64), 1700, np.uint16))[1].tobytes()
+    packed = CompressedImage(header=header(S), format="16UC1; compressedDepth png")
+    packed.data = bytes(12) + png
+    watching.node.hear("/depth/compressedDepth", packed)
+    for name in ("left", "right"):
+        watching.show(name, S)
+    depth_m = watching.views[0].depth_m
+    assert depth_m is not None
+    assert np.allclose(depth_m, 1.7)
+    # The camera is that of the topic without the plugin's name.
+    assert "/depth/camera_info" in watching.node.callbacks
 
 
 def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:

@@ -1,0 +1,68 @@
+"""Depth images that are packed as PNG, by hand."""
+
+from __future__ import annotations
+
+import struct
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.vision.depth_image import depth_from_image, unpack_depth
+
+
+def packed(pixels: np.ndarray, a: float = 0.0, b: float = 0.0) -> bytes:
+    """The bytes of a compressedDepth message: format, two parameters, PNG."""
+    return struct.pack("<iff", 0, a, b) + cv2.imencode(".png", pixels)[1].tobytes()
+
+
+def test_millimetres_are_stored_as_they_are() -> None:
+    pixels = np.array([[0, 1500], [2300, 65_535]], np.uint16)
+    depth_m = unpack_depth(packed(pixels), "16UC1; compressedDepth png")
+    assert depth_m.dtype == np.float32
+    assert np.allclose(depth_m, [[0.0, 1.5], [2.3, 65.535]])
+    # Older releases do not name the format of the picture.
+    assert np.array_equal(depth_m, unpack_depth(packed(pixels), "16UC1; compressedDepth"))
+
+
+def test_metres_are_stored_as_inverse_depths() -> None:
+    # 100 / 2 m + 5 = 55; 0 is unknown, and so is what would be behind the camera.
+    pixels = np.array([[55, 0, 4]], np.uint16)
+    depth_m = unpack_depth(packed(pixels, 100.0, 5.0), "32FC1; compressedDepth png")
+    assert np.allclose(depth_m, [[2.0, 0.0, 0.0]])
+
+
+def test_a_message_of_either_kind_is_read() -> None:
+    pixels = np.full((3, 4), 1200, np.uint16)
+    sent = SimpleNamespace(data=packed(pixels), format="16UC1; compressedDepth png")
+    raw = SimpleNamespace(
+        data=pixels.tobytes(), height=3, width=4, step=8, encoding="16UC1", is_bigendian=0
+    )
+    assert np.array_equal(depth_from_image(sent), depth_from_image(raw))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "pixels"),
+    [
+        ("bgr8; jpeg compressed bgr8", np.zeros((2, 2), np.uint16)),
+        ("16UC1; compressedDepth rvl", None),
+        ("16UC1; compressedDepth png", np.zeros((2, 2), np.uint8)),
+        ("16UC1; compressedDepth png", np.zeros((2, 2, 3), np.uint16)),
+        ("8UC1; compressedDepth png", np.zeros((2, 2), np.uint16)),
+    ],
+)
+def test_what_is_no_depth_is_refused(encoding: str, pixels: np.ndarray | None) -> None:
+    data = packed(pixels) if pixels is not None else bytes(40)
+    with pytest.raises(EncodingError, match="no depth that can be read; expected '16UC1"):
+        unpack_depth(data, encoding)
+
+
+@given(st.binary(max_size=60), st.booleans())
+def test_broken_bytes_are_refused(data: bytes, is_begun: bool) -> None:
+    begun = packed(np.full((4, 4), 7, np.uint16))[:24] if is_begun else b""
+    with pytest.raises(EncodingError):
+        unpack_depth(begun + data, "16UC1; compressedDepth png")
