@@ -73,6 +73,10 @@ ARGUMENTS = {
     "extrinsics_file": Argument("", "where the cameras stand, of Kalibr or aniposelib", Path),
     "measure_distance": Argument("true", "with two cameras, they measure person_distance_m", bool),
     "depth": Argument("", "topic of depth images of the (first) camera"),
+    "within_m": Argument(
+        *("0.0", "with depth: whoever is nearer is the person; 0: learn a background", float),
+        limits=(0.0, 20.0),
+    ),
     "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
     "robot_file": Argument("", "start the node retarget with this robot arm, a URDF", Path),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
@@ -81,7 +85,7 @@ ARGUMENTS = {
 }
 # Parameters that are launch arguments too, by node.
 GIVEN = {
-    "background": ("image_transport", "background_file"),
+    "background": ("image_transport", "background_file", "within_m", "depth"),
     "initializer": (
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
         *("cameras", "extrinsics_file", "measure_distance"),
@@ -124,6 +128,11 @@ def _check(context: LaunchContext) -> list[object]:
         raise ValueError(
             "launch argument single_process is true, but cameras are given; expected one of them: "
             "several cameras need more than the one core of a process; leave single_process out"
+        )
+    if typed["within_m"] and (typed["cameras"] or not typed["depth"]):
+        raise ValueError(
+            f"launch argument within_m is {given['within_m']}; expected it with depth, the topic "
+            "of depth images of one camera, and without cameras"
         )
     if not Path(given["config_dir"]).is_dir():
         raise ValueError(
@@ -193,6 +202,9 @@ def _exact(parameters: dict[str, object]) -> dict[str, object]:
 def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, object]:
     """The launch arguments that are parameters of ``node``, as its types."""
     typed = values(ARGUMENTS, given)
+    if node == "background" and not typed["within_m"]:
+        # Only who cuts out the person by depth needs to hear it.
+        typed["depth"] = ""
     kept = typed["background_file"]
     if camera and isinstance(kept, str) and kept:
         # Each camera has a background of its own.

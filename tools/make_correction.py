@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.correction import moved
+from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, scaled_features
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.tracker import Tracker
@@ -49,6 +50,10 @@ STEADY, LEAST_PERIOD_S = 0.01, 0.05
 LEAST_BONE_M = 0.01
 # Errors beyond these are other postures, which no correction mends, m and m/s^2.
 MOST_M, MOST_M_S2 = 2.0, 60.0
+
+
+# Of most images no depth is known; m.
+OF_DEPTH = slice(-DEPTH_FEATURES, None), 0.08
 
 
 class Samples(NamedTuple):
@@ -94,7 +99,7 @@ def samples_of(folder: Path, seed: int) -> Samples:
 
 def learn(samples: Sequence[Samples], seed: int = 0) -> RecurrentNetwork:
     """Return the network that learned from these sessions."""
-    mean, scale = networks.mean_and_scale(networks.by_arm(samples))
+    mean, scale = networks.mean_and_scale(networks.by_arm(samples), [OF_DEPTH])
     sequences = _sequences(samples, mean, scale)
     modules = [_learned(sequences, seed + number) for number in range(NETWORKS)]
     layers = [_layers(module) for module in modules]

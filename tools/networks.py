@@ -32,7 +32,7 @@ MOST = 2.5
 # Deviation of what is added to the features: neighbours shall have similar answers.
 NOISE = 0.4
 _LEAST_SCALE = 1e-3
-# Most recordings have one camera; beside them several shall not be all alike, beyond MOST.
+# Most recordings have one camera.
 _SCALE_OF_CAMERAS = 0.4
 RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
@@ -69,10 +69,19 @@ def by_arm(sessions: Sequence[Images]) -> FloatArray:
     return np.concatenate([one.features.reshape(-1, one.features.shape[2]) for one in sessions])
 
 
-def mean_and_scale(features: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviations of features (n, F); those that do not vary have a small one."""
+def mean_and_scale(
+    features: FloatArray, seldom: Sequence[tuple[slice, float]] = ()
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and deviations of features (n, F), which are at least a little.
+
+    Args:
+        features: of all images.
+        seldom: further ones, beside those of cameras, that most images lack, and what their
+            deviations are at least: in the others they shall not be all alike, beyond ``MOST``.
+    """
     least = np.full(features.shape[1], _LEAST_SCALE)
-    least[OF_CAMERAS] = _SCALE_OF_CAMERAS
+    for some, scale in ((OF_CAMERAS, _SCALE_OF_CAMERAS), *seldom):
+        least[some] = scale
     return features.mean(axis=0), np.maximum(features.std(axis=0), least)
 
 

@@ -9,7 +9,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cardbox_tracker.errors import CardboxError
+
 if TYPE_CHECKING:
+    from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 
@@ -21,7 +24,9 @@ REFERENCES = {
 """Names of the reference postures, and what the person does in them."""
 
 
-def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:
+def add_recording(
+    parser: argparse.ArgumentParser, required: bool = True, needs_background: bool = True
+) -> None:
     """Add the recording to read and the span in which its background is learned."""
     parser.add_argument(
         "recording",
@@ -33,10 +38,53 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     parser.add_argument(
         "--background",
         type=span,
-        required=required,
+        required=needs_background,
+        default=None,
         metavar="T0:T1",
         help="seconds during which nobody is in view",
     )
+
+
+def add_depth(parser: argparse.ArgumentParser) -> None:
+    """Add ``--depth`` and ``--within``, which may stand for ``--background``."""
+    parser.add_argument(
+        "--depth",
+        default=None,
+        metavar="TOPIC",
+        help="depth images (16UC1, 32FC1 or compressedDepth) that cover the same view as the first "
+        "of --cameras; 'stereo' measures depth in the first two of them, a rectified pair, left "
+        "first",
+    )
+    parser.add_argument(
+        "--within",
+        type=float,
+        default=None,
+        metavar="M",
+        help="in place of --background: with the images of --depth, whoever is nearer than this is "
+        "the person, metres; choose it between them and the wall",
+    )
+
+
+def background_of(options: argparse.Namespace) -> TimeSpan | Within:
+    """Return what tells the person from the scene.
+
+    Raises:
+        CardboxError: nothing does, or two things do.
+    """
+    from cardbox_tracker.recordings.cameras import STEREO
+    from cardbox_tracker.recordings.depth_silhouettes import Within
+
+    if (options.within is None) == (options.background is None):
+        raise CardboxError(
+            "expected either --background T0:T1, seconds during which nobody is in view, or "
+            "--within M with depth images"
+        )
+    if options.within is None:
+        span: TimeSpan = options.background
+        return span
+    if options.depth in (None, STEREO):
+        raise CardboxError("--within needs the topic of depth images: give --depth TOPIC")
+    return Within(options.depth, options.within)
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:

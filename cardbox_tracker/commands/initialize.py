@@ -10,9 +10,11 @@ from cardbox_tracker.commands.arguments import (
     REFERENCES,
     add_camera_pitch,
     add_cameras,
+    add_depth,
     add_recording,
     add_references,
     add_seed,
+    background_of,
     print_remarks,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
@@ -27,8 +29,9 @@ _GUESSED_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser)
+    add_recording(parser, needs_background=False)
     add_cameras(parser)
+    add_depth(parser)
     add_references(parser)
     parser.add_argument(
         "--distance",
@@ -84,7 +87,11 @@ def run(options: argparse.Namespace) -> None:
     spans = {name: getattr(options, name) for name in REFERENCES}
     with (
         open_recording(
-            options.recording, options.background, options.cameras, options.extrinsics
+            options.recording,
+            background_of(options),
+            options.cameras,
+            options.extrinsics,
+            options.depth,
         ) as source,
         progress_bar("initialize") as show,
     ):

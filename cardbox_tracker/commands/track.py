@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.arguments import (
     add_cameras,
+    add_depth,
     add_preset,
     add_recording,
     add_seed,
+    background_of,
     particle_count,
     print_remarks,
     time,
@@ -53,16 +55,9 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 
-    add_recording(parser, required)
+    add_recording(parser, required, needs_background=False)
     add_cameras(parser)
-    parser.add_argument(
-        "--depth",
-        default=None,
-        metavar="TOPIC",
-        help="depth images (16UC1, 32FC1 or compressedDepth) that cover the same view as the first "
-        "of --cameras; 'stereo' measures depth in the first two of them, a rectified pair, left "
-        "first",
-    )
+    add_depth(parser)
     parser.add_argument(
         "--model",
         type=Path,
@@ -154,7 +149,7 @@ def track_inputs(
         raise CardboxError("several cameras and depth need --preset default; paper has one outline")
     with open_recording(
         options.recording,
-        options.background,
+        background_of(options),
         options.cameras,
         options.extrinsics,
         options.depth,

@@ -93,7 +93,8 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
         if has_results(bag):
             with progress_bar("view") as show:
                 return show_results(bag, feed, show)
-    missing = [name for name in ("model", "background", "start") if getattr(options, name) is None]
+    needed = ("model", "start", *([] if options.within else ["background"]))
+    missing = [name for name in needed if getattr(options, name) is None]
     if missing:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "

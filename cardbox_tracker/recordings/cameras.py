@@ -13,11 +13,13 @@ import numpy as np
 
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera
-from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader, stamp_ns_of
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.depth_images import depth_images
+from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
 from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import DepthImage, at_size, depth_from_image
+from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 from cardbox_tracker.vision.extrinsics_sources import (
@@ -64,7 +66,7 @@ class CameraSources:
         self,
         path: str | os.PathLike[str],
         cameras: Sequence[str],
-        background: TimeSpan,
+        background: TimeSpan | Within,
         extrinsics: Path | None = None,
         depth: str | None = None,
         config: BackgroundConfig | None = None,
@@ -74,7 +76,8 @@ class CameraSources:
         Args:
             path: a recording as :class:`BagReader` takes it.
             cameras: namespaces, the first camera first.
-            background: when nobody is in any image.
+            background: when nobody is in any image; with one camera also what cuts out the person
+                in depth images instead.
             extrinsics: a file, see :func:`load_extrinsics`.
             depth: topic of depth images of the first camera's optical frame and proportions, or
                 ``stereo``: from the first two cameras, a rectified pair.
@@ -84,6 +87,10 @@ class CameraSources:
             CardboxError: there are too many cameras, or one twice.
         """
         self.cameras = camera_names(cameras)
+        if isinstance(background, Within) and len(self.cameras) > 1:
+            raise CardboxError(
+                "depth images cut out the person for one camera only; several need a background"
+            )
         self._path, self._file, self._depth = path, extrinsics, depth
         self._background, self._config = background, config
         self._stack = ExitStack()
@@ -103,7 +110,7 @@ class CameraSources:
             self.bag = bags[0]
             found = extrinsics_of(bags[0], self.cameras, self._file)
             self.sources = [
-                SilhouetteSource(bag, self._background, self._config, camera=camera)
+                _source(bag, self._background, camera, self._config)
                 for bag, camera in zip(bags, self.cameras, strict=True)
             ]
             self.tolerance_ns = self._period_ns() // 2
@@ -154,19 +161,8 @@ class CameraSources:
     def _depths(self) -> Iterator[tuple[int, DepthImage]]:
         """Yield stamp and depth of each depth image, at the size of the first camera."""
         if self._depth is None or self._depth == STEREO:
-            return
-        camera = self.first.camera
-        with BagReader(self._path) as bag:
-            kind = bag.topics.get(self._depth, IMAGE_TYPES[0])
-            if kind not in IMAGE_TYPES:
-                raise BagError(
-                    f"{self._depth} has messages of {kind}; expected depth images: "
-                    f"{' or '.join(IMAGE_TYPES)} (compressedDepth)"
-                )
-            for message in bag.messages([self._depth]):
-                image = bag.deserialize(message)
-                depth_m = at_size(depth_from_image(image), camera.width, camera.height)
-                yield stamp_ns_of(image), depth_m
+            return iter(())
+        return depth_images(self._path, self._depth, self.first.camera)
 
     def _period_ns(self) -> int:
         """Median distance of the first camera's stamps."""
@@ -183,7 +179,7 @@ class CameraSources:
 @contextmanager
 def open_recording(
     path: str | os.PathLike[str],
-    background: TimeSpan,
+    background: TimeSpan | Within,
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
     depth: str | None = None,
@@ -200,7 +196,18 @@ def open_recording(
             yield sources
     else:
         with BagReader(path) as bag:
-            yield SilhouetteSource(bag, background, camera=next(iter(cameras), None))
+            yield _source(bag, background, next(iter(cameras), None))
+
+
+def _source(
+    bag: BagReader,
+    background: TimeSpan | Within,
+    camera: str | None,
+    config: BackgroundConfig | None = None,
+) -> SilhouetteSource:
+    if isinstance(background, Within):
+        return DepthSilhouetteSource(bag, background, camera=camera)
+    return SilhouetteSource(bag, background, config, camera=camera)
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:

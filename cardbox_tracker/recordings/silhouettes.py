@@ -108,14 +108,7 @@ class SilhouetteSource:
             BagError: the span has too few images.
             CameraError: the recording's camera is not calibrated.
         """
-        self._bag = bag
-        self._broken: dict[int, str] = {}
-        self._clock_ns = 0
-        self._topic = bag.image_topic(camera)
-        calibration = bag.calibration(camera)
-        self._pipeline = SilhouettePipeline(calibration, size, config)
-        self.frame_id = calibration.frame_id
-        self.camera = self._pipeline.camera
+        self._open(bag, size, camera, config)
         for _, time_s, image in self._images():
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
@@ -129,6 +122,22 @@ class SilhouetteSource:
                 + "".join(f" ({remark})" for remark in self.remarks)
             )
         self._pipeline.finish_learning()
+
+    def _open(
+        self,
+        bag: BagReader,
+        size: tuple[int, int],
+        camera: str | None,
+        config: BackgroundConfig | None = None,
+    ) -> None:
+        self._bag = bag
+        self._broken: dict[int, str] = {}
+        self._clock_ns = 0
+        self._topic = bag.image_topic(camera)
+        calibration = bag.calibration(camera)
+        self._pipeline = SilhouettePipeline(calibration, size, config)
+        self.frame_id = calibration.frame_id
+        self.camera = self._pipeline.camera
 
     @property
     def first(self) -> SilhouetteSource:

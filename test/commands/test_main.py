@@ -71,7 +71,7 @@ def test_version(cardbox: Callable) -> None:
     [
         ((), "required: COMMAND"),
         (("dance",), "invalid choice: 'dance'"),
-        (("track",), "required: BAG, --background, --model, --start, --csv"),
+        (("track",), "required: BAG, --model, --start, --csv"),
         (("synthesize",), "required: --output"),
         (("urdf",), "required: MODEL.yaml"),
     ],

@@ -59,6 +59,26 @@ def test_mistakes_of_track(
 
 
 @pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ((), "expected either --background T0:T1"),
+        (("--background=0:3.9", "--within=2.5", "--depth=/depth"), "expected either --background"),
+        (("--within=2.5",), "--within needs the topic of depth images: give --depth TOPIC"),
+        (("--within=2.5", "--depth=stereo"), "--within needs the topic of depth images"),
+        (("--within=2.5", "--depth=/depth"), "--depth needs --cameras"),
+        (("--within=nan", "--depth=/d", "--cameras", "camera"), "the limit of the depth is nan m"),
+        (("--within=2.5", "--depth=/d", "--cameras", "camera"), "has no topic /d; it has"),
+    ],
+)
+def test_a_background_or_depth_tells_the_person_from_the_scene(
+    files: Path, words: tuple[str, ...], expected: str, cardbox: Callable
+) -> None:
+    given = (f"--model={files / 'person.yaml'}", "--start=15.6", f"--csv={files / 'out.csv'}")
+    cardbox("track", files / "session", *given, *words).assert_refused("track", expected)
+    assert not (files / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
     ("name", "expected"),
     [
         ("missing", "there is no recording"),

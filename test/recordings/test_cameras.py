@@ -13,6 +13,7 @@ from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.cameras import CameraSources, open_recording
+from cardbox_tracker.recordings.depth_silhouettes import Within
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 
@@ -87,6 +88,48 @@ def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
         CameraSources(two, ["two", "one"], EMPTY, chain, depth="stereo"),
     ):
         pass
+
+
+def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "ranged"
+    depth = np.full((96, 128), 3000, np.uint16)
+    depth[20:80, 40:80] = 1500
+    with BagReader(two) as old, BagWriter(folder) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for i in range(9):
+            new.write_image("/one/depth", 10**18 + i * PERIOD_NS, "one_frame", depth, "16UC1")
+    with open_recording(folder, Within("/one/depth", 2.0), ["one"]) as source:
+        frames = list(source.first.frames(0.25))
+        # Of ten images the last one has no depth image, and two are before that time.
+        assert len(frames) == 9 - 3
+        assert "1 images have no depth image on /one/depth" in source.first.remarks[0]
+        for frame in frames:
+            assert frame.silhouette.shape == (source.first.camera.height, source.first.camera.width)
+            assert frame.image is not None
+        # A quarter of the image's height times a third of its width is near.
+        near = np.mean([np.count_nonzero(frame.silhouette) for frame in frames])
+        assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
+    with pytest.raises(CardboxError, match="for one camera only"):
+        CameraSources(folder, ["one", "two"], Within("/one/depth", 2.0))
+    with (
+        pytest.raises(CardboxError, match=r"limit of the depth is 0\.1 m; expected 0\.3 to 20 m"),
+        open_recording(folder, Within("/one/depth", 0.1), ["one"]),
+    ):
+        pass
+
+
+def test_a_topic_without_depth_is_refused(two: Path) -> None:
+    with (
+        CameraSources(two, ["one"], EMPTY, depth="/one/camera_info") as opened,
+        pytest.raises(BagError, match="/one/camera_info has messages of sensor_msgs/msg/Camera"),
+    ):
+        next(opened.frames())
+    with (
+        CameraSources(two, ["one"], EMPTY, depth="/one/image_raw") as opened,
+        pytest.raises(CardboxError, match="encoding 'mono8' is no depth"),
+    ):
+        next(opened.frames())
 
 
 def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> None:

@@ -40,11 +40,14 @@ class Camera:
         info = self.topic.replace("image_raw", "camera_info")
         self.images = graph.node.create_publisher(Image, self.topic, qos.CAMERA)
         self.infos = graph.node.create_publisher(CameraInfo, info, qos.CAMERA)
+        self.ranges = None
+        if "depth" in parameters:
+            self.ranges = graph.node.create_publisher(Image, parameters["depth"], qos.CAMERA)
         names = ("-r", f"image_raw:={self.topic}", "-r", f"camera_info:={info}")
         self.process = graph.start(
             "background", "--ros-args", *names, learn_images=LEARN_IMAGES, **parameters
         )
-        ends = (self.images, self.infos)
+        ends = [end for end in (self.images, self.infos, self.ranges) if end is not None]
         graph.wait(lambda: all(end.get_subscription_count() == 1 for end in ends), "the node")
         graph.spin(0.3)
         self.silhouettes.clear()
@@ -72,6 +75,9 @@ class Camera:
             0, 2, truth.shape
         )
         self.images.publish(image_message(header, np.clip(pixels, 0, 255).astype(np.uint8)))
+        if self.ranges is not None:
+            depth_mm = np.where(truth > 0, 2000, 4000).astype(np.uint16)
+            self.ranges.publish(image_message(header, depth_mm, "16UC1"))
 
     def iou(self, message: Any) -> float:
         truth = self.shown[message.header.stamp.sec, message.header.stamp.nanosec]
@@ -96,6 +102,24 @@ class Camera:
 @pytest.fixture
 def camera(own_graph: Any, scene: Any) -> Camera:
     return Camera(own_graph, scene)
+
+
+def test_with_depth_images_nothing_has_to_be_learned(camera: Camera) -> None:
+    camera.start(depth="/range/image_raw", within_m=3.0)
+    # They stand there from the first image on.
+    shown, silhouettes = camera.until_silhouettes("front", 3)
+    assert shown < LEARN_IMAGES
+    assert min(camera.iou(message) for message in silhouettes) > 0.95
+    _, nobody = camera.until_silhouettes(None, 5)
+    assert not np.any(np.frombuffer(nobody[-1].data, np.uint8))
+    camera.ranges = None
+    count = len(camera.silhouettes)
+    for _ in range(20):
+        camera.show("front")
+        camera.graph.spin(0.05)
+    # What is in flight may still come.
+    assert len(camera.silhouettes) <= count + 1
+    assert camera.graph.diagnosis("background", "waiting for depth images on /range/image_raw")
 
 
 def test_a_good_background_is_kept(camera: Camera, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ class Findings:
         drift: how much brighter they are than the background, grey levels.
         follows: True if the light is followed.
         covered: share of the image that is foreground.
+        within_m: whoever is nearer is foreground; 0: whoever is before the background.
     """
 
     topic: str
@@ -32,6 +33,7 @@ class Findings:
     drift: float
     follows: bool
     covered: float
+    within_m: float = 0.0
 
 
 def advice(findings: Findings) -> dict[str, str]:
@@ -44,6 +46,13 @@ def advice(findings: Findings) -> dict[str, str]:
             "with FASTRTPS_DEFAULT_PROFILES_FILE set to this package's "
             "config/fastdds_large_images.xml, or use smaller, grey or compressed images"
         )
+    if findings.within_m > 0.0:
+        if findings.covered > _COVERAGE_TO_WARN:
+            texts["depth"] = (
+                f"most of the image is nearer than within_m, {findings.within_m:g} m: choose it "
+                "between the person and the wall, and let nothing else stand before it"
+            )
+        return texts
     drifted = not findings.follows and abs(findings.drift) > _DRIFT_TO_WARN_GREY_LEVELS
     if drifted or findings.covered > _COVERAGE_TO_WARN:
         texts["brightness"] = (

@@ -5,14 +5,15 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import BackgroundFileError, CameraError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.background_advice import Findings, advice
+from cardbox_tracker.ros.nodes.depth_cut import DepthCut
 from cardbox_tracker.ros.nodes.node_parameters import BackgroundParameters
+from cardbox_tracker.ros.nodes.silhouette_output import SilhouetteOutput
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -21,6 +22,7 @@ from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.vision.background import warm_up
 from cardbox_tracker.vision.background_file import background_path
 from cardbox_tracker.vision.calibration_watch import CalibrationWatch
+from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.kept_background import KeptBackground
 from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
@@ -42,12 +44,8 @@ class BackgroundNode(CardboxNode):
         self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
         self._image_bytes = 0
-        self._covered = 0.0
         self._info: CameraInfo | None = None
-
-        self._silhouette = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
-        self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
-        self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+        self._output = SilhouetteOutput(self)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
         compressed = settings.image_transport == "compressed"
@@ -59,6 +57,7 @@ class BackgroundNode(CardboxNode):
         self._single = SinglePublisher(self, (self._image_topic, self._info_topic))
         self.subscribe(CameraInfo, "camera_info", self._on_info, qos.SENSOR_DATA)
         self.subscribe(kind, topic, self._on_image, qos.SENSOR_DATA)
+        self._cut = DepthCut(self, settings.depth, self._send) if settings.depth else None
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
         self.diagnostics.source = f"images on {self._image_topic}"
@@ -72,6 +71,8 @@ class BackgroundNode(CardboxNode):
             self._pipeline.config = settings.config()
 
     def _learn(self) -> str:
+        if self.parameters.value.within_m > 0.0:
+            return "nothing has to be learned: within_m is set, so depth shows who is near"
         if self._pipeline is None or self._image is None:
             raise CameraError(
                 f"no image was received yet on {self._image_topic}, so there is nothing to learn "
@@ -120,11 +121,17 @@ class BackgroundNode(CardboxNode):
         full = conversions.image_of(message, conversions.most_pixels_of(calibration, most))
         conversions.check_shape(full, calibration, self._image_topic, self._info_topic)
         self._image = image = pipeline.prepare(full)
+        within_m = self.parameters.value.within_m
+        if self._cut is not None and within_m > 0.0:
+            self._output.show(message.header, image)
+            self._cut.add(message.header, pipeline.camera, within_m, sent_ns)
+            return
         if not pipeline.is_ready:
             self._prepare(message.header, pipeline, image)
         if pipeline.is_ready:
-            self._publish(message.header, pipeline, image)
-            self.diagnostics.working(sent_ns)
+            self._output.show(message.header, image)
+            silhouette = pipeline.silhouette(image, conversions.stamp_ns(message.header.stamp))
+            self._send(message.header, silhouette, pipeline.camera, sent_ns)
 
     def _prepare(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
@@ -148,23 +155,16 @@ class BackgroundNode(CardboxNode):
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
         self.get_logger().info(done)
 
-    def _publish(
-        self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
+    def _send(
+        self, header: Header, silhouette: conversions.ImageArray, camera: Camera, sent_ns: int
     ) -> None:
-        if self._images.get_subscription_count():
-            # Before the silhouette, so that nobody who needs both has to wait.
-            self._images.publish(conversions.image_message(header, image))
-        silhouette = pipeline.silhouette(image, conversions.stamp_ns(header.stamp))
-        # The silhouette first, so that the tracker does not wait for a CameraInfo that rarely
-        # changes.
-        self._silhouette.publish(conversions.image_message(header, silhouette, "mono8"))
-        self._infos.publish(conversions.camera_info_message(header, pipeline.camera, self._info))
-        self._covered = np.count_nonzero(silhouette) / silhouette.size
+        self._output.send(header, silhouette, camera, self._info)
+        self.diagnostics.working(sent_ns)
 
     def _values(self) -> dict[str, str]:
         values = {
             "background learned from": f"0/{self.parameters.value.learn_images}",
-            "foreground (% of the image)": f"{100 * self._covered:.1f}",
+            "foreground (% of the image)": f"{100 * self._output.covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
             "ignored CameraInfo": str(self._watch.ignored),
         }
@@ -185,7 +185,8 @@ class BackgroundNode(CardboxNode):
             self._image_bytes,
             self._drift(),
             settings.follow and settings.clean_up,
-            self._covered,
+            self._output.covered,
+            settings.within_m,
         )
         return advice(findings) | self._single.remarks() | ({"": remark} if remark else {})
 

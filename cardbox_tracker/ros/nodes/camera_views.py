@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import CameraError, CardboxError
@@ -17,18 +17,17 @@ from cardbox_tracker.estimation.cost.terms import DepthImage
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
+from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.stream import StreamStatistics
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.depth_image import as_seen_by, at_size, depth_from_image
 from cardbox_tracker.vision.pairing import Arrivals
 
 # Half a period of 30 Hz, until the first camera's own is known.
 _TOLERANCE_NS = 16_000_000
 _SILENT_S = 3.0
-_PACKED = "/compressedDepth"
 # The stamps of cameras are compared only while all of them send: one that pauses is behind.
 _RECENT_S = 0.5
 _OTHER_CLOCK_NS = 1_000_000_000
@@ -79,7 +78,6 @@ class _Source:
     def __init__(self, name: str, topic: str) -> None:
         self.name, self.topic = name, topic
         self.stream = StreamStatistics()
-        self.camera: Camera | None = None
         self.problem = ""
         self.newest_ns = 0
         self._arrived_s = self._counted_s = time.monotonic()
@@ -139,11 +137,7 @@ class CameraViews:
                 node.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
             node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
         if depth:
-            # As image_transport names its topics: the camera is that of the one without it.
-            kind: Any = CompressedImage if depth.endswith(_PACKED) else Image
-            info = f"{depth.removesuffix(_PACKED)}/camera_info"
-            node.subscribe(CameraInfo, info, self._on_depth_info, qos.SENSOR_DATA)
-            node.subscribe(kind, depth, self._on_depth, qos.SENSOR_DATA)
+            self._depth_input = DepthInput(node, depth, self._on_depth)
 
     @property
     def topics(self) -> list[str]:
@@ -164,9 +158,6 @@ class CameraViews:
         """Return the silhouette whose stamp stands for all: the first camera's, or the earliest."""
         there = [one.message for one in seen[: self._count] if one is not None]
         return there[0] if seen[0] is not None else min(there, key=_stamp_ns)
-
-    def _on_depth_info(self, message: CameraInfo, _: int) -> None:
-        self._sources[-1].camera = conversions.depth_camera_of(message)
 
     def _on_depth(self, message: Any, sent_ns: int) -> None:
         self._add(self._count, message, None, sent_ns)
@@ -235,11 +226,7 @@ class CameraViews:
             return None
         source = self._sources[-1]
         try:
-            depth_m = depth_from_image(seen[0].message)
-            if source.camera is None:
-                depth_m = at_size(depth_m, camera.width, camera.height)
-            else:
-                depth_m = as_seen_by(depth_m, source.camera, camera)
+            depth_m = self._depth_input.seen_by(camera, seen[0].message)
         except CardboxError as error:
             source.problem = str(error)
             return None

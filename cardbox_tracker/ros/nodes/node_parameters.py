@@ -28,6 +28,7 @@ from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters, RulaPar
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M
 from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.pairing import camera_names
 
@@ -52,6 +53,19 @@ class BackgroundParameters(NodeParameters):
         "",
         "file to keep the learned background in; if it exists at the start and fits the camera and "
         "what it shows, nothing has to be learned, although somebody stands there; empty: none",
+        read_only=True,
+    )
+    within_m: float = parameter(
+        0.0,
+        "with depth images: whoever is nearer than this is the person, and nothing has to be "
+        "learned; choose it between them and the wall; 0: learn the empty scene",
+        unit="m",
+        limits=(0.0, WITHIN_LIMITS_M[1]),
+    )
+    depth: str = parameter(
+        "",
+        "topic of these depth images (16UC1, 32FC1 or compressedDepth) from where the camera is, "
+        "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
         read_only=True,
     )
     learning: str = parameter(
@@ -81,6 +95,14 @@ class BackgroundParameters(NodeParameters):
     min_area: float = shared(BackgroundConfig, "min_area")
     max_hole: float = shared(BackgroundConfig, "max_hole")
     absorb_after: int = shared(BackgroundConfig, "absorb_after")
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        if self.within_m > 0.0 and not self.depth:
+            raise ValueError(
+                f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
+                "depth images, or within_m to 0"
+            )
 
     def config(self) -> BackgroundConfig:
         """Return the settings of the core."""

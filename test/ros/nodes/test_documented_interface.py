@@ -126,7 +126,10 @@ def make(tmp_path: Path) -> Iterator[Callable[..., Any]]:
 
 def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]:
     if name == "background":
-        return [make(BackgroundNode, image_transport=kind) for kind in ("raw", "compressed")]
+        return [
+            *(make(BackgroundNode, image_transport=kind) for kind in ("raw", "compressed")),
+            make(BackgroundNode, depth="DEPTH", within_m=2.5),
+        ]
     if name == "camera":
         video = folder / "video.avi"
         writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (64, 48))

@@ -1,0 +1,93 @@
+"""Silhouettes of a recording with depth images: nothing has to be learned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.depth_images import depth_images
+from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, Frame, SilhouetteSource
+from cardbox_tracker.vision.background import brightness_of
+from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
+from cardbox_tracker.vision.pairing import side_by_side
+
+# Half a period of 30 Hz.
+_TOLERANCE_NS = 16_000_000
+
+
+class Within(NamedTuple):
+    """In place of a background: whoever is nearer than a limit.
+
+    Attributes:
+        topic: of depth images that show what the camera shows.
+        metres: the limit, along the optical axis.
+    """
+
+    topic: str
+    metres: float
+
+
+class DepthSilhouetteSource(SilhouetteSource):
+    """The images of one bag that have a depth image, and whoever is near in it."""
+
+    def __init__(
+        self,
+        bag: BagReader,
+        within: Within,
+        size: tuple[int, int] = WORKING_SIZE,
+        camera: str | None = None,
+    ) -> None:
+        """Prepare to read.
+
+        Args:
+            bag: an open recording.
+            within: what is cut out.
+            size: working resolution (width, height), px.
+            camera: namespace of the camera; without it, the recording has only one.
+
+        Raises:
+            BagError: the recording has no images.
+            CameraError: the recording's camera is not calibrated.
+            CardboxError: the limit is impossible.
+        """
+        least_m, most_m = WITHIN_LIMITS_M
+        if not least_m <= within.metres <= most_m:
+            raise CardboxError(
+                f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "
+                f"{most_m:g} m, between the person and the wall"
+            )
+        self._open(bag, size, camera)
+        self._within = within
+        self._without = 0
+
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
+        """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
+        depths = depth_images(self._bag.path, self._within.topic, self.camera)
+        streams: list[Iterator[Any]] = [self._images(), depths]
+        self._without = 0
+        for seen, measured in side_by_side(streams, lambda item: int(item[0]), _TOLERANCE_NS):
+            if seen is None:
+                continue
+            stamp_ns, time_s, image = seen
+            if time_s > end_s:
+                break
+            if time_s < start_s:
+                continue
+            if measured is None:
+                self._without += 1
+                continue
+            silhouette = silhouette_within(measured[1], self._within.metres)
+            yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is odd about the images read so far."""
+        if not self._without:
+            return super().remarks
+        without = (
+            f"{self._without} images have no depth image on {self._within.topic} of their time, "
+            "and are left out"
+        )
+        return [*super().remarks, without]
