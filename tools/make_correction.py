@@ -37,13 +37,13 @@ FloatArray = NDArray[np.float64]
 # About the deviations of the answers, m: middle of the shoulders, elbow, hand; x, y, z of each.
 UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
 # Nodes of the first layer, of the memory, of the last layer but one.
-ENTERED, NODES, LEFT = 128, 96, 64
-NETWORKS, EPOCHS = 4, 20
+ENTERED, NODES, LEFT = 192, 160, 96
+NETWORKS, EPOCHS = 2, 12
 # Images of a sequence, which begin half as many apart, and sequences of a batch.
 LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
 # Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
-NOISE = 0.25
+NOISE = 0.1
 # Metres that a metre per second squared is worth, and periods below which it would be noise, s.
 STEADY, LEAST_PERIOD_S = 0.01, 0.05
 # Bones that are said to be shorter than this have hardly a direction, m.

@@ -85,7 +85,8 @@ class Fitting:
 
         Args:
             is_somebody: whether anybody was in it.
-            iou: of model and silhouette; None if the person was lost.
+            iou: of model and silhouette, before what was learned has corrected the result; None if
+                the person was lost.
         """
         self._absent = 0 if is_somebody else self._absent + 1
         if self._absent == _ABSENT_FRAMES:

@@ -133,6 +133,8 @@ class Tracker:
         self._particles: Particles | None = None
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
+        # How well the last result fitted before it was corrected.
+        self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next silhouette on.
@@ -229,7 +231,8 @@ class Tracker:
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
         estimate = self._track(silhouette, image)
-        self._fitting.after(estimate.state != NO_PERSON, estimate.iou)
+        iou = None if estimate.iou is None else self._seen_iou
+        self._fitting.after(estimate.state != NO_PERSON, iou)
         if estimate.posture is not None:
             there = estimate.placed(self.body)
             self._fitting.compare(silhouette, image, there, estimate.posture)
@@ -262,7 +265,7 @@ class Tracker:
             # Particles that are not numbers would stay so for ever.
             self.reset()
             return Estimate(LOST)
-        self._before = fit.seen
+        self._before, self._seen_iou = fit.seen, fit.seen_iou
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:

@@ -78,7 +78,7 @@ class Cycles:
         is_poor = iou < self._config.lost_iou
         keypoints_m = self._keypoints(posture)
         stddev = self.hierarchy.stddev()
-        return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, seen=posture)
+        return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, posture, iou)
 
     def _iterate(self, observation: SumOfTerms) -> None:
         """Run the cycles of one frame, with falling noise; the first one explores."""

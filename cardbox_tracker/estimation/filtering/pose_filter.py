@@ -46,6 +46,7 @@ class Fit:
         is_poor: it does not fit; several such frames in a row mean that the person was lost.
         seen: what explains the image best, before the learned correction: (14,), or (12,) without
             an offset.
+        seen_iou: as ``iou``, of that.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: their standard deviations, (2,), or None.
         particles: of whole states, or None from a filter that has none.
@@ -59,6 +60,7 @@ class Fit:
     is_uncertain: bool
     is_poor: bool
     seen: FloatArray
+    seen_iou: float
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
     particles: Particles | None = None

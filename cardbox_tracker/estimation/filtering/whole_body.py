@@ -40,8 +40,7 @@ _HOME_LIMIT_M = 0.7
 # Deviation of x of torsos that stand upright: larger while the search is young.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Arms that are passed on, and how many of them are combined with the other side's.
-_BEST_ARMS, _PAIRED_ARMS = 20, 12
-_AGAIN_NOISE = 0.45
+_BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 12, 0.45
 # A step across the image that takes the legs out of the columns where they were.
 _STEP_M = 0.05
 # Uniform numbers of a torso, an arm, a state of the last rounds.
@@ -306,5 +305,6 @@ class WholeBodyFilter:
             offset_m=result[N_JOINTS:],
             offset_stddev_m=deviations[N_JOINTS:],
             seen=fitted,
+            seen_iou=fit_iou,
             particles=Particles(*rated, mean, config.spread, deviations / spread),
         )
