@@ -3,7 +3,9 @@
 Fitting takes about as long as a hundred frames, so it happens once a person: on the first
 silhouette that shows a whole upper body, after the image was empty, for somebody else may have
 come, where the torso has other colours than it had, and where the model fits clearly worse than it
-did. What fails is tried again after a pause, which doubles.
+did. What fails is tried again after a pause, which doubles. Who bows or turns away fits worse, too,
+and then a fit is wrong: where the new body usually fits clearly worse than the one before did, that
+one is taken again.
 """
 
 from __future__ import annotations
@@ -55,6 +57,9 @@ class Fitting:
     def _expect(self) -> None:
         """Expect somebody who was not seen yet."""
         self._is_due, self._pause, self._wait, self._absent = True, _SHORTEST_PAUSE, 0, 0
+        self._ious: list[float] = []
+        self._fitted: BodyModel | None = None
+        self._last: tuple[BodyModel, float] | None = None
 
     def before(self, silhouette: Silhouette, image: Image | None) -> BodyModel | None:
         """Return a body to use from this frame on, or None to go on.
@@ -64,6 +69,8 @@ class Fitting:
             image: of the same frame.
         """
         self._wait = max(0, self._wait - 1)
+        if (body := self._last_that_fitted()) is not None:
+            return body
         if not self._is_due or self._wait > 0:
             return None
         seen = upper_body(silhouette)
@@ -74,11 +81,31 @@ class Fitting:
             fit = fit_first_sight(self._guess, self._camera, seen, image, self._config, self._rng)
         except InitializationError:
             return None
-        self._is_due, self._worse, self._ious = False, 0, list[float]()
+        # Of the same person, whom it fitted; None of a person who is new.
+        self._last = (self._fitted, self._usual) if self._fitted and self._ious else None
+        self._fitted = fit.body
+        self._is_due, self._worse, self._ious = False, 0, []
         worn = fit.body.appearance
         self._clothes = None if worn is None else worn.histograms[TORSO]
         self._frames = self._other = 0
         return fit.body
+
+    def _last_that_fitted(self) -> BodyModel | None:
+        """Return the body before the last fit if that was one for the worse, and go on with it."""
+        if self._last is None or (len(self._ious) < _USUAL_FRAMES and not self._is_due):
+            return None
+        body, usual = self._last
+        self._last = None
+        if self._usual >= usual - _WORSE:
+            return None
+        self._fitted, self._ious = body, [usual] * _USUAL_FRAMES
+        self._is_due, self._worse = False, 0
+        return body
+
+    @property
+    def _usual(self) -> float:
+        """How well the fitted body usually fits, as IoU."""
+        return float(np.mean(self._ious)) if self._ious else 1.0
 
     def after(self, is_somebody: bool, iou: float | None) -> None:
         """Take note of how well the frame was tracked.
@@ -98,8 +125,7 @@ class Fitting:
             self._pause = _SHORTEST_PAUSE
         if iou is not None and len(self._ious) < _USUAL_FRAMES:
             self._ious.append(iou)
-        usual = float(np.mean(self._ious)) if self._ious else 1.0
-        self._worse = self._worse + 1 if iou is None or iou < usual - _WORSE else 0
+        self._worse = self._worse + 1 if iou is None or iou < self._usual - _WORSE else 0
         self._is_due = self._worse >= _WORSE_FRAMES
 
     def compare(
@@ -123,4 +149,5 @@ class Fitting:
         before = self._clothes
         alike = np.sum(np.sqrt(before * now)) / np.sqrt(before.sum() * now.sum())
         self._other = self._other + 1 if -np.log(alike) > _OTHER_CLOTHES else 0
-        self._is_due = self._other >= _OTHER_TIMES
+        if self._other >= _OTHER_TIMES:
+            self._is_due, self._fitted, self._last = True, None, None

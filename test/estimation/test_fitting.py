@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -129,6 +131,32 @@ def test_what_does_not_fit_is_not_tried_with_every_image(monkeypatch: pytest.Mon
         track.track(seen)
     assert 2 <= len(tries) <= 3
     assert track.body.unknown
+
+
+@pytest.mark.parametrize(("usual", "is_kept"), [(0.75, True), (0.65, False)])
+def test_a_fit_for_the_worse_is_taken_back(
+    monkeypatch: pytest.MonkeyPatch, usual: float, is_kept: bool
+) -> None:
+    """Who bows fits worse, and so does what is fitted to them then once they stand again."""
+    bodies = [person(1.75, -0.62), person(1.5, -0.5)]
+    fits = (SimpleNamespace(body=body) for body in bodies)
+    monkeypatch.setattr(fitting, "fit_first_sight", lambda *_: next(fits))
+    guess = body_from_proportions(1.75)
+    decides = fitting.Fitting(guess, CAMERA, default_preset(), np.random.default_rng(0))
+    seen = silhouette(bodies[0])
+    assert decides.before(seen, None) is bodies[0]
+    for _ in range(20):
+        decides.after(True, 0.8)
+        assert decides.before(seen, None) is None
+    for _ in range(5):
+        decides.after(True, 0.6)
+    assert decides.before(seen, None) is bodies[1]
+    used = []
+    for _ in range(12):
+        decides.after(True, usual)
+        used.append(decides.before(seen, None))
+    found = [body for body in used if body is not None]
+    assert found == ([] if is_kept else [bodies[0]])
 
 
 def test_the_same_seed_gives_the_same_body() -> None:
