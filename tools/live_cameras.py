@@ -25,7 +25,7 @@ from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
-from cardbox_tracker.evaluation.recorded.tracking import track_session
+from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, track_session
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.cameras import STEREO
@@ -80,7 +80,7 @@ def row(session: RecordedSession, depth: str | None) -> str:
     Raises:
         CardboxError: it cannot be measured, or a node ended.
     """
-    (run,) = track_session(session, default_preset(), (0,), depth)
+    (run,) = track_session(session, default_preset(), (0,), WITH_DEPTH if depth else None)
     if run.body is None:
         raise CardboxError(f"{session.name}: {run.failure}")
     with tempfile.TemporaryDirectory() as folder:

@@ -75,13 +75,17 @@ def track_session(
     seconds since tracking began; None: none of them.
 
     Raises:
-        CardboxError: the recording cannot be read.
+        CardboxError: the recording cannot be read, or has no camera ``only``.
     """
     depth = None
     if only == WITH_DEPTH:
         depth, only = session.truth.depth_topic or STEREO, None
         config = replace(config, terms=(*config.terms, Depth()))
     cameras, empty = session.truth.cameras, session.spans["empty"]
+    if only is not None and only not in cameras:
+        raise CardboxError(
+            f"{session.name} has no camera {only}; expected one of {', '.join(cameras)}"
+        )
     with open_recording(session.bag, empty, cameras, session.extrinsics, depth) as source:
         others = source.others if isinstance(source, CameraSources) else ()
         camera = source.first.camera

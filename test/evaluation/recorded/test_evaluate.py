@@ -10,9 +10,11 @@ import pytest
 
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.evaluation.recorded.evaluate import evaluate_session, evaluate_sessions
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.session import synthesize_session
@@ -78,6 +80,8 @@ def test_a_session_with_depth_images_is_tracked_with_them_too(
             new.write_image("/camera/depth", entry["stamp_ns"], "camera", depth, "16UC1")
     results = evaluate_sessions([folder], tmp_path / "out", "default", (0,), jobs=1)
     alone, ranged = results["sessions"]
+    with pytest.raises(CardboxError, match="ranged has no camera left; expected one of camera"):
+        track_session(load_session(folder), default_preset(), (0,), only="left")
     assert (alone["name"], ranged["name"]) == ("ranged", "ranged, with depth")
     assert alone["runs"][0]["aligned"] != ranged["runs"][0]["aligned"] < LARGEST_ERROR_CM
 
