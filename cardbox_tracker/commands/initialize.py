@@ -84,6 +84,11 @@ def run(options: argparse.Namespace) -> None:
     )
     inputs = options.recording, options.extrinsics
     check_outputs((options.output,), options.force, inputs=inputs)
+    if options.depth is not None and options.within is None:
+        raise CardboxError(
+            "--depth measures nobody by itself: give --within M in place of --background, or leave "
+            "--depth out"
+        )
     spans = {name: getattr(options, name) for name in REFERENCES}
     with (
         open_recording(
@@ -91,7 +96,6 @@ def run(options: argparse.Namespace) -> None:
             background_of(options),
             options.cameras,
             options.extrinsics,
-            options.depth,
         ) as source,
         progress_bar("initialize") as show,
     ):

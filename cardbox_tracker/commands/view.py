@@ -93,7 +93,7 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
         if has_results(bag):
             with progress_bar("view") as show:
                 return show_results(bag, feed, show)
-    needed = ("model", "start", *([] if options.within else ["background"]))
+    needed = ("model", "start", *(["background"] if options.within is None else []))
     missing = [name for name in needed if getattr(options, name) is None]
     if missing:
         raise CardboxError(

@@ -11,10 +11,7 @@ from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, Frame, SilhouetteSource
 from cardbox_tracker.vision.background import brightness_of
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
-from cardbox_tracker.vision.pairing import side_by_side
-
-# Half a period of 30 Hz.
-_TOLERANCE_NS = 16_000_000
+from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
 
 
 class Within(NamedTuple):
@@ -67,7 +64,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self._images(), depths]
         self._without = 0
-        for seen, measured in side_by_side(streams, lambda item: int(item[0]), _TOLERANCE_NS):
+        for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
             stamp_ns, time_s, image = seen

@@ -17,6 +17,9 @@ T = TypeVar("T")
 
 MOST_CAMERAS = 4
 
+TOLERANCE_NS = 16_000_000
+"""Half a period of 30 Hz: what belongs together where the period is not known."""
+
 # So many of another camera's images may wait for one: whatever its camera needs to send it.
 _WAITING = 2
 # After so many times in vain a camera is not waited for until it sends again.

@@ -12,7 +12,6 @@ along the axes of the optical frame.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -25,7 +24,7 @@ from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.filtering.depth_features import features_of_depth
+from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
@@ -37,6 +36,7 @@ DATA = "correction.npz"
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
 _STEPS = 4
 _LEAST_BONE_M = 1e-6
+_NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
 
 
 def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
@@ -119,13 +119,13 @@ class Correction:
         cost = self._cost
         self.found_m = cost.keypoints(state)
         result = state[None], stddev[None], self.found_m[None], np.array([iou])
-        if not viewpoints.has_depth:
-            frame = replace(frame, depth_m=None)
         self.features = np.concatenate(
             [
                 features_of(*result, viewpoints)[0],
                 features_of_search(search, cost, self.found_m),
-                features_of_depth(frame, self._camera, self.found_m),
+                features_of_depth(frame, self._camera, self.found_m)
+                if viewpoints.has_depth
+                else _NO_DEPTH,
             ],
             axis=1,
         )

@@ -23,10 +23,8 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.stream import StreamStatistics
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.pairing import Arrivals
+from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
 
-# Half a period of 30 Hz, until the first camera's own is known.
-_TOLERANCE_NS = 16_000_000
 _SILENT_S = 3.0
 # The stamps of cameras are compared only while all of them send: one that pauses is behind.
 _RECENT_S = 0.5
@@ -129,7 +127,7 @@ class CameraViews:
         if depth:
             self._sources.append(_Source("depth", node.resolve(depth)))
         self._deliver = deliver
-        self._arrivals: Arrivals[Seen] = Arrivals(len(self._sources), _TOLERANCE_NS)
+        self._arrivals: Arrivals[Seen] = Arrivals(len(self._sources), TOLERANCE_NS)
         self._pairings = [ImagePairing(partial(self._add, source)) for source in range(self._count)]
         for topic, pairing in zip(topics, self._pairings, strict=True):
             if use_image:
@@ -166,7 +164,7 @@ class CameraViews:
         stamp_ns = _stamp_ns(message)
         if not self._sources[number].arrived(stamp_ns):
             return
-        self._arrivals.tolerance_ns = self._sources[0].stream.period_ns // 2 or _TOLERANCE_NS
+        self._arrivals.tolerance_ns = self._sources[0].stream.period_ns // 2 or TOLERANCE_NS
         self._arrivals.add(number, stamp_ns, Seen(message, image, sent_ns))
         for seen in self._arrivals.sets():
             # The last one may be a depth image, which says nothing alone.

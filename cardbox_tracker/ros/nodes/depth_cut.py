@@ -7,16 +7,14 @@ from typing import Any, NamedTuple
 
 from std_msgs.msg import Header
 
+from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_silhouette import silhouette_within
-from cardbox_tracker.vision.pairing import Arrivals
-
-# Half a period of 30 Hz.
-_TOLERANCE_NS = 16_000_000
+from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
 
 
 class Taken(NamedTuple):
@@ -46,7 +44,7 @@ class DepthCut:
         """Subscribe with ``node`` to depth images on ``topic``; ``send`` takes silhouettes."""
         self._node, self._topic = node, node.resolve(topic)
         self._send = send
-        self._arrivals: Arrivals[Taken] = Arrivals(2, _TOLERANCE_NS)
+        self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
         self._input = DepthInput(node, topic, self._on_depth)
 
     def add(self, header: Header, camera: Camera, within_m: float, sent_ns: int) -> None:
@@ -67,7 +65,11 @@ class DepthCut:
                 self._node.diagnostics.wait_for(f"depth images on {self._topic}")
                 continue
             assert seen.camera is not None
-            depth_m = self._input.seen_by(seen.camera, measured.message)
+            try:
+                depth_m = self._input.seen_by(seen.camera, measured.message)
+            except EncodingError as error:
+                # Either message may have completed the set.
+                raise EncodingError(f"{self._topic}: {error}") from None
             silhouette = silhouette_within(depth_m, seen.within_m)
             sent_ns = max(seen.sent_ns, measured.sent_ns)
             self._send(seen.message, silhouette, seen.camera, sent_ns)
