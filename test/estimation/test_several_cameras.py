@@ -166,6 +166,8 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out(
         if len(seeing) == 1:
             assert ious[seeing[0]] == pytest.approx(estimate.iou)
     assert min(iou for iou in ious if iou is not None) > least_iou
+    assert estimate.iou is not None
+    assert estimate.iou > 0.8
     assert set(states[4:]) <= {TRACKING, UNCERTAIN}
     assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
     assert max(errors[4:]) < 20.0
