@@ -23,14 +23,17 @@ from cardbox_tracker.estimation.cost.outline_points import (
     Ints,
     distance_at,
     find_outline,
+    first_points,
+    moved_patches,
     point_on_edge,
     project_corners,
-    unmoved_patches,
 )
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     BODY_PATCHES,
     N_STATE,
-    corners_of_body,
+    TRUNK_PATCHES,
+    new_figure,
+    place_patches,
 )
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -95,50 +98,53 @@ def add_equations(
     Returns:
         How many points there are.
     """
-    trial, there = np.empty(N_STATE), np.empty(N_STATE)
-    corners_m, corners_px = np.empty((BODY_PATCHES, 4, 3)), np.empty((BODY_PATCHES, 4, 2))
-    less_px, same = np.empty((BODY_PATCHES, 4, 2)), np.empty(BODY_PATCHES, np.bool_)
+    figure = parts, drawn, girdle, place, view
+    work, arm = new_figure()
+    trial, there, behind = np.empty(N_STATE), np.empty(N_STATE), np.empty(N_STATE)
+    corners_px, less_px = np.empty((BODY_PATCHES, 4, 2)), np.empty((BODY_PATCHES, 4, 2))
     _seen_from(state, turned, moved, there)
-    corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
-    project_corners(corners_m, lens, corners_px)
+    place_patches(there, True, (True, True), *figure, work, arm)
+    project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
     count = find_outline(corners_px, (field.shape[1], field.shape[0]), end_row, edges, points)
+    first_point = np.empty(BODY_PATCHES + 1, np.int64)
+    first_points(edges, count, first_point)
     now, weights, by_state = np.empty(count), np.empty(count), np.empty(count)
-    jacobian = np.empty((N_STATE, count))
     for i in range(count):
         now[i] = distance_at(
             field, *point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
         )
         outlying = 1.0 + (now[i] / HALF_PX) ** 2
         weights[i] = INFORMATION * points[i, 1] / (outlying * outlying)
+    # Of each value of a state only the points that move with it count.
+    jacobian, span = np.empty((N_STATE, count)), np.empty((N_STATE, 2), np.int64)
     for j in range(N_STATE):
         trial[:] = state
         trial[j] = state[j] + steps[j]
         _seen_from(trial, turned, moved, there)
-        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
-        project_corners(corners_m, lens, corners_px)
         trial[j] = state[j] - steps[j]
-        _seen_from(trial, turned, moved, there)
-        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
-        project_corners(corners_m, lens, less_px)
-        unmoved_patches(corners_px, less_px, same)
-        for i in range(count):
+        _seen_from(trial, turned, moved, behind)
+        first, end = moved_patches(there, behind)
+        span[j, 0], span[j, 1] = first_point[first], first_point[end]
+        has_arm = first <= TRUNK_PATCHES < end, end == BODY_PATCHES
+        place_patches(there, first == 0, has_arm, *figure, work, arm)
+        project_corners(work.corners, lens, first, end, corners_px)
+        place_patches(behind, first == 0, has_arm, *figure, work, arm)
+        project_corners(work.corners, lens, first, end, less_px)
+        for i in range(span[j, 0], span[j, 1]):
             p, c, share = edges[i, 0], edges[i, 1], points[i, 0]
-            if same[p]:
-                jacobian[j, i] = 0.0
-                continue
             more = distance_at(field, *point_on_edge(corners_px, p, c, share))
             less = distance_at(field, *point_on_edge(less_px, p, c, share))
             jacobian[j, i] = (more - less) / (2.0 * steps[j])
     for j in range(N_STATE):
         total = 0.0
-        for i in range(count):
+        for i in range(span[j, 0], span[j, 1]):
             weighted = weights[i] * jacobian[j, i]
             total += weighted * now[i]
             by_state[i] = weighted
         right[j] += total
         for k in range(j + 1):
             total = 0.0
-            for i in range(count):
+            for i in range(max(span[j, 0], span[k, 0]), min(span[j, 1], span[k, 1])):
                 total += by_state[i] * jacobian[k, i]
             matrix[j, k] += total
     return count
@@ -179,14 +185,17 @@ def costs_along(
         points: (n, 2), as written there.
         costs: one for each share.
     """
+    work, arm = new_figure()
     trial, there = np.empty(N_STATE), np.empty(N_STATE)
-    corners_m, corners_px = np.empty((BODY_PATCHES, 4, 3)), np.empty((BODY_PATCHES, 4, 2))
+    corners_px = np.empty((BODY_PATCHES, 4, 2))
     for number in range(len(SHARES)):
         for j in range(N_STATE):
             trial[j] = state[j] + SHARES[number] * change[j]
         _seen_from(trial, turned, moved, there)
-        corners_of_body(there, parts, drawn, girdle, place, view, corners_m)
-        project_corners(corners_m, lens, corners_px)
+        place_patches(
+            there, True, (True, True), parts, drawn, girdle, place, view, work, arm
+        )
+        project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
         for i in range(len(points)):
             x, y = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
             square = distance_at(field, x, y) ** 2

@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats
 from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
-from cardbox_tracker.estimation.cost.whole_body_kernels import BODY_PATCHES
+from cardbox_tracker.estimation.cost.whole_body_kernels import (
+    ARM_ANGLES,
+    ARM_PATCHES,
+    BODY_PATCHES,
+    LEFT_ARM,
+    PITCH,
+    ROLL,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    TRUNK_PATCHES,
+    YAW,
+)
 
 Ints = NDArray[np.int64]
 
@@ -27,11 +39,22 @@ _COVERED_PX, _BORDER_PX = 0.5, 3.0
 
 
 @_compile
-def project_corners(corners_m: Floats, lens: Floats, corners_px: Floats) -> None:
-    """Write corners (13, 4, 2), px; ``lens`` is fx, fy, cx, cy."""
-    for p in range(BODY_PATCHES):
+def project_corners(
+    corners_m: Floats, lens: Floats, first: int, end: int, corners_px: Floats
+) -> None:
+    """Write corners (13, 4, 2), px, of the patches ``first`` to ``end``.
+
+    Args:
+        corners_m: of all patches in the optical frame, (3, 52), as ``Workspace`` has them, metres.
+        lens: fx, fy, cx, cy.
+        first: patch.
+        end: patch.
+        corners_px: written.
+    """
+    for p in range(first, end):
         for c in range(4):
-            x, y, z = corners_m[p, c, 0], corners_m[p, c, 1], max(corners_m[p, c, 2], 0.05)
+            e = c * BODY_PATCHES + p
+            x, y, z = corners_m[0, e], corners_m[1, e], max(corners_m[2, e], 0.05)
             corners_px[p, c, 0] = lens[0] * x / z + lens[2]
             corners_px[p, c, 1] = lens[1] * y / z + lens[3]
 
@@ -146,10 +169,33 @@ def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
 
 
 @_compile
-def unmoved_patches(one_px: Floats, other_px: Floats, same: NDArray[np.bool_]) -> None:
-    """Write which patches are where they were, (13,)."""
-    for p in range(BODY_PATCHES):
-        same[p] = True
-        for c in range(4):
-            if one_px[p, c, 0] != other_px[p, c, 0] or one_px[p, c, 1] != other_px[p, c, 1]:
-                same[p] = False
+def first_points(edges: Ints, count: int, first: Ints) -> None:
+    """Write where the points of each patch begin, and where the last ones end, (14,).
+
+    Args:
+        edges: patches, in order, and corners of the points, (n, 2).
+        count: of the points.
+        first: written.
+    """
+    p = 0
+    for i in range(count):
+        while p <= edges[i, 0]:
+            first[p] = i
+            p += 1
+    for later in range(p, BODY_PATCHES + 1):
+        first[later] = count
+
+
+@_compile
+def moved_patches(one: Floats, other: Floats) -> tuple[int, int]:
+    """Return the first and the end of the patches that differ between two states (14,)."""
+    for j in (TORSO_Y, ROLL, PITCH, YAW, TORSO_X, TORSO_Z):
+        if one[j] != other[j]:
+            return 0, BODY_PATCHES
+    first, end = BODY_PATCHES, 0
+    for arm in range(2):
+        for j in range(LEFT_ARM + ARM_ANGLES * arm, LEFT_ARM + ARM_ANGLES * (arm + 1)):
+            if one[j] != other[j]:
+                first = min(first, TRUNK_PATCHES + ARM_PATCHES * arm)
+                end = TRUNK_PATCHES + ARM_PATCHES * (arm + 1)
+    return min(first, end), end

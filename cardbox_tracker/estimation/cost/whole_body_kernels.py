@@ -81,9 +81,9 @@ ASIDE, UPWARDS, CLAVICLE, LIFT_GAIN, LIFT_FROM = 0, 1, 2, 3, 4
 ) = range(15)
 N_RULES = 15
 
-_TRUNK_PARTS, _TRUNK_PATCHES, _LIMB_PATCHES = 4, 5, 2
-_ARM_PATCHES = 2 * _LIMB_PATCHES
-BODY_PATCHES = _TRUNK_PATCHES + 2 * _ARM_PATCHES
+_TRUNK_PARTS, TRUNK_PATCHES, _LIMB_PATCHES = 4, 5, 2
+ARM_PATCHES = 2 * _LIMB_PATCHES
+BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
 # The square at an elbow is as large as the disc of the limbs' mean width, that at a hand's end as
 # the disc of the forearm's width: half sides, sqrt(pi) / 2 = 0.886 of the radius.
 _SQUARE_OF_DISC = 0.886
@@ -305,7 +305,7 @@ def _place_trunk(work: Workspace, drawn: Floats) -> None:
     patches = shape.shape[1] // 4
     for j in range(3):
         for c in range(4):
-            for e in range(c * patches, c * patches + _TRUNK_PATCHES):
+            for e in range(c * patches, c * patches + TRUNK_PATCHES):
                 turned = rotation[j, 0] * shape[0, e] + rotation[j, 1] * shape[1, e]
                 corners[j, e] = hip[j] + turned + rotation[j, 2] * shape[2, e]
 
@@ -483,12 +483,12 @@ def rate_trunks(
     ``scale`` is 1 / (pixels of the silhouette).
     """
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    work = _workspace(_TRUNK_PATCHES, rows)
+    work = _workspace(TRUNK_PATCHES, rows)
     for i in range(states.shape[0]):
         _pose(states[i], Place(*place), View(*view), work.torso, work.hip)
         _place_trunk(work, drawn)
         _draw(work, View(*view), rows, width)
-        gain = _sum_union(work, _TRUNK_PATCHES, row_sums)[0]
+        gain = _sum_union(work, TRUNK_PATCHES, row_sums)[0]
         ratings[i] = (base_px + gain) * scale + _torso_prior(states[i], anchor, rules)
 
 
@@ -514,14 +514,14 @@ def rate_arms(
     ``covered`` and ``base_px`` are the row sums and the cost with that trunk drawn.
     """
     rows, width = covered.shape[0], covered.shape[1] - 1
-    work, arm = _workspace(_ARM_PATCHES, rows), _new_arm()
+    work, arm = _workspace(ARM_PATCHES, rows), _new_arm()
     _pose(torso, Place(*place), View(*view), work.torso, work.hip)
     for i in range(arms.shape[0]):
         _pose_arm(arms[i], side, parts, girdle, arm.points, arm.directions)
         _turn_arm(arm, work.torso, work.hip)
         _place_arm(arm, 0, drawn, work.corners)
         _draw(work, View(*view), rows, width)
-        gain = _sum_union(work, _ARM_PATCHES, covered)[0]
+        gain = _sum_union(work, ARM_PATCHES, covered)[0]
         ratings[i] = (base_px + gain) * scale + _arm_prior(arm, side, parts, rules, gmm)
 
 
@@ -555,7 +555,7 @@ def rate_bodies(
             angles = states[i, first : first + ARM_ANGLES]
             _pose_arm(angles, side, parts, girdle, arm.points, arm.directions)
             _turn_arm(arm, work.torso, work.hip)
-            _place_arm(arm, _TRUNK_PATCHES + _ARM_PATCHES * k, drawn, work.corners)
+            _place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, drawn, work.corners)
             prior += _arm_prior(arm, side, parts, rules, gmm)
         _draw(work, View(*view), rows, width)
         gain, area = _sum_union(work, BODY_PATCHES, row_sums)
@@ -580,13 +580,13 @@ def cover(
 ) -> int:
     """Write the row sums beside some parts of a state to ``covered``; return the gain they lack."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
-    patches = _TRUNK_PATCHES * has_trunk + _ARM_PATCHES * (int(has_left) + int(has_right))
+    patches = TRUNK_PATCHES * has_trunk + ARM_PATCHES * (int(has_left) + int(has_right))
     work, arm = _workspace(patches, rows), _new_arm()
     _pose(state, Place(*place), View(*view), work.torso, work.hip)
     p = 0
     if has_trunk:
         _place_trunk(work, drawn)
-        p = _TRUNK_PATCHES
+        p = TRUNK_PATCHES
     for k in range(2):
         if (k == 0 and has_left) or (k == 1 and has_right):
             first = _first_angle(k)
@@ -594,10 +594,42 @@ def cover(
             _pose_arm(angles, _side_of(k), parts, girdle, arm.points, arm.directions)
             _turn_arm(arm, work.torso, work.hip)
             _place_arm(arm, p, drawn, work.corners)
-            p += _ARM_PATCHES
+            p += ARM_PATCHES
     _draw(work, View(*view), rows, width)
     _cover(work.sides, work.extent, row_sums, covered)
     return int(_sum_union(work, patches, row_sums)[0])
+
+
+@_inline
+def new_figure() -> tuple[Workspace, Arm]:
+    """Return what :func:`place_patches` needs."""
+    return _workspace(BODY_PATCHES, 1), _new_arm()
+
+
+@_inline
+def place_patches(
+    state: Floats,
+    has_trunk: bool,
+    has_arm: tuple[bool, bool],
+    parts: Floats,
+    drawn: Floats,
+    girdle: Floats,
+    place: PlaceTuple,
+    view: ViewTuple,
+    work: Workspace,
+    arm: Arm,
+) -> None:
+    """Write the corners of trunk, left and right arm, or some of these, into ``work``."""
+    _pose(state, Place(*place), View(*view), work.torso, work.hip)
+    if has_trunk:
+        _place_trunk(work, drawn)
+    for k in range(2):
+        if has_arm[k]:
+            first = _first_angle(k)
+            angles = state[first : first + ARM_ANGLES]
+            _pose_arm(angles, _side_of(k), parts, girdle, arm.points, arm.directions)
+            _turn_arm(arm, work.torso, work.hip)
+            _place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, drawn, work.corners)
 
 
 @_compile
@@ -611,15 +643,8 @@ def corners_of_body(
     corners_m: Floats,
 ) -> None:
     """Write the patches of a state to ``corners_m`` (13, 4, 3), metres in the optical frame."""
-    work, arm = _workspace(BODY_PATCHES, 1), _new_arm()
-    _pose(state, Place(*place), View(*view), work.torso, work.hip)
-    _place_trunk(work, drawn)
-    for k in range(2):
-        first = _first_angle(k)
-        angles = state[first : first + ARM_ANGLES]
-        _pose_arm(angles, _side_of(k), parts, girdle, arm.points, arm.directions)
-        _turn_arm(arm, work.torso, work.hip)
-        _place_arm(arm, _TRUNK_PATCHES + _ARM_PATCHES * k, drawn, work.corners)
+    work, arm = new_figure()
+    place_patches(state, True, (True, True), parts, drawn, girdle, place, view, work, arm)
     for p in range(BODY_PATCHES):
         for c in range(4):
             for j in range(3):

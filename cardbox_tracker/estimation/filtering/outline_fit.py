@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import (
     SHARES,
@@ -175,6 +176,8 @@ def signed_distances(
 ) -> tuple[int, int, NDArray[np.float32]]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
+    At most ``FAR_PX`` either way.
+
     Returns:
         The first column and row of the window around what is foreground above ``end_row``, and
         there the distances, px; empty if nothing is.
@@ -188,6 +191,6 @@ def signed_distances(
     if not width:
         return 0, 0, np.zeros((0, 0), np.float32)
     _, inside = cv2.threshold(rows[top:bottom, left:right], 127, 1, cv2.THRESH_BINARY)
-    away = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 3)
-    within = cv2.distanceTransform(inside, cv2.DIST_L2, 3)
-    return left, top, np.asarray(away - within, np.float32)
+    distances = np.empty(inside.shape, np.float32)
+    signed_distances_of(np.asarray(inside, np.uint8), distances)
+    return left, top, distances
