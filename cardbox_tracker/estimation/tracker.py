@@ -15,7 +15,13 @@ from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import (
+    USUAL_INTERVAL_S,
+    DepthImage,
+    Image,
+    Silhouette,
+    Term,
+)
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.estimate import (
     LOST,
@@ -130,6 +136,7 @@ class Tracker:
             cost = self.config.whole_body.cost
             self._refinement = SizeRefinement(self.body, self.camera, cost)
         self._poor_frames = 0
+        self._stamp_ns: int | None = None
         self._particles: Particles | None = None
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
@@ -181,23 +188,27 @@ class Tracker:
         self._silhouette.frame(silhouette, image)
         return self._region.select(silhouette, self._before, self._poor_frames == 0, image)
 
-    def track(self, silhouette: Silhouette, image: Image | None = None) -> Estimate:
+    def track(
+        self, silhouette: Silhouette, image: Image | None = None, stamp_ns: int | None = None
+    ) -> Estimate:
         """Estimate the posture behind a silhouette.
 
         Args:
             silhouette: (H, W), 0 or 255, of the camera's size.
             image: (H, W) grey or (H, W, 3) bgr of the same frame, for terms that use it.
+            stamp_ns: when it was taken; None: 1/15 s after the one before.
 
         Raises:
             ValueError: silhouette or image has not the camera's size.
         """
-        return self.track_views([silhouette], [image])
+        return self.track_views([silhouette], [image], stamp_ns=stamp_ns)
 
     def track_views(
         self,
         silhouettes: Sequence[Silhouette | None],
         images: Sequence[Image | None],
         depth_m: DepthImage | None = None,
+        stamp_ns: int | None = None,
     ) -> Estimate:
         """Estimate the posture behind what all cameras see at one time.
 
@@ -208,6 +219,7 @@ class Tracker:
             images: of the same cameras.
             depth_m: (H, W) of the first camera, metres along its optical axis, for the term
                 ``Depth``; not finite or 0 where it is not known.
+            stamp_ns: as for :meth:`track`.
 
         Raises:
             ValueError: a silhouette or an image has not its camera's size.
@@ -220,6 +232,10 @@ class Tracker:
             )
         )
         self._depth_m = depth_m
+        before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        self._interval_s = USUAL_INTERVAL_S
+        if stamp_ns is not None and before_ns is not None and stamp_ns > before_ns:
+            self._interval_s = (stamp_ns - before_ns) / 1e9
         silhouette, image = silhouettes[0], images[0]
         if silhouette is None:
             silhouette, image = np.zeros((self.camera.height, self.camera.width), np.uint8), None
@@ -247,8 +263,12 @@ class Tracker:
 
     def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
         frame = self._silhouette.frame(silhouette, image, self._before)
-        if self._others_now or self._depth_m is not None:
-            frame = replace(frame, others=self._others_now, depth_m=self._depth_m)
+        frame = replace(
+            frame,
+            others=self._others_now,
+            depth_m=self._depth_m,
+            interval_s=self._interval_s,
+        )
         sight = self._filter.look(frame)
         if sight is Sight.NOBODY:
             self._before = None

@@ -136,7 +136,7 @@ def _estimates(
 ) -> Iterator[tuple[Frame, Estimate]]:
     if isinstance(source, SilhouetteSource):
         for frame in source.frames(start_s):
-            yield frame, tracker.track(frame.silhouette, frame.image)
+            yield frame, tracker.track(frame.silhouette, frame.image, frame.stamp_ns)
         return
     nothing = np.zeros((tracker.camera.height, tracker.camera.width), np.uint8)
     for stamp_ns, time_s, frames, depth_m in source.frames(start_s):
@@ -144,6 +144,7 @@ def _estimates(
             [frame and frame.silhouette for frame in frames],
             [frame and frame.image for frame in frames],
             depth_m,
+            stamp_ns,
         )
         yield frames[0] or Frame(stamp_ns, time_s, nothing, nothing), estimate
 

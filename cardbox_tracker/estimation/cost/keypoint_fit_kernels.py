@@ -9,18 +9,108 @@ Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code o
 
 from __future__ import annotations
 
+from math import atan2, cos, pi, sin
+
 import numpy as np
 
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
 from cardbox_tracker.estimation.cost.linear_kernels import solve
-from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, keypoints
+from cardbox_tracker.estimation.cost.whole_body_kernels import (
+    ARM_ANGLES,
+    LEFT_ARM,
+    N_STATE,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    keypoints,
+    pose,
+    pose_arm,
+)
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 KEYPOINTS = 6
 SPREAD_M = 0.01
 """How near to the wanted places the keypoints come where a joint has to turn by a deviation."""
+
+
+@_compile
+def pose_at_keypoints(
+    state: Floats,
+    parts: Floats,
+    girdle: Floats,
+    place: PlaceTuple,
+    view: ViewTuple,
+    wanted: Floats,
+    limits: Floats,
+) -> None:
+    """Change arms and place of ``state`` (14,) so that its keypoints are near ``wanted``.
+
+    The inverse of the kinematics. Bones point where they are wanted to, or as near to that as the
+    limits let them; a forearm begins at the elbow as it is then. The torso keeps its angles, and
+    its place is such that the middle of the shoulders is the wanted one.
+
+    Args:
+        state: to begin with; changed.
+        parts: as of :func:`~.whole_body_kernels.keypoints`, like the next three.
+        girdle: see there.
+        place: see there.
+        view: see there.
+        wanted: keypoints (6, 3), metres in the optical frame.
+        limits: lowest and highest value of each, (14, 2).
+    """
+    rotation, hip = np.empty((3, 3)), np.empty(3)
+    points, ahead, now = np.empty((3, 3)), np.empty(3), np.empty((KEYPOINTS, 3))
+    directions = np.empty(6)
+    pose(state, place, view, rotation, hip)
+    for arm in range(2):
+        first, side = LEFT_ARM + ARM_ANGLES * arm, 1.0 - 2.0 * arm
+        angles = state[first : first + ARM_ANGLES]
+        within = limits[first : first + ARM_ANGLES]
+        shoulder, elbow, hand = wanted[3 * arm], wanted[3 * arm + 1], wanted[3 * arm + 2]
+        for c in range(3):
+            ahead[c] = 0.0
+            for r in range(3):
+                ahead[c] += rotation[r, c] * (elbow[r] - shoulder[r])
+        # With a for the abduction and f for the flexion, the upper arm points along
+        # (sin f, sin a cos f, -cos a cos f).
+        abduction = _nearest(side * atan2(ahead[1], -ahead[2]), within[0, 0], within[0, 1])
+        ca, sa = cos(side * abduction), sin(side * abduction)
+        flexion = atan2(ahead[0], sa * ahead[1] - ca * ahead[2])
+        angles[0], angles[1] = abduction, _nearest(flexion, within[1, 0], within[1, 1])
+        pose_arm(angles, side, parts, girdle, points, directions)
+        # Where the forearm would point from the elbow as it is now.
+        for c in range(3):
+            ahead[c] = 0.0
+            for r in range(3):
+                ahead[c] += rotation[r, c] * (hand[r] - shoulder[r])
+            ahead[c] += points[0, c] - points[1, c]
+        cf, sf = cos(angles[1]), sin(angles[1])
+        along_x = cf * ahead[0] - sa * sf * ahead[1] + ca * sf * ahead[2]
+        along_y = ca * ahead[1] + sa * ahead[2]
+        along_z = -sf * ahead[0] - sa * cf * ahead[1] + ca * cf * ahead[2]
+        turned = _nearest(side * atan2(along_y, -along_z), within[2, 0], within[2, 1])
+        ce, se = cos(side * turned), sin(side * turned)
+        bent = atan2(along_x, se * along_y - ce * along_z)
+        angles[2], angles[3] = turned, _nearest(bent, within[3, 0], within[3, 1])
+    keypoints(state, parts, girdle, place, view, now)
+    for c in range(3):
+        ahead[c] = 0.5 * (wanted[0, c] + wanted[3, c] - now[0, c] - now[3, c])
+    cos_pitch, sin_pitch = view[4], view[5]
+    state[TORSO_Y] += ahead[0]
+    state[TORSO_X] += sin_pitch * ahead[1] - cos_pitch * ahead[2]
+    state[TORSO_Z] += -cos_pitch * ahead[1] - sin_pitch * ahead[2]
+    for j in (TORSO_Y, TORSO_X, TORSO_Z):
+        state[j] = min(max(state[j], limits[j, 0]), limits[j, 1])
+
+
+@_compile
+def _nearest(angle: float, least: float, most: float) -> float:
+    """Return ``angle``, rad, or the limit that is the shorter way round from it."""
+    middle = 0.5 * (least + most)
+    off = (angle - middle + pi) % (2.0 * pi) - pi
+    return min(max(middle + off, least), most)
 
 
 @_compile
@@ -71,7 +161,10 @@ def fit_keypoints(
                 jacobian[j, i] = (above[i // 3, i % 3] - below[i // 3, i % 3]) / (2.0 * steps[j])
         for j in range(N_STATE):
             for k in range(j + 1):
-                matrix[j, k] = scale * np.sum(jacobian[j] * jacobian[k])
+                total = 0.0
+                for i in range(KEYPOINTS * 3):
+                    total += jacobian[j, i] * jacobian[k, i]
+                matrix[j, k] = scale * total
             matrix[j, j] += 1.0 if stddev[j] == 0.0 else 1.0 / stddev[j] ** 2
             total = 0.0
             for i in range(KEYPOINTS * 3):

@@ -192,9 +192,7 @@ def costs_along(
         for j in range(N_STATE):
             trial[j] = state[j] + SHARES[number] * change[j]
         _seen_from(trial, turned, moved, there)
-        place_patches(
-            there, True, (True, True), parts, drawn, girdle, place, view, work, arm
-        )
+        place_patches(there, True, (True, True), parts, drawn, girdle, place, view, work, arm)
         project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
         for i in range(len(points)):
             x, y = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])

@@ -37,6 +37,9 @@ Silhouette = NDArray[np.uint8]
 Image = NDArray[np.uint8]
 DepthImage = NDArray[np.float32]
 
+USUAL_INTERVAL_S = 1.0 / 15.0
+"""Between frames of which no time is known."""
+
 ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
 """Joints of each arm."""
 
@@ -61,6 +64,7 @@ class Frame:
         others: what further cameras see at that time, each a frame of its own.
         depth_m: (H, W), metres along the optical axis, not finite or 0 where it is not known; None
             without a depth image.
+        interval_s: since the frame before, s.
     """
 
     silhouette: Silhouette
@@ -70,6 +74,7 @@ class Frame:
     posture: FloatArray | None = None
     others: tuple[Frame, ...] = ()
     depth_m: DepthImage | None = None
+    interval_s: float = USUAL_INTERVAL_S
 
 
 class TermObservation(Protocol):

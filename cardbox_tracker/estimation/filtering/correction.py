@@ -19,12 +19,13 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints
+from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
+from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
@@ -34,7 +35,9 @@ DATA = "correction.npz"
 """Name of the network's data file."""
 # Place and arms move; the torso keeps its angles.
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
-_STEPS = 4
+_STEPS = 1
+# Roll, pitch and yaw of the torso in a state.
+_TURNS = slice(1, 4)
 _LEAST_BONE_M = 1e-6
 _NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
 
@@ -89,13 +92,22 @@ class Correction:
         found_m: keypoints before the last correction, (6, 3), metres in the optical frame.
     """
 
-    def __init__(self, cost: WholeBodyCost, camera: Camera) -> None:
-        """Prepare for the body of ``cost`` before ``camera``, the first one."""
+    def __init__(self, cost: WholeBodyCost, camera: Camera, smoothing_s: float = 0.0) -> None:
+        """Prepare for the body of ``cost`` before ``camera``, the first one.
+
+        ``smoothing_s`` is the time constant by which results are steadied.
+        """
         self._cost, self._camera = cost, camera
+        self._keypoints, self._turns = LowPass(smoothing_s), LowPass(smoothing_s)
         self._network = load_recurrent_network(DATA)
         # Who comes back is the same person, so nothing makes it forget.
         self._memory = self._network.new_memory(2)
         self.features, self.found_m = np.empty((2, 0)), np.empty((6, 3))
+
+    def forget(self) -> None:
+        """Begin anew with what is steadied: the next state may be of another place."""
+        self._keypoints.forget()
+        self._turns.forget()
 
     def __call__(
         self,
@@ -131,7 +143,9 @@ class Correction:
         )
         answers_m, self._memory = self._network(self.features, self._memory)
         corrected = state.copy()
+        corrected[_TURNS] = self._turns(state[_TURNS], frame.interval_s)
         figure = cost.parts, cost.girdle, cost.place, cost.view
-        wanted = moved(self.found_m, answers_m)
+        wanted = self._keypoints(moved(self.found_m, answers_m), frame.interval_s)
+        pose_at_keypoints(corrected, *figure, wanted, STATE_LIMITS)
         fit_keypoints(corrected, *figure, wanted, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
         return corrected

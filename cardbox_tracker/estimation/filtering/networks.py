@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import njit
 
 Layer = tuple[FloatArray, FloatArray]
 """Weights (networks, inputs, outputs) and biases (networks, 1, outputs)."""
@@ -40,13 +41,11 @@ class Network(NamedTuple):
     def __call__(self, features: FloatArray) -> FloatArray:
         """Return the answers, (n, A), to features (n, F)."""
         scaled = scaled_features(features, self.mean, self.scale, self.most)
-        values = np.broadcast_to(scaled, (len(self.weights[0]), *scaled.shape))
-        for number, (weights, biases) in enumerate(zip(self.weights, self.biases, strict=True)):
-            if number > 0:
-                values = np.maximum(values, 0.0)
-            values = values @ weights + biases
-        answer: FloatArray = values.mean(axis=0) * self.unit
-        return answer
+        answers = np.zeros((len(features), len(self.unit)))
+        # For two rows the layers of numpy's products take longer than the products.
+        _add_answers(scaled, self.weights, self.biases, answers)
+        answers *= self.unit / len(self.weights[0])
+        return answers
 
 
 class RecurrentNetwork(NamedTuple):
@@ -101,6 +100,31 @@ class RecurrentNetwork(NamedTuple):
         inside = np.concatenate([memory, entered], axis=2) @ first + first_biases
         answers = np.maximum(inside, 0.0) @ last + last_biases
         return np.asarray(answers.mean(axis=0), np.float64) * self.unit, memory
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_answers(
+    features: FloatArray,
+    weights: tuple[FloatArray, ...],
+    biases: tuple[FloatArray, ...],
+    answers: FloatArray,
+) -> None:
+    """Add the answers of all networks of a :class:`Network`, without the unit, to (n, A)."""
+    for network in range(weights[0].shape[0]):
+        for row in range(features.shape[0]):
+            values = features[row]
+            for number in range(len(weights)):
+                inputs, outputs = weights[number].shape[1:]
+                sums = biases[number][network, 0].copy()
+                for i in range(inputs):
+                    value = values[i]
+                    if number > 0 and value < 0.0:
+                        continue
+                    for o in range(outputs):
+                        sums[o] += value * weights[number][network, i, o]
+                values = sums
+            for o in range(answers.shape[1]):
+                answers[row, o] += values[o]
 
 
 def scaled_features(

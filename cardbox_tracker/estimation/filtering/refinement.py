@@ -49,7 +49,11 @@ class Refinement:
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
         self._yaws_rad = [0.0, *(view.yaw_rad for _, view in others)]
         self.see(range(len(self._yaws_rad)))
-        self.correction = Correction(cost, camera) if config.learned_correction else None
+        self.correction = (
+            Correction(cost, camera, config.output_smoothing_s)
+            if config.learned_correction
+            else None
+        )
         self._deviations = load_network(DATA) if config.learned_deviations else None
 
     def see(self, seeing: Sequence[int]) -> None:
@@ -64,6 +68,8 @@ class Refinement:
         What was learned goes on: it has learned from people who leave and come back.
         """
         self.outline.forget()
+        if self.correction is not None:
+            self.correction.forget()
 
     def corrected(
         self, frame: Frame, fitted: FloatArray, stddev: FloatArray, iou: float, search: Search

@@ -75,7 +75,7 @@ def measure_recovery(
         tracker = Tracker(body, camera, config, np.random.default_rng(seed))
         found = {}
         for frame, silhouette in _disturbed(frames, kind, truth, pitched):
-            estimate = tracker.track(silhouette, frame.image)
+            estimate = tracker.track(silhouette, frame.image, frame.stamp_ns)
             if estimate.keypoints_m is not None and frame.stamp_ns in truth:
                 off_m = np.linalg.norm(estimate.keypoints_m - truth[frame.stamp_ns], axis=1)
                 found[frame.stamp_ns] = 100 * float(off_m.mean())

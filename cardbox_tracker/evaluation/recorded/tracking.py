@@ -114,7 +114,7 @@ def track_session(
                 if tracker is None:
                     continue
                 start = time.perf_counter()
-                estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m)
+                estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m, stamp_ns)
                 spent.append(1e3 * (time.perf_counter() - start))
                 if observe is not None:
                     observe(seed, stamp_ns, estimates[stamp_ns], tracker)

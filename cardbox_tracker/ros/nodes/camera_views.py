@@ -60,6 +60,13 @@ class Views:
         seen = self.silhouettes[0] if self.images[0] is None else self.images[0]
         return self.nothing if seen is None else seen
 
+    @property
+    def seen(
+        self,
+    ) -> tuple[list[ImageArray | None], list[ImageArray | None], DepthImage | None]:
+        """What the tracker sees of it: silhouettes, images and depth."""
+        return self.silhouettes, self.images, self.depth_m
+
 
 @dataclass(frozen=True)
 class Seen:

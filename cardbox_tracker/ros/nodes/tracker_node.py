@@ -148,7 +148,8 @@ class TrackerNode(CardboxNode):
 
     def _is_next(self, message: Image) -> bool:
         """Return whether a silhouette can be used; one of a time before starts tracking anew."""
-        step = self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        self._now_ns = conversions.stamp_ns(message.header.stamp)
+        step = self.diagnostics.input.add(self._now_ns)
         if step is Step.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
         return step.is_usable
@@ -160,15 +161,14 @@ class TrackerNode(CardboxNode):
             self._wait()
             self._outputs.waiting(message, seen, "no body model yet: call initializer/initialize")
             return
-        silhouette = conversions.silhouette_of(message)
-        height, width = silhouette.shape
+        height, width = (silhouette := conversions.silhouette_of(message)).shape
         if (width, height) != (self._camera.width, self._camera.height):
             raise CameraError(
                 f"the silhouette is {width}x{height} but {self._info_topic} describes "
                 f"{self._camera.width}x{self._camera.height}; expected the same size"
             )
         image = conversions.image_behind(silhouette, seen)
-        estimate = self._tracker.track(silhouette, image)
+        estimate = self._tracker.track(silhouette, image, self._now_ns)
         picture = silhouette if image is None else image
         self._outputs.publish(message.header, estimate, picture, self._tracker)
         self._report.add(estimate, self._tracker.body)
@@ -184,7 +184,7 @@ class TrackerNode(CardboxNode):
             self._outputs.waiting(lead, None, "no body model yet: call initializer/initialize")
             return
         views = self._several.views(seen)
-        estimate = self._tracker.track_views(views.silhouettes, views.images, views.depth_m)
+        estimate = self._tracker.track_views(*views.seen, self._now_ns)
         self._outputs.publish(views.header, estimate, views.picture, self._tracker)
         self._report.add(estimate, self._tracker.body)
         self._several.done(views, estimate, self._tracker)
