@@ -236,9 +236,7 @@ def angles_of_arms(directions: Floats, side: float, limits: Floats) -> Floats:
 
 
 @_compile
-def pose(
-    state: Floats, place: PlaceTuple, view: ViewTuple, rotation: Floats, hip: Floats
-) -> None:
+def pose(state: Floats, place: PlaceTuple, view: ViewTuple, rotation: Floats, hip: Floats) -> None:
     """Write rotation (3, 3) and mid-hip (3,), metres, of the torso in the optical frame."""
     _pose(state, Place(*place), View(*view), rotation, hip)
 

@@ -72,6 +72,7 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
     for i, kind in enumerate(KINDS):
         result[kind] = float(distance[:, [i, i + 3]].mean())
         result[f"aligned_{kind}"] = float(aligned[:, [i, i + 3]].mean())
+    off_m = run.keypoints_m - session.keypoints_m
     far = distance.mean(axis=1) > FAR_CM
     segments = session.segments[have]
     result |= {
@@ -84,9 +85,8 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
             }
             for name in dict.fromkeys(segments.tolist())
         },
-        "acceleration": acceleration_error(
-            run.keypoints_m - session.keypoints_m, session.stamps_ns
-        ),
+        "acceleration": acceleration_error(off_m, session.stamps_ns),
+        "acceleration_beside": acceleration_error(beside_shoulders(off_m), session.stamps_ns),
         "coverage": coverage(session, run),
     }
     return result

@@ -114,6 +114,7 @@ def _signed(results: Results) -> list[str]:
 def _steadiness(results: Results) -> list[str]:
     columns: dict[str, Callable[[Results], float]] = {
         "acceleration error, m/s²": lambda s: mean_of(s["runs"], "acceleration"),
+        "beside the shoulders": lambda s: mean_of(s["runs"], "acceleration_beside"),
         "without estimate, %": lambda s: _percent(s, "without_estimate"),
         "beyond 30 cm, %": lambda s: _percent(s, "far"),
         "of these `tracking`, images": lambda s: mean_of(s["runs"], "far_but_tracking"),
@@ -127,7 +128,9 @@ def _steadiness(results: Results) -> list[str]:
         "## Steadiness, losses, uncertainty, time",
         "",
         "Coverage: in how many images the true angle of a joint lies within two of its standard "
-        "deviations; mean, least and most over the 11 angles. MediaPipe's time is that of another "
+        "deviations; mean, least and most over the 11 angles. The acceleration error is that of the "
+        "joints' places, and of their places beside the middle of the shoulders: MediaPipe Pose has "
+        "no others, and `python -m tools.mediapipe_jitter` prints its. MediaPipe's time is that of another "
         "run, so it compares roughly; `cardbox benchmark` compares in one run.",
         "",
         *_table(results, columns, "{:.1f}"),

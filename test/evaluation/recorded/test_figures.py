@@ -63,7 +63,15 @@ def run_of(session: RecordedSession, postures: np.ndarray, **changes: Any) -> Se
 
 def test_the_truth_has_no_error(session: RecordedSession, postures: np.ndarray) -> None:
     found = figures(session, run_of(session, postures))
-    for name in ("absolute", "aligned", "pa", "depth", "hand_depth", "acceleration"):
+    for name in (
+        "absolute",
+        "aligned",
+        "pa",
+        "depth",
+        "hand_depth",
+        "acceleration",
+        "acceleration_beside",
+    ):
         assert found[name] == pytest.approx(0.0, abs=1e-9)
     assert (found["frames"], found["without_estimate"], found["far"]) == (N, 0, 0)
     assert found["states"] == {"tracking": N}
@@ -119,6 +127,8 @@ def test_the_acceleration_error_by_hand(session: RecordedSession, postures: np.n
     found = figures(session, run_of(session, postures, keypoints_m=points))
     # Second differences of +-2 mm at 15 Hz.
     assert found["acceleration"] == pytest.approx(0.002 * 15.0**2, rel=1e-4)
+    # All joints shake alike.
+    assert found["acceleration_beside"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_coverage_counts_two_standard_deviations(
