@@ -1,13 +1,16 @@
 """Learn the correction of the tracker's results from recorded sessions with ground truth.
 
 python -m tools.make_correction SESSION... --check SESSION... --output FILE [--jobs N]
+                                [--go-on FILE]
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
 ``default`` in as many ways as seeds are asked for (``tools/tracked_ways.py``); the network
 learns where the keypoints are beside those found
 (``cardbox_tracker/estimation/filtering/correction.py``) and to be steady. Those after ``--check``
 are not learned from: absolute and aligned error, cm, and the error of the acceleration, m/s^2,
-are printed for them, without the correction and with it. Needs PyTorch: ``pip install '.[learn]'``.
+are printed for them, without the correction and with it. ``--go-on`` begins with the networks in a
+file that it has written, that of the package for example, and learns more slowly. Needs PyTorch:
+``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -24,8 +27,14 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.correction import moved
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
-from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, scaled_features
+from cardbox_tracker.estimation.filtering.low_pass import LowPass
+from cardbox_tracker.estimation.filtering.networks import (
+    RecurrentNetwork,
+    read_recurrent_network,
+    scaled_features,
+)
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import load_session
@@ -42,6 +51,10 @@ NETWORKS, EPOCHS = 2, 12
 # Images of a sequence, which begin half as many apart, and sequences of a batch.
 LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
+# Of networks that have learned before.
+RATE_ON, EPOCHS_ON = 1e-3, 8
+# What results are steadied by after the correction, which learns to be earlier for it.
+SMOOTHING_S = WholeBodyConfig().output_smoothing_s
 # Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
 NOISE = 0.1
 # Metres that a metre per second squared is worth, and periods below which it would be noise, s.
@@ -97,11 +110,16 @@ def samples_of(folder: Path, seed: int) -> Samples:
     return Samples(features, found_m, true_m, stamps_ns)
 
 
-def learn(samples: Sequence[Samples], seed: int = 0) -> RecurrentNetwork:
-    """Return the network that learned from these sessions."""
-    mean, scale = networks.mean_and_scale(networks.by_arm(samples), [OF_DEPTH])
+def learn(
+    samples: Sequence[Samples], seed: int = 0, begin: RecurrentNetwork | None = None
+) -> RecurrentNetwork:
+    """Return the network that learned from these sessions, after those that ``begin`` did."""
+    if begin is None:
+        mean, scale = networks.mean_and_scale(networks.by_arm(samples), [OF_DEPTH])
+    else:
+        mean, scale = begin.mean, begin.scale
     sequences = _sequences(samples, mean, scale)
-    modules = [_learned(sequences, seed + number) for number in range(NETWORKS)]
+    modules = [_learned(sequences, seed + number, begin, number) for number in range(NETWORKS)]
     layers = [_layers(module) for module in modules]
     enter, receive, keep, first, last = (
         (np.stack([one[i][0] for one in layers]), np.stack([one[i][1] for one in layers]))
@@ -127,8 +145,11 @@ def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) 
     return [torch.tensor(np.array(c), dtype=torch.float32) for c in zip(*parts, strict=True)]
 
 
-def _learned(sequences: list[Any], seed: int) -> Any:
-    """Return the modules (enter, recurrent, leave_0, leave_1) that learned from the sequences."""
+def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, number: int) -> Any:
+    """Return the modules (enter, recurrent, leave_0, leave_1) that learned from the sequences.
+
+    They are those of the network ``number`` of ``begin`` first, if there is one.
+    """
     import torch
     from torch import nn
 
@@ -142,16 +163,19 @@ def _learned(sequences: list[Any], seed: int) -> Any:
             nn.Linear(LEFT, len(UNIT_M)),
         ]
     )
+    rate, epochs = (RATE, EPOCHS) if begin is None else (RATE_ON, EPOCHS_ON)
+    if begin is not None:
+        _put(begin, number, modules)
     batches = len(features) // BATCH
-    optimizer = torch.optim.AdamW(modules.parameters(), lr=RATE, weight_decay=DECAY)
+    optimizer = torch.optim.AdamW(modules.parameters(), lr=rate, weight_decay=DECAY)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, RATE, total_steps=EPOCHS * batches + 1
+        optimizer, rate, total_steps=epochs * batches + 1
     )
-    for _ in range(EPOCHS):
+    for _ in range(epochs):
         for chosen in torch.randperm(len(features))[: batches * BATCH].split(BATCH):
             noise = NOISE * torch.randn(len(chosen), 1, 2, features.shape[3])
             answers = _answers(modules, features[chosen] + noise)
-            off = _moved(found[chosen], answers) - true[chosen]
+            off = _steadied(_moved(found[chosen], answers), period[chosen]) - true[chosen]
             loss = _loss(off, known[chosen], period[chosen])
             optimizer.zero_grad()
             loss.backward()
@@ -195,6 +219,21 @@ def _moved(found: Any, answers: Any) -> Any:
     return torch.cat(parts, dim=2)
 
 
+def _steadied(points: Any, period_s: Any) -> Any:
+    """Return keypoints (B, L, 6, 3) as the tracker steadies them, of images a period apart."""
+    import torch
+
+    if SMOOTHING_S == 0.0:
+        return points
+    age = torch.arange(points.shape[1])
+    age = age[:, None] - age[None, :]
+    kept = torch.exp(-period_s / SMOOTHING_S)[:, None, None]
+    shares = torch.where(age >= 0, (1.0 - kept) * kept ** age.clamp(min=0), 0.0)
+    # The first one is taken as it is.
+    shares[:, :, 0] = kept[:, 0] ** age[:, 0]
+    return torch.einsum("bts,bskc->btkc", shares, points)
+
+
 def _direction(vectors: Any) -> Any:
     return vectors / (vectors.square().sum(dim=-1, keepdim=True) + LEAST_BONE_M**2).sqrt()
 
@@ -229,13 +268,32 @@ def _layers(modules: Any) -> list[tuple[FloatArray, FloatArray]]:
     return [networks.numbers_of(*pair) for pair in pairs]
 
 
+def _put(network: RecurrentNetwork, number: int, modules: Any) -> None:
+    """Write the weights of one network into modules: the inverse of :func:`_layers`."""
+    import torch
+
+    enter, unit, first, last = modules
+    pairs = [
+        (network.enter, enter.weight, enter.bias),
+        (network.receive, unit.weight_ih_l0, unit.bias_ih_l0),
+        (network.keep, unit.weight_hh_l0, unit.bias_hh_l0),
+        (network.leave[0], first.weight, first.bias),
+        (network.leave[1], last.weight, last.bias),
+    ]
+    with torch.no_grad():
+        for (weights, biases), weight, bias in pairs:
+            weight.copy_(torch.tensor(weights[number].T))
+            bias.copy_(torch.tensor(biases[number, 0]))
+
+
 def corrected(network: RecurrentNetwork, samples: Samples) -> FloatArray:
-    """Return the keypoints as the network says that they are, (n, 6, 3)."""
-    memory = network.new_memory(2)
+    """Return the keypoints as the network says that they are, steadied, (n, 6, 3)."""
+    memory, low_pass = network.new_memory(2), LowPass(SMOOTHING_S)
+    intervals_s = np.diff(samples.stamps_ns, prepend=samples.stamps_ns[:1]) / 1e9
     result = np.empty_like(samples.found_m)
     for i, (features, found_m) in enumerate(zip(samples.features, samples.found_m, strict=True)):
         answers_m, memory = network(features, memory)
-        result[i] = moved(found_m, answers_m)
+        result[i] = low_pass(moved(found_m, answers_m), float(intervals_s[i]))
     return result
 
 
@@ -254,7 +312,7 @@ def check(network: RecurrentNetwork, samples: Samples) -> tuple[float, ...]:
 
 def main(args: list[str] | None = None) -> int:
     """Track, learn, check, write."""
-    return networks.run(args, __doc__, samples_of, learn, check)
+    return networks.run(args, __doc__, samples_of, learn, check, read=read_recurrent_network)
 
 
 if __name__ == "__main__":

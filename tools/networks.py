@@ -179,9 +179,10 @@ def run(
     args: Sequence[str] | None,
     description: str | None,
     track: Callable[..., OfSession],
-    learn_from: Callable[[Sequence[OfSession], int], AnyNetwork],
+    learn_from: Callable[..., AnyNetwork],
     check: Callable[[AnyNetwork, OfSession], Sequence[float]],
     adjust: Callable[[AnyNetwork, Sequence[OfSession]], AnyNetwork] | None = None,
+    read: Callable[[Path], AnyNetwork] | None = None,
 ) -> int:
     """Run one of the tools: track all sessions, learn from some, check the others, write.
 
@@ -190,15 +191,19 @@ def run(
         description: of the tool.
         track: returns what is kept of a session's folder, with ``seed``; it runs in processes of
             their own.
-        learn_from: returns the network, with the seed of the learning.
+        learn_from: returns the network, given sessions, the seed of the learning and, with
+            ``read``, what it begins with.
         check: returns the figures of a session that was not learned from.
         adjust: returns the network as it shall be, given the sessions after ``--fresh``.
+        read: reads the file after ``--go-on``.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
     parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
     if adjust is not None:
         parser.add_argument("--fresh", nargs="+", type=Path, required=True, metavar="SESSION")
+    if read is not None:
+        parser.add_argument("--go-on", type=Path, metavar="FILE", help="networks to begin with")
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
     parser.add_argument("--seed", type=int, default=0, help="of the learning")
@@ -211,7 +216,8 @@ def run(
             learned += pool.map(partial(track, seed=seed), given.sessions)
         fresh = list(pool.map(partial(track, seed=0), given.fresh)) if adjust else []
         others = list(pool.map(partial(track, seed=0), given.check))
-    network = learn_from(learned, given.seed)
+    begin = [read(given.go_on)] if read is not None and given.go_on is not None else []
+    network = learn_from(learned, given.seed, *begin)
     if adjust is not None:
         network = adjust(network, fresh)
     if others:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import read_recurrent_network
 from tools import make_correction as tool
 from tools import networks
@@ -50,6 +51,28 @@ def test_what_is_missing_is_learned_and_kept(
     networks.save(network, tmp_path / "network.npz", "a test")
     stored = read_recurrent_network(tmp_path / "network.npz")
     assert np.allclose(tool.corrected(stored, other), tool.corrected(network, other), atol=1e-4)
+
+
+def test_it_goes_on_with_what_was_learned(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    for name, value in {"EPOCHS": 1, "EPOCHS_ON": 0, "LENGTH": 40, "BATCH": 4}.items():
+        monkeypatch.setattr(tool, name, value)
+    sessions, other = [session(0), session(1)], session(9)
+    begin = tool.learn(sessions)
+    same = tool.learn(sessions, seed=5, begin=begin)
+    assert np.allclose(tool.corrected(same, other), tool.corrected(begin, other), atol=1e-6)
+
+
+def test_it_learns_with_the_low_pass_of_the_tracker(monkeypatch: pytest.MonkeyPatch) -> None:
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    monkeypatch.setattr(tool, "SMOOTHING_S", 0.08)
+    points = np.random.default_rng(0).standard_normal((2, 30, 6, 3))
+    periods_s = np.array([1 / 15, 1 / 30])
+    found = tool._steadied(torch.tensor(points), torch.tensor(periods_s)).numpy()
+    for sequence, period_s, steadied in zip(points, periods_s, found, strict=True):
+        low_pass = LowPass(0.08)
+        expected = [low_pass(one, float(period_s)) for one in sequence]
+        assert np.allclose(steadied, expected, atol=1e-6)
 
 
 def test_errors_are_of_all_keypoints_and_without_the_shoulders() -> None:

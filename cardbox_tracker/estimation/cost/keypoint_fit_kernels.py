@@ -1,6 +1,8 @@
-"""Compiled Gauss-Newton steps that bring the keypoints of a state to where they are wanted.
+"""Compiled: the state whose keypoints are nearest to where they are wanted.
 
-Each step solves, with the Jacobian J of the keypoints K(state) and damping in units of ``stddev``,
+The inverse of the kinematics finds it, but for what bones of given lengths, the torso's angles and
+the limits do not allow. Gauss-Newton steps share that out. Each step solves, with the Jacobian J of
+the keypoints K(state) and damping in units of ``stddev``,
 
     (J' J / SPREAD_M^2 + diag(1 / stddev^2)) change = J' (wanted - K(state)) / SPREAD_M^2
 
