@@ -110,7 +110,7 @@ def _track(tracker: Tracker, frame: FrameSet, camera: int | None, kind: str) -> 
         silhouettes[camera] = images[camera] = None
         if kind == "covered" and seen is not None and image is not None:
             silhouettes[camera], images[camera] = np.full_like(seen, 255), np.zeros_like(image)
-    return tracker.track_views(silhouettes, images)
+    return tracker.track_views(silhouettes, images, stamp_ns=frame.stamp_ns)
 
 
 def table(session: RecordedSession, rows: Iterator[Row]) -> str:

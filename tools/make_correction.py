@@ -29,6 +29,7 @@ from cardbox_tracker.estimation.filtering.correction import moved
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import (
+    Layer,
     RecurrentNetwork,
     read_recurrent_network,
     scaled_features,
@@ -52,7 +53,7 @@ NETWORKS, EPOCHS = 2, 12
 LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
 # Of networks that have learned before.
-RATE_ON, EPOCHS_ON = 1e-3, 8
+RATE_ON, EPOCHS_ON, KEPT_ON = 1e-3, 9, 0.7
 # What results are steadied by after the correction, which learns to be earlier for it.
 SMOOTHING_S = WholeBodyConfig().output_smoothing_s
 # Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
@@ -119,13 +120,35 @@ def learn(
     else:
         mean, scale = begin.mean, begin.scale
     sequences = _sequences(samples, mean, scale)
-    modules = [_learned(sequences, seed + number, begin, number) for number in range(NETWORKS)]
-    layers = [_layers(module) for module in modules]
+    layers = [
+        _layers(_learned(sequences, seed + number, begin, number)) for number in range(NETWORKS)
+    ]
     enter, receive, keep, first, last = (
         (np.stack([one[i][0] for one in layers]), np.stack([one[i][1] for one in layers]))
         for i in range(5)
     )
-    return RecurrentNetwork(mean, scale, networks.MOST, enter, receive, keep, (first, last), UNIT_M)
+    network = RecurrentNetwork(
+        mean, scale, networks.MOST, enter, receive, keep, (first, last), UNIT_M
+    )
+    return network if begin is None else _between(begin, network)
+
+
+def _between(begin: RecurrentNetwork, end: RecurrentNetwork) -> RecurrentNetwork:
+    """Return the network ``KEPT_ON`` of the way from ``begin`` to ``end``, weight by weight.
+
+    It is better than either in what both know (Wortsman et al., "Robust Fine-Tuning of Zero-Shot
+    Models", 2022).
+    """
+
+    def mixed(one: Layer, other: Layer) -> Layer:
+        weights, biases = ((1 - KEPT_ON) * a + KEPT_ON * b for a, b in zip(one, other, strict=True))
+        return weights, biases
+
+    layers = [
+        mixed(getattr(begin, name), getattr(end, name)) for name in ("enter", "receive", "keep")
+    ]
+    first, last = (mixed(one, other) for one, other in zip(begin.leave, end.leave, strict=True))
+    return end._replace(enter=layers[0], receive=layers[1], keep=layers[2], leave=(first, last))
 
 
 def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) -> list[Any]:

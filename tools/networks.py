@@ -110,8 +110,8 @@ def learn(
         mean,
         scale,
         MOST,
-        tuple(np.stack(of_layer) for of_layer in zip(*weights, strict=True)),
-        tuple(np.stack(of_layer) for of_layer in zip(*biases, strict=True)),
+        tuple(np.stack(of_layer).astype(np.float64) for of_layer in zip(*weights, strict=True)),
+        tuple(np.stack(of_layer).astype(np.float64) for of_layer in zip(*biases, strict=True)),
         unit,
     )
 

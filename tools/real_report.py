@@ -58,6 +58,7 @@ class Frames:
         masks: MediaPipe's, (N, H, W), 0 or 255.
         landmarks_px: MediaPipe's, (N, 6, 2), as ``LANDMARKS``; nan where there is none.
         clips: name of the clip, (N,).
+        stamps_ns: when they were taken, (N,).
     """
 
     camera: Camera
@@ -66,6 +67,7 @@ class Frames:
     masks: Image
     landmarks_px: FloatArray
     clips: NDArray[np.str_]
+    stamps_ns: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,7 @@ def read_frames(folder: Path) -> Frames:
         np.where(masks[chosen], 255, 0).astype(np.uint8),
         np.array([_landmarks(frame) for frame in seen]),
         np.array([frame["segment"] for frame in seen]),
+        np.array([frame.stamp_ns for frame in frames]),
     )
 
 
@@ -173,7 +176,8 @@ def track(frames: Frames, variant: Variant, stature_m: float, distance_m: float,
             if not variant.fits:
                 body = _placed(body.with_values(unknown=()), silhouette, camera)
             tracker = Tracker(body, camera, config, np.random.default_rng(seed))
-        estimate = tracker.track(silhouette, frames.images[i] if variant.colors else None)
+        image = frames.images[i] if variant.colors else None
+        estimate = tracker.track(silhouette, image, int(frames.stamps_ns[i]))
         estimates.append(estimate)
         bodies.append(tracker.body)
         if estimate.posture is None or estimate.keypoints_m is None:

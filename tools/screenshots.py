@@ -87,7 +87,7 @@ def _shots(
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
     span = segments["neutral"].start_s, max(moments.values()) + 1.0
     for frame in source.frames(*span):
-        estimate = tracker.track(frame.silhouette, frame.image)
+        estimate = tracker.track(frame.silhouette, frame.image, frame.stamp_ns)
         for motion, time_s in moments.items():
             if motion not in overlays and frame.time_s >= time_s - 1e-6:
                 frames[motion] = frame

@@ -48,7 +48,8 @@ def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, flo
                 assert agreement is not None
                 for frame in frames:
                     seen = [one and one.silhouette for one in frame.frames]
-                    tracker.track_views(seen, [one and one.image for one in frame.frames])
+                    images = [one and one.image for one in frame.frames]
+                    tracker.track_views(seen, images, stamp_ns=frame.stamp_ns)
                     if agreement.is_due:
                         agreement.check()
                 agreement.check(is_last=True)

@@ -95,7 +95,7 @@ class Correction:
     def __init__(self, cost: WholeBodyCost, camera: Camera, smoothing_s: float = 0.0) -> None:
         """Prepare for the body of ``cost`` before ``camera``, the first one.
 
-        ``smoothing_s`` is the time constant by which results are steadied.
+        ``smoothing_s`` is the time constant by which joints and the torso's angles are steadied.
         """
         self._cost, self._camera = cost, camera
         self._keypoints, self._turns = LowPass(smoothing_s), LowPass(smoothing_s)

@@ -41,7 +41,7 @@ _HOME_LIMIT_M = 0.7
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Arms that are passed on, how many of them are combined with the other side's, and the noise around
 # the best, as a share of that of all.
-_BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 10, 0.45
+_BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 12, 0.45
 _STEP_M = 0.05  # across the image: the legs leave the columns where they were
 # Uniform numbers of a torso, an arm, a state of the last rounds.
 _TORSO_UNIFORMS, _ARM_UNIFORMS, _TOGETHER_UNIFORMS = 2, 3, 2

@@ -30,7 +30,7 @@ class WholeBodyConfig:
     apart_m: float = setting(
         0.12, "how far apart survivors are to differ", unit="m", limits=(0.0, 10.0), restarts=True
     )
-    torsos: int = setting(52, "torsos tried", limits=(2, 100_000), restarts=True)
+    torsos: int = setting(70, "torsos tried", limits=(2, 100_000), restarts=True)
     torso_explorers: int = setting(
         16, "of these, those that bow or turn anywhere", limits=(0, 100_000), restarts=True
     )
@@ -46,7 +46,7 @@ class WholeBodyConfig:
         limits=(1, 1000),
         restarts=True,
     )
-    arms: int = setting(76, "arms tried on either side", limits=(44, 100_000), restarts=True)
+    arms: int = setting(90, "arms tried on either side", limits=(44, 100_000), restarts=True)
     arm_mirrors: int = setting(
         8, "of these, survivors mirrored in depth", limits=(0, 100_000), restarts=True
     )
@@ -60,12 +60,12 @@ class WholeBodyConfig:
         20, "of these, those drawn from the learned prior", limits=(0, 100_000), restarts=True
     )
     arms_again: int = setting(
-        38, "arms tried around the best 20", limits=(1, 100_000), restarts=True
+        50, "arms tried around the best 20", limits=(1, 100_000), restarts=True
     )
     rounds: int = setting(
         2, "rounds in which all joints move together", limits=(0, 100), restarts=True
     )
-    together: int = setting(26, "states of such a round", limits=(2, 100_000), restarts=True)
+    together: int = setting(36, "states of such a round", limits=(2, 100_000), restarts=True)
     # Differences of survivors follow the directions in which the fit is flat (Storn & Price,
     # "Differential Evolution", 1997).
     differing: float = setting(
@@ -150,7 +150,7 @@ class WholeBodyConfig:
         restarts=True,
     )
     output_smoothing_s: float = setting(
-        0.0,
+        0.08,
         "time constant by which corrected results are steadied, and about which they are later; "
         "0: not at all",
         unit="s",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +17,7 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.correction import DATA, Correction, moved
 from cardbox_tracker.estimation.filtering.loss import Evidence
-from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.vision.camera import Camera
@@ -40,6 +43,26 @@ def search(state: np.ndarray, chance: float = 0.1) -> Search:
     evidence = Evidence(0.1, 0.05, 0.05, 1.0, 0.0, 0.05, STDDEV, state, 100)
     states = np.array([state, state + 0.02, state - 0.02])
     return Search(states, np.array([0.1, 0.12, 0.12]), 0.02, evidence, chance)
+
+
+def test_joints_and_turns_are_steadied(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(_: object, features: np.ndarray, memory: object) -> tuple[np.ndarray, object]:
+        return np.zeros((2, 9)), memory
+
+    monkeypatch.setattr(RecurrentNetwork, "__call__", nothing)
+    later = FRONT.copy()
+    later[[0, 1, 4]] += 0.2, 0.1, 0.3
+    frame = replace(NOBODY, interval_s=0.05)
+    for smoothing_s, kept in ((0.0, 0.0), (0.1, np.exp(-0.5))):
+        correction = Correction(COST, CAMERA, smoothing_s)
+        for state in (FRONT, later):
+            found = correction(frame, state, STDDEV, 0.9, search(state), VIEWPOINTS)
+        points, before, after = (COST.keypoints(one) for one in (found, FRONT, later))
+        assert found[1] == pytest.approx(kept * FRONT[1] + (1.0 - kept) * later[1])
+        assert np.allclose(points, kept * before + (1.0 - kept) * after, atol=0.02)
+    correction.forget()
+    found = correction(frame, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS)
+    assert np.allclose(COST.keypoints(found), COST.keypoints(FRONT), atol=0.003)
 
 
 def test_answers_are_beside_the_middle_of_the_shoulders_and_bones_keep_their_lengths() -> None:
