@@ -175,7 +175,7 @@ class WholeBodyConfig:
         restarts=True,
     )
     uncertain_from: float = setting(
-        0.6, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
+        0.55, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
     )
     lost_from: float = setting(
         0.95,
