@@ -43,8 +43,8 @@ def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
     ("values", "text"),
     [
         ({"arms": 50, "banked_arms": 40}, "arms is 50; expected more than the 58 special ones"),
-        ({"fresh_torsos": 17}, "fresh_torsos, torso_explorers and torsos are 17, 16, 52"),
-        ({"best_torsos": 53}, "best_torsos is 53; expected 1 to 52"),
+        ({"fresh_torsos": 17}, "fresh_torsos, torso_explorers and torsos are 17, 16, 70"),
+        ({"best_torsos": 71}, "best_torsos is 71; expected 1 to 70"),
         ({"alike": 33}, "alike is 33; expected 1 to 32"),
     ],
 )

@@ -93,10 +93,10 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
 
 
 def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
-    tracker = make(default_preset())
+    tracker, states = make(default_preset()), []
     for silhouette in waving(20):
         estimate = tracker.track(silhouette)
-        assert estimate.state == TRACKING
+        states.append(estimate.state)
         state = np.append(estimate.posture, estimate.offset_m)
         assert np.all((state >= STATE_LIMITS[:, 0]) & (state <= STATE_LIMITS[:, 1]))
         # The keypoints are those of the posture.
@@ -106,6 +106,27 @@ def test_the_whole_body_filter_says_where_it_is_and_how_well_it_fits() -> None:
         assert estimate.posture_stddev.shape == (12,)
         assert np.all(estimate.posture_stddev > 0)
         assert np.all(estimate.offset_stddev_m > 0)
+    # It may doubt a posture now and then.
+    assert set(states) <= {TRACKING, UNCERTAIN}
+    assert states.count(TRACKING) >= 16
+
+
+def test_results_are_steadied_by_the_time_between_images() -> None:
+    silhouettes = waving(6)
+
+    def last(period_ns: int | None) -> Any:
+        tracker, start_ns = make(default_preset()), 10**18
+        for i, silhouette in enumerate(silhouettes):
+            stamp_ns = None if period_ns is None else start_ns + i * period_ns
+            posture = tracker.track(silhouette, None, stamp_ns).posture
+        return posture
+
+    usual = last(None)
+    assert np.allclose(last(66_666_667), usual, atol=1e-6)
+    # Of images a second apart nothing of the one before is left.
+    assert not np.allclose(last(10**9), usual, atol=1e-3)
+    # Stamps that do not tell it count as none.
+    assert np.array_equal(last(0), usual)
 
 
 @pytest.mark.parametrize("make_config", [paper_preset, default_preset])

@@ -76,9 +76,9 @@ def test_the_tracker_gets_the_images(
     seen = []
     follow = Tracker.track
 
-    def spy(tracker: Tracker, silhouette: Any, image: Any = None) -> Any:
+    def spy(tracker: Tracker, silhouette: Any, image: Any = None, stamp_ns: Any = None) -> Any:
         seen.append(image)
-        return follow(tracker, silhouette, image)
+        return follow(tracker, silhouette, image, stamp_ns)
 
     monkeypatch.setattr(Tracker, "track", spy)
     config = default_preset().with_particles(20)

@@ -202,7 +202,9 @@ def test_the_tracker_gets_silhouette_and_image_of_one_stamp(
 ) -> None:
     seen: list[Any] = []
 
-    def track(_: Tracker, silhouette: np.ndarray, image: np.ndarray | None = None) -> Estimate:
+    def track(
+        _: Tracker, silhouette: np.ndarray, image: np.ndarray | None = None, _stamp_ns: int = 0
+    ) -> Estimate:
         seen.append((silhouette.copy(), None if image is None else image.copy()))
         return Estimate("no_person")
 

@@ -41,7 +41,9 @@ class Fed:
         self.node = node
         self.trackers: list[Tracker] = []
 
-        def track(tracker: Tracker, silhouette: Any, image: Any = None) -> Estimate:
+        def track(
+            tracker: Tracker, silhouette: Any, image: Any = None, stamp_ns: Any = None
+        ) -> Estimate:
             self.trackers.append(tracker)
             return Estimate("no_person")
 
