@@ -139,8 +139,7 @@ class WholeBodyConfig:
     )
     learned_correction: bool = setting(
         True,
-        "whether the learned correction is part of the result; not with one camera and a depth "
-        "image",
+        "whether the learned correction is part of the result",
         restarts=True,
     )
     learned_deviations: bool = setting(
