@@ -3,8 +3,8 @@
 Euclidean distances between pixels' centres, found in two passes as of Felzenszwalb and Huttenlocher
 ("Distance Transforms of Sampled Functions", 2012): along the columns, then along the rows, where
 the least of nearby squares is taken. Farther than ``FAR_PX`` all are alike, so few are near enough,
-and all loops are short and without branches. That takes a third of the time of OpenCV's
-``distanceTransform``, which knows one side at a time and only approximately.
+and all loops are short and without branches. OpenCV's ``distanceTransform`` knows one side at a
+time, takes longer for both than this, and is only approximate unless it is given more time still.
 """
 
 from __future__ import annotations

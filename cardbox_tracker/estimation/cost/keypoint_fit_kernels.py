@@ -16,18 +16,19 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.kernels import Floats, Place, PlaceTuple, View, ViewTuple
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     ARM_ANGLES,
-    LEFT_ARM,
     N_STATE,
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
+    _first_angle,
+    _pose,
+    _pose_arm,
+    _side_of,
     keypoints,
-    pose,
-    pose_arm,
 )
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -65,28 +66,23 @@ def pose_at_keypoints(
     rotation, hip = np.empty((3, 3)), np.empty(3)
     points, ahead, now = np.empty((3, 3)), np.empty(3), np.empty((KEYPOINTS, 3))
     directions = np.empty(6)
-    pose(state, place, view, rotation, hip)
+    _pose(state, Place(*place), View(*view), rotation, hip)
     for arm in range(2):
-        first, side = LEFT_ARM + ARM_ANGLES * arm, 1.0 - 2.0 * arm
+        first, side = _first_angle(arm), _side_of(arm)
         angles = state[first : first + ARM_ANGLES]
         within = limits[first : first + ARM_ANGLES]
         shoulder, elbow, hand = wanted[3 * arm], wanted[3 * arm + 1], wanted[3 * arm + 2]
-        for c in range(3):
-            ahead[c] = 0.0
-            for r in range(3):
-                ahead[c] += rotation[r, c] * (elbow[r] - shoulder[r])
+        _in_torso(rotation, shoulder, elbow, ahead)
         # With a for the abduction and f for the flexion, the upper arm points along
         # (sin f, sin a cos f, -cos a cos f).
         abduction = _nearest(side * atan2(ahead[1], -ahead[2]), within[0, 0], within[0, 1])
         ca, sa = cos(side * abduction), sin(side * abduction)
         flexion = atan2(ahead[0], sa * ahead[1] - ca * ahead[2])
         angles[0], angles[1] = abduction, _nearest(flexion, within[1, 0], within[1, 1])
-        pose_arm(angles, side, parts, girdle, points, directions)
+        _pose_arm(angles, side, parts, girdle, points, directions)
         # Where the forearm would point from the elbow as it is now.
+        _in_torso(rotation, shoulder, hand, ahead)
         for c in range(3):
-            ahead[c] = 0.0
-            for r in range(3):
-                ahead[c] += rotation[r, c] * (hand[r] - shoulder[r])
             ahead[c] += points[0, c] - points[1, c]
         cf, sf = cos(angles[1]), sin(angles[1])
         along_x = cf * ahead[0] - sa * sf * ahead[1] + ca * sf * ahead[2]
@@ -105,6 +101,15 @@ def pose_at_keypoints(
     state[TORSO_Z] += -cos_pitch * ahead[1] - sin_pitch * ahead[2]
     for j in (TORSO_Y, TORSO_X, TORSO_Z):
         state[j] = min(max(state[j], limits[j, 0]), limits[j, 1])
+
+
+@_compile
+def _in_torso(rotation: Floats, begin: Floats, end: Floats, ahead: Floats) -> None:
+    """Write the way between two points of the optical frame to ``ahead``, in the torso's frame."""
+    for c in range(3):
+        ahead[c] = 0.0
+        for r in range(3):
+            ahead[c] += rotation[r, c] * (end[r] - begin[r])
 
 
 @_compile

@@ -236,20 +236,6 @@ def angles_of_arms(directions: Floats, side: float, limits: Floats) -> Floats:
 
 
 @_compile
-def pose(state: Floats, place: PlaceTuple, view: ViewTuple, rotation: Floats, hip: Floats) -> None:
-    """Write rotation (3, 3) and mid-hip (3,), metres, of the torso in the optical frame."""
-    _pose(state, Place(*place), View(*view), rotation, hip)
-
-
-@_compile
-def pose_arm(
-    angles: Floats, side: float, parts: Floats, girdle: Floats, points: Floats, directions: Floats
-) -> None:
-    """Write shoulder, elbow, hand (3, 3), metres, and bones (6,) of an arm in the torso's frame."""
-    _pose_arm(angles, side, parts, girdle, points, directions)
-
-
-@_compile
 def keypoints(
     state: Floats,
     parts: Floats,
