@@ -15,9 +15,11 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation import person_region
 from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import background
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 
 
@@ -27,6 +29,7 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
     person_region.warm_up()
     body = BodyModel()
     camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
+    beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.
@@ -36,9 +39,13 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
                 np.zeros((len(PARTS), bins_of(channels)), np.uint8), np.full(channels, 128.0)
             )
             config = PRESETS[name]().with_particles(2)
-            tracker = Tracker(body.with_values(appearance=looks), camera, config)
-            for _ in range(2):
-                tracker.track(silhouette, np.full(shape, 128, np.uint8))
+            image = np.full(shape, 128, np.uint8)
+            for others in ((), (beside,)) if config.has_several_views else ((),):
+                person = body.with_values(appearance=looks)
+                tracker = Tracker(person, camera, config, others=others)
+                for _ in range(2):
+                    views = 1 + len(others)
+                    tracker.track_views([silhouette] * views, [image] * views)
 
 
 if __name__ == "__main__":

@@ -15,12 +15,15 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation import person_region, still_things
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost import (
+    arm_points,
     inner_cue_kernels,
     kernels,
+    outline_fit_kernels,
     pose_prior,
     row_sums,
     whole_body_kernels,
 )
+from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
 from cardbox_tracker.estimation.precompile import compile_all
@@ -29,6 +32,7 @@ from cardbox_tracker.vision import chroma, light, regions, shadows, window
 from cardbox_tracker.vision import foreground as contrast
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -38,6 +42,7 @@ def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (
         *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
+        *(arm_points, outline_fit_kernels),
         *(particle_kernels, whole_body_moves, person_region, still_things),
         *(contrast, regions, chroma, shadows, light, window),
     )
@@ -76,4 +81,18 @@ def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
         for pixels in (silhouette, np.zeros_like(silhouette), crowded, read_only, read_only):
             state = tracker.track(pixels, seen).state
         assert state == TRACKING
+    assert compiled() == before
+
+
+def test_nor_does_one_of_several_cameras() -> None:
+    compile_all()
+    before = compiled()
+    assert before["cardbox_tracker.estimation.cost.arm_points.add_costs_of_arms"] > 0
+    body = BodyModel()
+    person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
+    beside = OtherCamera(CAMERA, Extrinsics(np.eye(3), np.array([0.2, 0.0, 0.0])))
+    tracker = Tracker(body, CAMERA, PRESETS["default"](), others=[beside])
+    for seen in ([person, person], [None, person], [person, None]):
+        estimate = tracker.track_views(seen, [None, None])
+    assert estimate.keypoints_m is not None
     assert compiled() == before

@@ -95,6 +95,10 @@ class MultiViewCost:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso."""
         return self._sum(lambda cost, to_view: cost.arms(arms, arm))
 
+    def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return about what arms (N, 4) cost, 0 left or 1 right, without priors, (N,)."""
+        return self._sum(lambda cost, _: cost.arms_by_points(arms, arm))
+
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels of all cameras, (N,)."""
         ratings, costs_px, areas_px = self.costs[0].bodies(states)

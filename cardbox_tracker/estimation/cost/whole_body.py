@@ -16,6 +16,7 @@ from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
+from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms
 from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
 from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
@@ -73,6 +74,7 @@ class WholeBodyCost:
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
         kind = np.int16 if camera.width < 2**15 else np.int32
         shape = (camera.height, camera.width + 1)
+        self._beside_arm: int | None = None
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
@@ -126,6 +128,7 @@ class WholeBodyCost:
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
         """Rate torsos (N,), with the arms of a state drawn where they are in the image."""
+        self._beside_arm = None
         gain = kernels.cover(arms_of, False, True, True, *self.figure, self._seen, self._beside)
         ratings = np.empty(len(states))
         kernels.rate_trunks(
@@ -146,7 +149,7 @@ class WholeBodyCost:
 
     def fix_torso(self, torso: FloatArray) -> None:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
-        self._torso = torso
+        self._torso, self._beside_arm = torso, None
         gain = kernels.cover(
             torso, True, False, False, *self.figure, self._seen, self._beside_trunk
         )
@@ -155,8 +158,21 @@ class WholeBodyCost:
 
     def uncovered(self, arm: int) -> NDArray[Any]:
         """Row sums beside the fixed torso and the other arm than ``arm``, 0 left or 1 right."""
-        kernels.cover(self._torso, True, arm == 1, arm == 0, *self.figure, self._seen, self._beside)
+        if self._beside_arm != arm:
+            is_left, seen = arm == 1, (self._seen, self._beside)
+            kernels.cover(self._torso, True, is_left, not is_left, *self.figure, *seen)
+            self._beside_arm = arm
         return self._beside
+
+    def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return about what arms (N, 4) cost, 0 left or 1 right, without priors, (N,).
+
+        See :mod:`cardbox_tracker.estimation.cost.arm_points`.
+        """
+        costs = np.zeros(len(arms))
+        of_arm = 1.0 - 2.0 * arm, self._torso, *self.figure
+        add_costs_of_arms(arms, *of_arm, self.uncovered(arm), self._scale, costs)
+        return costs
 
     def arms(self, arms: FloatArray, arm: int) -> FloatArray:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso."""

@@ -26,6 +26,7 @@ def propose_arms(
     normals: FloatArray,
     uniforms: FloatArray,
     share: int = 1,
+    times: int = 1,
 ) -> FloatArray:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of a pool.
 
@@ -36,17 +37,22 @@ def propose_arms(
         cost: what one camera sees; its torso is fixed.
         normals: unit normal, (N, 4).
         uniforms: uniform in 0..1, (N, 3).
-        share: of mirrored, reaching and likely arms, take only one in so many.
+        share: of mirrored, reaching and likely arms, take only one in so many,
+        times: and so many for each of them.
     """
+    mirrors, tips, banked = (
+        times * (count // share)
+        for count in (config.arm_mirrors, config.arm_tips, config.banked_arms)
+    )
     return moves.propose_arms(
         pool,
         arm,
         config.survivors,
         config.arm_noise_rad,
-        config.arm_mirrors // share,
-        config.arm_tips // share,
+        mirrors,
+        tips,
         bank_of_arms(),
-        config.banked_arms // share,
+        banked,
         cost.uncovered(arm),
         cost.parts,
         cost.girdle,

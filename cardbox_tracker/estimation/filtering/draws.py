@@ -2,17 +2,55 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.whole_body_kernels import ARM_ANGLES, N_STATE
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+
+# Uniform numbers of a torso, an arm, a state of the last rounds.
+_OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
 
 
 class Draws:
-    """Hands out the numbers of one search."""
+    """Hands out the numbers of one search: normal ones, and uniform ones in 0..1."""
 
+    def __init__(self, rng: np.random.Generator, config: WholeBodyConfig, candidates: int) -> None:
+        """Draw.
+
+        Args:
+            rng: from which.
+            config: how many torsos, arms and states are rated.
+            candidates: arms that are proposed for each one that is rated.
+        """
+        c, together = config, config.rounds * config.together
+        arms, near = (2 * candidates * count for count in (c.arms, c.arms_again))
+        normals = c.torsos * N_STATE + (arms + near) * ARM_ANGLES + together * N_STATE
+        uniforms = c.torsos * _OF_TORSO + arms * _OF_ARM + together * _OF_STATE
+        self._normals = _Numbers(rng.standard_normal(normals))
+        self._uniforms = _Numbers(rng.random(uniforms))
+
+    def for_torsos(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return normal numbers (count, 14) and uniform ones (count, 2)."""
+        return self._normals.take(count, N_STATE), self._uniforms.take(count, _OF_TORSO)
+
+    def for_arms(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return normal numbers (count, 4) and uniform ones (count, 3)."""
+        return self._normals.take(count, ARM_ANGLES), self._uniforms.take(count, _OF_ARM)
+
+    def for_near_arms(self, count: int) -> FloatArray:
+        """Return normal numbers (count, 4)."""
+        return self._normals.take(count, ARM_ANGLES)
+
+    def for_states(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return normal numbers (count, 14) and uniform ones (count, 2)."""
+        return self._normals.take(count, N_STATE), self._uniforms.take(count, _OF_STATE)
+
+
+class _Numbers:
     def __init__(self, values: FloatArray) -> None:
-        """Hand out ``values``, (N,)."""
         self._values, self._next = values, 0
 
     def take(self, rows: int, columns: int) -> FloatArray:
-        """Return the next numbers as (rows, columns)."""
         start, self._next = self._next, self._next + rows * columns
         return self._values[start : self._next].reshape(rows, columns)

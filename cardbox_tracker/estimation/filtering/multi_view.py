@@ -60,6 +60,7 @@ class MultiViewFilter(WholeBodyFilter):
     A frame's ``others`` are those of ``cameras``; one without foreground says nothing.
     """
 
+    candidates = 4
     _seeing: list[int]
     """Cameras that see the person in this frame, by their number."""
 
@@ -151,9 +152,9 @@ class MultiViewFilter(WholeBodyFilter):
     def _propose_arms(
         self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
     ) -> FloatArray:
-        views, count = self._views, len(self._seeing)
-        ends = [len(normals) * part // count for part in range(count + 1)]
-        return np.concatenate(
+        views, count, times = self._views, len(self._seeing), self.candidates
+        ends = [times * (self._config.arms * part // count) for part in range(count + 1)]
+        arms = np.concatenate(
             [
                 propose_arms(
                     views.to_views[number](pool),
@@ -163,14 +164,20 @@ class MultiViewFilter(WholeBodyFilter):
                     normals[begin:end],
                     uniforms[begin:end],
                     count,
+                    times,
                 )
                 for number, begin, end in zip(self._seeing, ends, ends[1:], strict=False)
             ]
         )
+        return self._promising(arms, arm)
 
-    def _together(
-        self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
-    ) -> None:
+    def _promising(self, arms: FloatArray, arm: int) -> FloatArray:
+        # Neighbours are of one kind, so each kind stays.
+        costs = self._views.arms_by_points(arms, arm).reshape(-1, self.candidates)
+        best: FloatArray = arms[self.candidates * np.arange(len(costs)) + costs.argmin(axis=1)]
+        return best
+
+    def _together(self, states: FloatArray, ratings: FloatArray, draws: Draws) -> None:
         # Several outlines leave little that is flat: a step of Gauss and Newton is worth rounds.
         cost = self._cost
         kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
@@ -180,7 +187,7 @@ class MultiViewFilter(WholeBodyFilter):
         fitted = np.clip(fitted, *STATE_LIMITS.T)
         states = np.concatenate([states, fitted])
         ratings = np.concatenate([ratings, self._cost.bodies(fitted)[0]])
-        super()._together(states, ratings, normals, uniforms)
+        super()._together(states, ratings, draws)
 
     def ious(self) -> list[float | None]:
         """Return how well the last result covers each camera's silhouette of that frame.

@@ -20,7 +20,6 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    ARM_ANGLES,
     N_STATE,
     TORSO,
     TORSO_X,
@@ -43,8 +42,6 @@ _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # the best, as a share of that of all.
 _BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 12, 0.45
 _STEP_M = 0.05  # across the image: the legs leave the columns where they were
-# Uniform numbers of a torso, an arm, a state of the last rounds.
-_TORSO_UNIFORMS, _ARM_UNIFORMS, _TOGETHER_UNIFORMS = 2, 3, 2
 
 
 class WholeBodyFilter:
@@ -52,6 +49,9 @@ class WholeBodyFilter:
 
     A state is d1..d12, ``torso_x`` and ``torso_z``. What is done to results is in ``refine``.
     """
+
+    candidates = 1
+    """Arms that are proposed for each one that is rated."""
 
     def __init__(
         self, config: TrackerConfig, silhouette: SilhouetteTerm, rng: np.random.Generator
@@ -66,10 +66,6 @@ class WholeBodyFilter:
         self._reference = np.zeros(N_STATE)
         self._reference[:N_JOINTS] = reference_posture("front")
         self._reference[0] = self._body.placement.lateral_m
-        self._normals = c.torsos * N_STATE + 2 * (c.arms + c.arms_again) * ARM_ANGLES
-        self._normals += c.rounds * c.together * N_STATE
-        self._uniforms = c.torsos * _TORSO_UNIFORMS + 2 * c.arms * _ARM_UNIFORMS
-        self._uniforms += c.rounds * c.together * _TOGETHER_UNIFORMS
         self.forget()
 
     def use_body(self, silhouette: SilhouetteTerm) -> None:
@@ -155,27 +151,26 @@ class WholeBodyFilter:
     def _search(self) -> None:
         """Run all stages once."""
         config, cost = self._config, self._cost
-        normals = Draws(self._rng.standard_normal(self._normals))
-        uniforms = Draws(self._rng.random(self._uniforms))
+        draws = Draws(self._rng, config, self.candidates)
         before = self._survivors[0].copy()
         self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
         self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
         cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m, self._walk.yaw_rad
 
-        pool = self._torsos(before, normals, uniforms)
+        pool = self._torsos(before, draws)
         ratings = cost.bodies(pool)[0]
         best = pool[np.argmin(ratings)]
         by_rating = moves.best_states(pool, ratings, min(len(pool), config.survivors))
         cost.fix_torso(best)
         (left, left_ratings), (right, right_ratings) = (
-            self._arm(by_rating, arm, normals, uniforms) for arm in (0, 1)
+            self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
         pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
-        self._together(states, ratings, normals, uniforms)
+        self._together(states, ratings, draws)
 
-    def _torsos(self, before: FloatArray, normals: Draws, uniforms: Draws) -> FloatArray:
+    def _torsos(self, before: FloatArray, draws: Draws) -> FloatArray:
         """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
         config, cost = self._config, self._cost
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
@@ -194,8 +189,7 @@ class WholeBodyFilter:
             self._step_m,
             self._body.placement.distance_m,
             STATE_LIMITS,
-            normals.take(config.torsos, N_STATE),
-            uniforms.take(config.torsos, _TORSO_UNIFORMS),
+            *draws.for_torsos(config.torsos),
         )
         ratings = cost.torsos(torsos, before)
         pool = moves.pool_of(
@@ -221,30 +215,30 @@ class WholeBodyFilter:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state."""
         return propose_arms(pool, arm, self._config, self._one, normals, uniforms)
 
-    def _arm(
-        self, pool: FloatArray, arm: int, normals: Draws, uniforms: Draws
-    ) -> tuple[FloatArray, FloatArray]:
+    def _arm(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
         config, cost = self._config, self._cost
-        random = normals.take(config.arms, ARM_ANGLES), uniforms.take(config.arms, _ARM_UNIFORMS)
-        arms = self._propose_arms(pool, arm, *random)
+        arms = self._propose_arms(pool, arm, *draws.for_arms(self.candidates * config.arms))
         ratings = cost.arms(arms, arm)
         self._arm_spread[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
             arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
         )
-        again = moves.around_best(
+        near = moves.around_best(
             arms,
             ratings,
             _BEST_ARMS,
             _AGAIN_NOISE * config.arm_noise_rad,
             ARM_LIMITS,
-            normals.take(config.arms_again, ARM_ANGLES),
+            draws.for_near_arms(self.candidates * config.arms_again),
         )
-        return np.concatenate([arms, again]), np.concatenate([ratings, cost.arms(again, arm)])
+        near = self._promising(near, arm)
+        return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)])
 
-    def _together(
-        self, states: FloatArray, ratings: FloatArray, normals: Draws, uniforms: Draws
-    ) -> None:
+    def _promising(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return one of each ``candidates`` arms (N, 4), 0 left or 1 right."""
+        return arms
+
+    def _together(self, states: FloatArray, ratings: FloatArray, draws: Draws) -> None:
         """Move all joints of the best together; then choose who survives."""
         config, cost = self._config, self._cost
         sigma = config.together_noise * self._sigma
@@ -260,8 +254,7 @@ class WholeBodyFilter:
                 int(config.differing * config.together),
                 config.difference_scale,
                 STATE_LIMITS,
-                normals.take(config.together, N_STATE),
-                uniforms.take(config.together, _TOGETHER_UNIFORMS),
+                *draws.for_states(config.together),
             )
             states = np.concatenate([states, moved])
             ratings = np.concatenate([ratings, cost.bodies(moved)[0]])
