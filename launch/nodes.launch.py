@@ -71,7 +71,7 @@ ARGUMENTS = {
         name=True,
     ),
     "extrinsics_file": Argument("", "where the cameras stand, of Kalibr or aniposelib", Path),
-    "measure_distance": Argument("true", "with two cameras, they measure person_distance_m", bool),
+    "measure_distance": Argument("true", "two cameras or depth measure person_distance_m", bool),
     "depth": Argument("", "topic of depth images of the (first) camera"),
     "within_m": Argument(
         *("0.0", "with depth: whoever is nearer is the person; 0: learn a background", float),
@@ -88,7 +88,7 @@ GIVEN = {
     "background": ("image_transport", "background_file", "within_m", "depth"),
     "initializer": (
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
-        *("cameras", "extrinsics_file", "measure_distance"),
+        *("cameras", "extrinsics_file", "measure_distance", "depth"),
     ),
     "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth"),
 }

@@ -23,7 +23,7 @@ from cardbox_tracker.errors import CardboxError
 NAME = "initialize"
 HELP = "measure the person in a recording"
 
-# Where the search for the distance begins when two cameras measure it.
+# Where the search for the distance begins when depth images or two cameras measure it.
 _GUESSED_M = 2.0
 
 
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         metavar="M",
         help="from the camera to the person, metres along the floor; all sizes are proportional "
-        "to it; not needed with two or more --cameras, which measure it",
+        "to it; not needed with --depth, or with two or more --cameras, which measure it",
     )
     add_camera_pitch(parser)
     add_seed(parser, "the hypotheses")
@@ -65,14 +65,15 @@ def run(options: argparse.Namespace) -> None:
         describe,
         initialize_from_cameras,
         initialize_from_recording,
+        initialize_with_depth,
     )
 
     pitch_rad = math.radians(options.camera_pitch_deg)
     # An impossible distance or pitch is refused by its own name, before anything follows from it.
-    if options.distance is None and len(options.cameras) < 2:
+    if options.distance is None and options.depth is None and len(options.cameras) < 2:
         raise CardboxError(
-            "one camera does not show how far away the person is; give --distance M, or two "
-            "--cameras"
+            "one camera does not show how far away the person is; give --distance M, --depth "
+            "TOPIC, or two --cameras"
         )
     distance_m = _GUESSED_M if options.distance is None else options.distance
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
@@ -84,10 +85,10 @@ def run(options: argparse.Namespace) -> None:
     )
     inputs = options.recording, options.extrinsics
     check_outputs((options.output,), options.force, inputs=inputs)
-    if options.depth is not None and options.within is None:
+    if None not in (options.depth, options.distance) and options.within is None:
         raise CardboxError(
-            "--depth measures nobody by itself: give --within M in place of --background, or leave "
-            "--depth out"
+            "--depth measures how far away the person is, which --distance says, too: leave one of "
+            "them out, or give --within M in place of --background"
         )
     spans = {name: getattr(options, name) for name in REFERENCES}
     with (
@@ -96,13 +97,16 @@ def run(options: argparse.Namespace) -> None:
             background_of(options),
             options.cameras,
             options.extrinsics,
+            options.depth if options.distance is None else None,
         ) as source,
         progress_bar("initialize") as show,
     ):
-        if options.distance is None and isinstance(source, CameraSources):
-            result = initialize_from_cameras(source, spans, config, show)
-        else:
+        if options.distance is not None or not isinstance(source, CameraSources):
             result = initialize_from_recording(source.first, spans, config, show)
+        elif options.depth is not None:
+            result = initialize_with_depth(source, spans, config, show)
+        else:
+            result = initialize_from_cameras(source, spans, config, show)
     print_remarks(source.first)
     save_body_model(result.body, options.output)
     print(describe(result))

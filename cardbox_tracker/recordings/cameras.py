@@ -93,6 +93,8 @@ class CameraSources:
             )
         self._path, self._file, self._depth = path, extrinsics, depth
         self._background, self._config = background, config
+        # Then the depth images that are asked for are read already.
+        self._cuts_by_depth = isinstance(background, Within) and background.topic == depth
         self._stack = ExitStack()
         self.sources: list[SilhouetteSource] = []
         self.others: list[OtherCamera] = []
@@ -152,7 +154,9 @@ class CameraSources:
             if lead.time_s < start_s:
                 continue
             there = None
-            if depth is not None and depth[0] <= lead.stamp_ns + self.tolerance_ns:
+            if self._cuts_by_depth and frames[0] is not None:
+                there = frames[0].depth_m
+            elif depth is not None and depth[0] <= lead.stamp_ns + self.tolerance_ns:
                 there = depth[1]
             elif self._stereo is not None and None not in frames[:2]:
                 there = self._stereo(*(f.image for f in frames[:2] if f and f.image is not None))
@@ -160,7 +164,7 @@ class CameraSources:
 
     def _depths(self) -> Iterator[tuple[int, DepthImage]]:
         """Yield stamp and depth of each depth image, at the size of the first camera."""
-        if self._depth is None or self._depth == STEREO:
+        if self._depth is None or self._depth == STEREO or self._cuts_by_depth:
             return iter(())
         return depth_images(self._path, self._depth, self.first.camera)
 

@@ -76,7 +76,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
-            yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
+            yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image, measured[1])
 
     @property
     def remarks(self) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
     InitializationResult,
@@ -12,11 +13,14 @@ from cardbox_tracker.estimation.initialization.config import (
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.estimation.initialization.scale import (
-    SECOND_REFERENCES,
+    SCALE_REFERENCES,
+    DepthReference,
+    measured_with_depth,
     measured_with_second,
 )
 from cardbox_tracker.recordings.cameras import CameraSources
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.depth_image import median_depth
 
 # More of one posture look alike.
 _MOST_IMAGES = 20
@@ -62,13 +66,53 @@ def initialize_from_cameras(
     first, second = sources.sources[:2]
     references = {
         name: average_silhouette([frame.silhouette for frame in second.held(spans[name], name)])
-        for name in SECOND_REFERENCES
+        for name in SCALE_REFERENCES
     }
 
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
         return initialize_from_recording(first, spans, at, progress if is_last else None)
 
     return measured_with_second(measure, config, first.camera, sources.others[0], references)
+
+
+def initialize_with_depth(
+    sources: CameraSources,
+    spans: Mapping[str, TimeSpan],
+    config: InitializationConfig,
+    progress: Callable[[float], None] | None = None,
+) -> InitializationResult:
+    """Measure the person with the first camera, and the distance with its depth images.
+
+    The distance of ``config`` is only where the search begins.
+
+    Raises:
+        CardboxError: a span has no image, or no depth image.
+        InitializationError: as :func:`initialize_from_recording`, or the depth images do not show
+            that person.
+    """
+    references = {name: _depth_reference(sources, spans[name], name) for name in SCALE_REFERENCES}
+
+    def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
+        return initialize_from_recording(sources.first, spans, at, progress if is_last else None)
+
+    return measured_with_depth(measure, config, sources.first.camera, references)
+
+
+def _depth_reference(sources: CameraSources, span: TimeSpan, name: str) -> DepthReference:
+    silhouettes, depths_m = [], []
+    for taken in sources.frames(span.start_s):
+        if taken.time_s > span.end_s:
+            break
+        if taken.frames[0] is not None and taken.depth_m is not None:
+            silhouettes.append(taken.frames[0].silhouette)
+            depths_m.append(taken.depth_m)
+    if not depths_m:
+        raise CardboxError(
+            f"no depth image lies in the {name} span {span} s of the recording; give seconds from "
+            "its start, the topic of depth images that are there, or --distance"
+        )
+    kept = slice(None, None, -(-len(depths_m) // _MOST_IMAGES))
+    return DepthReference(average_silhouette(silhouettes), median_depth(depths_m[kept]))
 
 
 def describe(result: InitializationResult) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.vision.background import BackgroundConfig, brightness_of
+from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
@@ -62,6 +63,7 @@ class Frame(NamedTuple):
         silhouette: (H, W) uint8, 0 or 255.
         image: (H, W, 3) bgr, or (H, W) of a camera without colour, as ``brightness`` otherwise;
             None if it was not asked for.
+        depth_m: (H, W), metres, what the silhouette was cut out of; None of one that was not.
     """
 
     stamp_ns: int
@@ -69,6 +71,7 @@ class Frame(NamedTuple):
     brightness: NDArray[np.uint8]
     silhouette: NDArray[np.uint8]
     image: NDArray[np.uint8] | None = None
+    depth_m: DepthImage | None = None
 
     @property
     def picture(self) -> NDArray[np.uint8]:

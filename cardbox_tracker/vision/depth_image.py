@@ -6,6 +6,7 @@ Or packed, as image_transport's plugin ``compressedDepth`` sends them.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -104,6 +105,15 @@ def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
         return depth_m
     resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(resized, np.float32)
+
+
+def median_depth(depths_m: Sequence[DepthImage]) -> DepthImage:
+    """Return the median (H, W) of depth images of one size, each pixel of where it is known."""
+    stack = np.array(depths_m, np.float32)
+    stack[~(np.isfinite(stack) & (stack > 0))] = np.nan
+    # Where nothing is known in any of them.
+    stack[:, np.isnan(stack).all(axis=0)] = 0.0
+    return np.asarray(np.nanmedian(stack, axis=0), np.float32)
 
 
 def as_seen_by(depth_m: DepthImage, own: Camera, camera: Camera) -> DepthImage:

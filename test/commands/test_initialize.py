@@ -15,7 +15,7 @@ SPAN = "expected T0:T1, seconds from the start of the recording"
     [
         *((("--" + name, "9:3"), f"--{name}: {SPAN}") for name in ("front", "side", "arms")),
         (("--background", "5"), f"--background: {SPAN}"),
-        (("--depth", "/depth"), "--depth measures nobody by itself: give --within M"),
+        (("--depth", "/depth"), "--depth measures how far away the person is, which --distance"),
         (("--distance", "far"), "invalid float value: 'far'"),
         (("--distance", "-2"), "distance_m is -2 m; expected 0.3 to 20 m"),
         (("--distance", "0"), "distance_m is 0 m; expected 0.3 to 20 m"),
@@ -70,4 +70,4 @@ def test_one_camera_needs_the_distance(
 ) -> None:
     options = spans | {"--output": f"{tmp_path / 'body.yaml'}", "--cameras": "left"}
     done = cardbox("initialize", "no_bag", *(f"{n}={text}" for n, text in options.items()))
-    done.assert_refused("initialize", "give --distance M, or two --cameras")
+    done.assert_refused("initialize", "give --distance M, --depth TOPIC, or two --cameras")

@@ -12,6 +12,8 @@ import pytest
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.evaluation.truth import load_ground_truth
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.session import synthesize_session
 
 SPANS = {
@@ -58,6 +60,26 @@ def test_a_synthetic_recording_is_measured_and_tracked(
             errors.append(np.linalg.norm(np.array(found) - frame.keypoints_m, axis=1).mean())
     assert len(errors) > 30
     assert np.mean(errors) < 0.06
+
+
+def test_depth_images_measure_how_far_away_the_person_is(
+    session: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    recording, model = tmp_path / "ranged", tmp_path / "person.yaml"
+    # Chest and face of somebody whose hips are 2 m away.
+    depth = np.full((240, 320), 1900, np.uint16)
+    with BagReader(session) as old, BagWriter(recording) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for image in old.images(old.image_topic("cam0")):
+            new.write_image("/cam0/depth", image.stamp_ns, "cam0", depth, "16UC1")
+    given = ("--cameras", "cam0", "--depth=/cam0/depth", *words(SPANS), f"--output={model}")
+    done = cardbox("initialize", recording, *given)
+    assert done.code == 0, done.err
+    assert load_body_model(model).placement.distance_m == pytest.approx(2.0, abs=0.06)
+    empty = words(SPANS | {"--arms": "0:0.05"})
+    done = cardbox("initialize", recording, *given[:3], *empty, f"--output={tmp_path / 'no.yaml'}")
+    done.assert_refused("initialize", "reference 'arms'")
 
 
 @pytest.mark.parametrize(

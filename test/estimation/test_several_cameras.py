@@ -19,7 +19,12 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.estimation.initialization.scale import measured_scale, scaled
+from cardbox_tracker.estimation.initialization.scale import (
+    DepthReference,
+    depth_scale,
+    measured_scale,
+    scaled,
+)
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
@@ -227,6 +232,35 @@ def test_a_second_camera_measures_how_far_away_the_person_is(guessed: float) -> 
     nobody = {"front": np.zeros((120, 160), np.uint8)}
     with pytest.raises(InitializationError, match="does not show the person"):
         measured_scale(BODY, CAMERA, OTHER, nobody)
+
+
+def seen_with_depth(before_m: float) -> dict[str, DepthReference]:
+    """The references before CAMERA, their surface a plane ``before_m`` in front of the hips."""
+    references = {}
+    for name in ("front", "arms"):
+        state = np.append(reference_posture(name), [0.0, 0.0])
+        state[0] = BODY.placement.lateral_m
+        silhouette = drawn(FIRST, CAMERA, state)
+        hips = CAMERA.reference_to_optical(np.array([-BODY.placement.distance_m, 0.0, 0.0]))
+        depth = np.where(silhouette > 0, hips[2] - before_m, 0.0).astype(np.float32)
+        references[name] = DepthReference(silhouette, depth)
+    return references
+
+
+@pytest.mark.parametrize("guessed", [0.75, 1.3])
+def test_depth_images_measure_how_far_away_the_person_is(guessed: float) -> None:
+    found = depth_scale(scaled(BODY, guessed), CAMERA, seen_with_depth(0.1))
+    assert found * guessed == pytest.approx(1.0, abs=0.03)
+
+
+def test_depth_images_of_something_else_are_refused() -> None:
+    with pytest.raises(InitializationError, match="at no distance at which the silhouettes do"):
+        depth_scale(BODY, CAMERA, seen_with_depth(-20.0))
+    unknown = {
+        name: one._replace(depth_m=0 * one.depth_m) for name, one in seen_with_depth(0).items()
+    }
+    with pytest.raises(InitializationError, match="know 0 pixels of the person; expected 100"):
+        depth_scale(BODY, CAMERA, unknown)
 
 
 def test_of_an_image_turned_upright_only_what_is_asked_for_is_there() -> None:

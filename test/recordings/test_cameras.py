@@ -110,6 +110,13 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         # A quarter of the image's height times a third of its width is near.
         near = np.mean([np.count_nonzero(frame.silhouette) for frame in frames])
         assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
+        assert np.array_equal(frames[0].depth_m > 2.0, frames[0].silhouette == 0)
+    within = Within("/one/depth", 2.0)
+    with CameraSources(folder, ["one"], within, depth="/one/depth") as sources:
+        # Read once, for the silhouette and for whoever asks for the depth.
+        taken = list(sources.frames(0.25))
+        assert len(taken) == len(frames)
+        assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
     with pytest.raises(CardboxError, match="for one camera only"):
         CameraSources(folder, ["one", "two"], Within("/one/depth", 2.0))
     with (

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.errors import EncodingError
-from cardbox_tracker.vision.depth_image import depth_from_image, unpack_depth
+from cardbox_tracker.vision.depth_image import depth_from_image, median_depth, unpack_depth
 
 
 def packed(pixels: np.ndarray, a: float = 0.0, b: float = 0.0) -> bytes:
@@ -66,3 +66,9 @@ def test_broken_bytes_are_refused(data: bytes, is_begun: bool) -> None:
     begun = packed(np.full((4, 4), 7, np.uint16))[:24] if is_begun else b""
     with pytest.raises(EncodingError):
         unpack_depth(begun + data, "16UC1; compressedDepth png")
+
+
+def test_the_median_is_of_what_is_known() -> None:
+    depths = [np.array([[1.0, 0.0, 0.0]]), np.array([[3.0, 2.0, np.nan]]), np.array([[4.0, 0, 0]])]
+    found = median_depth([depth.astype(np.float32) for depth in depths])
+    np.testing.assert_array_equal(found, [[3.0, 2.0, 0.0]])

@@ -71,7 +71,11 @@ class Depth:
 
 
 class DepthTerm:
-    """The term for one person before one camera."""
+    """The term for one person before one camera.
+
+    Attributes:
+        body_px: what a whole body costs at most, px.
+    """
 
     def __init__(self, config: Depth, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
@@ -89,6 +93,8 @@ class DepthTerm:
         wide = 0.5 * (self.parts[rows, state.BOTTOM_WIDTH] + self.parts[rows, state.TOP_WIDTH])
         areas_px = config.weight * per_m**2 * self.parts[rows, state.HEIGHT] * wide
         self.areas_px = np.ascontiguousarray(areas_px)
+        # Of two arms.
+        self.body_px = float(areas_px[:3].sum() + 2.0 * areas_px[3:].sum())
         self.costs(np.zeros((1, 14)), np.zeros((camera.height, camera.width), np.float32))
 
     def observe(self, frame: Frame) -> TermObservation:

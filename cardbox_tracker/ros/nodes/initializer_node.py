@@ -33,7 +33,7 @@ from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
 from cardbox_tracker.ros.nodes.saved_model import SavedModel
-from cardbox_tracker.ros.nodes.second_camera import SecondCamera, measured
+from cardbox_tracker.ros.nodes.second_camera import distance_source, measured
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -62,8 +62,9 @@ class InitializerNode(CardboxNode):
         cameras = self.parameters.value.cameras
         topic = silhouettes_of(cameras or [""])[0]
         self._topic = self.resolve(topic)
-        self._second = SecondCamera(self, self.parameters.value) if len(cameras) > 1 else None
         self._references = ReferenceCapture(self._topic)
+        found = self.parameters.value, self._references, lambda: self._camera
+        self._distance = distance_source(self, *found)
         self.subscribe(CameraInfo, f"{topic}/camera_info", self._on_info, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, f"{topic}/image", self._references.add_image, qos.SILHOUETTE_INPUT)
         self.subscribe(Image, topic, self._on_silhouette, qos.SILHOUETTE_INPUT)
@@ -103,8 +104,8 @@ class InitializerNode(CardboxNode):
 
     def _capture(self, name: str) -> str:
         given = self.parameters.value
-        if self._second is not None and given.measure_distance:
-            self._second.capture(name, given.capture_frames, self._references.latest_ns)
+        if self._distance is not None and given.measure_distance:
+            self._distance.capture(name, given.capture_frames, self._references.latest_ns)
         return self._references.capture(name, given.capture_frames, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -131,10 +132,10 @@ class InitializerNode(CardboxNode):
 
     def _measure(self) -> str:
         settings, references = self.parameters.value, self._references
-        second = self._second if settings.measure_distance else None
+        distance = self._distance if settings.measure_distance else None
         references.check_running()
-        if second is not None:
-            second.check()
+        if distance is not None:
+            distance.check()
         before = dict(references.captured), dict(references.images)
         try:
             Guidance(self._show, self._capture, self._cancellation.wait).run(
@@ -145,7 +146,7 @@ class InitializerNode(CardboxNode):
                     f"no CameraInfo was received yet on {self._topic}/camera_info; take the "
                     "silhouettes from the background node, which publishes it"
                 )
-            result = measured(references, second, camera, settings.config(), self._progress)
+            result = measured(references, distance, camera, settings.config(), self._progress)
         except CardboxError:
             # Those captured by service stay, to be replaced one by one.
             references.captured, references.images = before

@@ -177,10 +177,17 @@ class InitializerParameters(NodeParameters):
 
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
+    depth: str = parameter(
+        "",
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the (first) camera is, "
+        "of its view or with a CameraInfo on TOPIC/camera_info, which measure how far away the "
+        "person is; empty: none",
+        read_only=True,
+    )
     measure_distance: bool = parameter(
         True,
-        "with two cameras or more, the second one measures how far away the person is; false: "
-        "person_distance_m is that",
+        "depth images, or with two cameras or more the second one, measure how far away the person "
+        "is; false: person_distance_m is that",
         effect=_NEXT_MEASUREMENT,
     )
 

@@ -14,11 +14,13 @@ from cardbox_tracker.estimation.initialization.config import (
 from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import Silhouette, average_silhouette
 from cardbox_tracker.estimation.initialization.scale import (
-    SECOND_REFERENCES,
+    SCALE_REFERENCES,
+    Measure,
     measured_with_second,
 )
 from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
+from cardbox_tracker.ros.nodes.depth_distance import DepthDistance
 from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import (
     KEPT,
@@ -33,8 +35,6 @@ from cardbox_tracker.vision.camera import Camera
 
 Progress = Callable[[float], None]
 """Takes the fraction of a measurement that is done."""
-
-Measure = Callable[[InitializationConfig, Progress], InitializationResult]
 
 
 class SecondCamera:
@@ -84,7 +84,7 @@ class SecondCamera:
         Raises:
             InitializationError: this camera has nothing of that time.
         """
-        if name not in SECOND_REFERENCES or now_ns is None:
+        if name not in SCALE_REFERENCES or now_ns is None:
             return
         alike = alike_of(self._recent, frames) if self._recent else []
         if not alike or abs(stamp_ns(alike[-1].header.stamp) - now_ns) > ONE_POSTURE_NS:
@@ -94,15 +94,12 @@ class SecondCamera:
             )
         self._captured[name] = average_silhouette([silhouette_of(message) for message in alike])
 
-    def measure(
-        self, measure: Measure, config: InitializationConfig, progress: Progress
-    ) -> InitializationResult:
+    def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
         """Measure a person with the first camera, and their distance with this one.
 
         Args:
-            measure: measures at the distance of the settings it is given.
+            measure: with the first camera.
             config: settings; the search begins at their distance.
-            progress: called with the fraction that is done.
 
         Raises:
             InitializationError: as ``measure``, or this camera does not show that person.
@@ -110,27 +107,45 @@ class SecondCamera:
         self.check()
         first = self._poses.first
         assert first is not None
-        missing = [name for name in SECOND_REFERENCES if name not in self._captured]
+        missing = [name for name in SCALE_REFERENCES if name not in self._captured]
         if missing:
             raise InitializationError(
                 f"the second camera has no reference {', '.join(missing)}: it was captured while "
                 "measure_distance was false; capture it again"
             )
+        return measured_with_second(measure, config, first, self._poses.others[0], self._captured)
 
-        def half(at: InitializationConfig, is_last: bool) -> InitializationResult:
-            return measure(at, lambda fraction: progress(0.5 * (fraction + is_last)))
 
-        return measured_with_second(half, config, first, self._poses.others[0], self._captured)
+def distance_source(
+    node: CardboxNode,
+    settings: InitializerParameters,
+    references: ReferenceCapture,
+    camera: Callable[[], Camera | None],
+) -> DepthDistance | SecondCamera | None:
+    """Return what measures how far away the person is, if there is anything.
+
+    Args:
+        node: the initializer.
+        settings: its parameters.
+        references: the silhouettes of the first camera.
+        camera: returns the first camera at the working resolution, once it is known.
+
+    Raises:
+        CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+    """
+    if settings.depth:
+        return DepthDistance(node, settings.depth, references, camera)
+    return SecondCamera(node, settings) if len(settings.cameras) > 1 else None
 
 
 def measured(
     references: ReferenceCapture,
-    second: SecondCamera | None,
+    distance: DepthDistance | SecondCamera | None,
     camera: Camera,
     config: InitializationConfig,
     progress: Progress,
 ) -> InitializationResult:
-    """Measure the person of ``references`` with the first ``camera``, and with ``second`` if any.
+    """Measure the person of ``references`` with the first ``camera``; ``distance``: how far away.
 
     Raises:
         InitializationError: they are unusable, or the model does not fit them.
@@ -139,6 +154,7 @@ def measured(
     def measure(at: InitializationConfig, done: Progress) -> InitializationResult:
         return initialize_body(references.captured, camera, at, done, references.images)
 
-    if second is None:
-        return measure(config, progress)
-    return second.measure(measure, config, progress)
+    def half(at: InitializationConfig, is_last: bool) -> InitializationResult:
+        return measure(at, lambda fraction: progress(0.5 * (fraction + is_last)))
+
+    return measure(config, progress) if distance is None else distance.measure(half, config)

@@ -151,7 +151,10 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
         return [make(RetargetNode, **ARM)]
     if name == "rula":
         return [make(RulaNode)]
-    return [make(InitializerNode), make(InitializerNode, cameras=["CAMERA"])]
+    return [
+        make(InitializerNode),
+        make(InitializerNode, cameras=["CAMERA"], depth="DEPTH"),
+    ]
 
 
 @pytest.mark.parametrize("name", NODES)

@@ -1,0 +1,100 @@
+"""The initializer takes the distance from depth images, and says what is missing for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.body.model import BodyModel  # noqa: E402
+from cardbox_tracker.body.posture import reference_posture  # noqa: E402
+from cardbox_tracker.errors import InitializationError  # noqa: E402
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost  # noqa: E402
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig  # noqa: E402
+from cardbox_tracker.estimation.initialization.config import (  # noqa: E402
+    InitializationConfig,
+    InitializationResult,
+)
+from cardbox_tracker.estimation.initialization.scale import scaled  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
+from cardbox_tracker.ros.nodes.depth_distance import DepthDistance  # noqa: E402
+from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+
+CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+BODY = BodyModel.of(hip_height_m=-0.4)
+SECOND = 1_000_000_000
+
+
+class Node:
+    """Stands for the initializer: keeps who hears what."""
+
+    def __init__(self) -> None:
+        self.heard: dict[str, Callable[[Any, int], None]] = {}
+
+    def resolve(self, topic: str) -> str:
+        return f"/{topic}"
+
+    def subscribe(self, kind: Any, topic: str, callback: Any, profile: Any) -> None:
+        self.heard[topic] = callback
+
+    def see(self, second: int, depth_m: float) -> None:
+        """Receive a depth image of twice the working resolution, of the same depth everywhere."""
+        pixels = np.full((240, 320), 1000 * depth_m, np.uint16)
+        header = Header(frame_id="eye", stamp=Time(sec=second))
+        self.heard["depth"](image_message(header, pixels, "16UC1"), 1)
+
+
+def silhouette_of(name: str) -> np.ndarray:
+    cost = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+    image = np.zeros((120, 160), np.uint8)
+    for patch in cost.corners(np.append(reference_posture(name), [0.0, 0.0])):
+        cv2.fillConvexPoly(image, np.round(CAMERA.project(patch)).astype(np.int32), 255)
+    return image
+
+
+@pytest.fixture
+def node() -> Node:
+    return Node()
+
+
+@pytest.fixture
+def distance(node: Node) -> DepthDistance:
+    references = ReferenceCapture("/silhouette")
+    references.captured = {name: silhouette_of(name) for name in ("front", "side", "arms")}
+    return DepthDistance(node, "depth", references, lambda: CAMERA)  # type: ignore[arg-type]
+
+
+def measure(at: InitializationConfig, _: bool) -> InitializationResult:
+    """Stands for the camera's measurement: any distance gives the same outlines."""
+    body = scaled(BODY, at.distance_m / BODY.placement.distance_m)
+    return InitializationResult(body, {"front": 0.9}, {}, {})
+
+
+def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDistance) -> None:
+    for second, name in ((1, "front"), (5, "side"), (9, "arms")):
+        node.see(second, BODY.placement.distance_m - 0.1)
+        distance.check()
+        distance.capture(name, 5, second * SECOND)
+    found = distance.measure(measure, InitializationConfig(distance_m=1.6)).body
+    assert found.placement.distance_m == pytest.approx(BODY.placement.distance_m, abs=0.06)
+
+
+def test_what_is_missing_is_said(node: Node, distance: DepthDistance) -> None:
+    with pytest.raises(InitializationError, match="no depth image was received yet on /depth"):
+        distance.check()
+    distance.capture("side", 5, SECOND)
+    node.see(1, 1.9)
+    with pytest.raises(InitializationError, match="'front': no depth image has come on /depth at"):
+        distance.capture("front", 5, 9 * SECOND)
+    distance.capture("front", 5, SECOND)
+    with pytest.raises(InitializationError, match="no depth images of the references front and"):
+        distance.measure(measure, InitializationConfig())
