@@ -12,15 +12,16 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from cardbox_tracker.estimation.filtering.correction import DATA
-from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.correction import network_for
+from cardbox_tracker.evaluation.recorded.session import load_session
 from tools import networks
 from tools.make_correction import check, samples_of
 
 
 def figures_of(folder: Path, seed: int) -> tuple[float, ...]:
     """Return the errors of a session, without and with the correction."""
-    return check(load_recurrent_network(DATA), samples_of(folder, seed))
+    cameras = len(load_session(folder).truth.cameras)
+    return check(network_for(max(1, cameras)), samples_of(folder, seed))
 
 
 def main(args: list[str] | None = None) -> None:

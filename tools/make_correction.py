@@ -9,8 +9,9 @@ learns where the keypoints are beside those found
 (``cardbox_tracker/estimation/filtering/correction.py``) and to be steady. Those after ``--check``
 are not learned from: absolute and aligned error, cm, and the error of the acceleration, m/s^2,
 are printed for them, without the correction and with it. ``--go-on`` begins with the networks in a
-file that it has written, that of the package for example, and learns more slowly. Needs PyTorch:
-``pip install '.[learn]'``.
+file that it has written, that of the package for example, and learns more slowly. The package's
+network for several cameras is that for one camera, gone on with recordings of several. Needs
+PyTorch: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -53,11 +54,11 @@ NETWORKS, EPOCHS = 2, 12
 LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
 # Of networks that have learned before.
-RATE_ON, EPOCHS_ON, KEPT_ON = 1e-3, 9, 0.7
+RATE_ON, EPOCHS_ON, KEPT_ON = 2e-3, 14, 0.7
 # What results are steadied by after the correction, which learns to be earlier for it.
 SMOOTHING_S = WholeBodyConfig().output_smoothing_s
 # Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
-NOISE = 0.1
+NOISE, NOISE_ON = 0.1, 0.25
 # Metres that a metre per second squared is worth, and periods below which it would be noise, s.
 STEADY, LEAST_PERIOD_S = 0.01, 0.05
 # Bones that are said to be shorter than this have hardly a direction, m.
@@ -186,7 +187,8 @@ def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, nu
             nn.Linear(LEFT, len(UNIT_M)),
         ]
     )
-    rate, epochs = (RATE, EPOCHS) if begin is None else (RATE_ON, EPOCHS_ON)
+    settings = (RATE, EPOCHS, NOISE) if begin is None else (RATE_ON, EPOCHS_ON, NOISE_ON)
+    rate, epochs, deviation = settings
     if begin is not None:
         _put(begin, number, modules)
     batches = len(features) // BATCH
@@ -196,7 +198,7 @@ def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, nu
     )
     for _ in range(epochs):
         for chosen in torch.randperm(len(features))[: batches * BATCH].split(BATCH):
-            noise = NOISE * torch.randn(len(chosen), 1, 2, features.shape[3])
+            noise = deviation * torch.randn(len(chosen), 1, 2, features.shape[3])
             answers = _answers(modules, features[chosen] + noise)
             off = _steadied(_moved(found[chosen], answers), period[chosen]) - true[chosen]
             loss = _loss(off, known[chosen], period[chosen])

@@ -2,7 +2,7 @@
 
 A recorded session of two cameras is tracked with the extrinsics of the second one turned about each
 of that camera's axes, both ways. Printed is by how many degrees ``Tracker.agreement`` says that it
-is turned, and whether that is told.
+is turned, aside and about its own axis, and whether that is told.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from cardbox_tracker.recordings.cameras import CameraSources
 _AXES = ("up or down", "about the vertical", "about its own axis")
 
 
-def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, float, bool]]:
-    """Yield how the camera is turned, what is found in degrees, and whether it is told.
+def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, float, float, bool]]:
+    """Yield how the camera is turned, what is found in degrees, its roll, and whether it is told.
 
     Raises:
         CardboxError: it is no session of several cameras.
@@ -53,10 +53,11 @@ def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, flo
                     if agreement.is_due:
                         agreement.check()
                 agreement.check(is_last=True)
-                found = agreement.turned_deg[0]
+                found, rolled = agreement.turned_deg[0], agreement.rolled_deg[0]
                 yield (
                     f"{sign * degrees:+g} degrees {name}",
                     np.nan if found is None else found,
+                    np.nan if rolled is None else rolled,
                     bool(agreement.remarks(["it"])),
                 )
             if not degrees:
@@ -71,8 +72,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     for degrees in options.degrees:
-        for turn, found, is_told in found_of(options.session, degrees, options.seed):
-            print(f"{turn}: {found:.2f} degrees, {'told' if is_told else 'not told'}", flush=True)
+        for turn, found, rolled, is_told in found_of(options.session, degrees, options.seed):
+            told = "told" if is_told else "not told"
+            print(f"{turn}: {found:.2f} degrees, rolled {rolled:.2f}, {told}", flush=True)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ sessions the heights differ by 0.1 to 0.4 px.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable
 from math import atan2
 
@@ -28,6 +29,10 @@ _BORDER_PX = 4.0
 _HEIGHT_PX, _HALF_PX = 0.1, 4.0
 # Frames are not independent: so many count, however many there are.
 _COUNTED = 150
+# Of the roll: steps, what is tried for the slopes, where a height weighs a quarter and what it is
+# off at least, and what there has to be.
+_ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
+_FEWEST, _LARGEST_CONDITION = 8, 1e6
 
 _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
@@ -36,7 +41,11 @@ class TopTangents:
     """The silhouettes of two cameras, as far as the planes through both can touch them."""
 
     def __init__(
-        self, first: Camera, other: Camera, pairs: Iterable[tuple[Silhouette, Silhouette]]
+        self,
+        first: Camera,
+        other: Camera,
+        pairs: Iterable[tuple[Silhouette, Silhouette]] = (),
+        most: int | None = None,
     ) -> None:
         """Take what both cameras saw at some times.
 
@@ -44,11 +53,25 @@ class TopTangents:
             first: the first camera, pitched as it stands.
             other: the further camera.
             pairs: silhouettes (H, W), 0 or 255, of both.
+            most: so many of the latest ones count; None: all.
         """
-        self._other = other
+        self._first, self._other = first, other
         self._up = first.reference_to_optical_rotation() @ np.array([0.0, 0.0, 1.0])
-        both = [(_hull(one, first), _hull(two, other)) for one, two in pairs]
-        self._hulls = [(one, two) for one, two in both if len(one[0]) and len(two[0])]
+        self._hulls: deque[tuple[_Hull, _Hull]] = deque(maxlen=most)
+        for one, two in pairs:
+            self.add(one, two)
+
+    def add(self, one: Silhouette, two: Silhouette) -> None:
+        """Take what both cameras saw at another time, unless one of them saw nobody."""
+        hulls = _hull(one, self._first), _hull(two, self._other)
+        if all(len(rays) for rays, _ in hulls):
+            self._hulls.append(hulls)
+
+    def copy(self) -> TopTangents:
+        """Return what there is now, for another thread."""
+        now = TopTangents(self._first, self._other)
+        now._hulls.extend(list(self._hulls))
+        return now
 
     def heights(self, extrinsics: Extrinsics) -> FloatArray:
         """Return how much higher the first camera's silhouettes reach, px of the other, (n,).
@@ -92,6 +115,48 @@ class TopTangents:
         weights = (_HEIGHT_PX * (1.0 + (now / _HALF_PX) ** 2)) ** -2.0
         weights *= min(1.0, _COUNTED / max(1, len(now)))
         return (slopes * weights) @ slopes.T, (slopes * weights) @ now
+
+
+def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:
+    """Return by how much the other camera is turned about its own axis, and how surely.
+
+    A turn about its axis moves heights beside the middle of the image by other amounts than heights
+    at the middle; one up or down moves all alike. Weighted least squares of both, so the person
+    has to move: heads and raised hands at several places.
+
+    Args:
+        tangents: of several times.
+        extrinsics: the pose it is said to have.
+
+    Returns:
+        The angle that the pose lacks, and its standard deviation, rad; infinite if nothing says it.
+    """
+    turn = np.zeros(2)
+    for _ in range(_ROLL_STEPS):
+        now = _turned(extrinsics, turn)
+        heights = tangents.heights(now)
+        slopes = np.array(
+            [
+                tangents.heights(_turned(now, change)) - tangents.heights(_turned(now, -change))
+                for change in _TRIED_RAD * np.eye(2)
+            ]
+        ) / (2.0 * _TRIED_RAD)
+        known = np.isfinite(heights) & np.isfinite(slopes).all(axis=0)
+        heights, slopes = heights[known], slopes[:, known]
+        weighted = slopes * (1.0 + (heights / _ROLL_HALF_PX) ** 2) ** -2.0
+        matrix = weighted @ slopes.T
+        if len(heights) < _FEWEST or np.linalg.cond(matrix) > _LARGEST_CONDITION:
+            return 0.0, float("inf")
+        turn -= np.linalg.solve(matrix, weighted @ heights)
+    noise_px = max(_LEAST_NOISE_PX, 1.48 * float(np.median(np.abs(heights))))
+    return float(turn[1]), noise_px * float(np.sqrt(np.linalg.inv(matrix)[1, 1]))
+
+
+def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
+    """Return the pose turned up or down, and about its own axis, by (2,), rad."""
+    vector = np.array([turn[0], 0.0, turn[1]])
+    matrix = np.asarray(cv2.Rodrigues(vector)[0], np.float64)
+    return Extrinsics(matrix @ extrinsics.rotation, matrix @ extrinsics.translation_m)
 
 
 def _hull(mask: Silhouette, camera: Camera) -> _Hull:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation import camera_calibration, camera_guess
 from cardbox_tracker.estimation.camera_agreement import CameraAgreement
@@ -19,7 +20,7 @@ from cardbox_tracker.estimation.camera_pose import (
     turned_by,
 )
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
-from cardbox_tracker.estimation.silhouette_tangents import TopTangents
+from cardbox_tracker.estimation.silhouette_tangents import TopTangents, roll_of
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
@@ -114,6 +115,32 @@ def test_with_tangents_a_roll_is_found() -> None:
     assert abs(np.degrees(turned_by(TRUE, found))[2]) < 2.0
 
 
+@pytest.mark.parametrize("degrees", [0.0, 3.0, -2.0])
+def test_a_roll_is_told_from_a_turn_up_by_heights_at_several_places(degrees: float) -> None:
+    roll_rad = np.radians(degrees)
+    change = np.array([np.radians(1.0), 0.0, -roll_rad, 0.0, 0.0, 0.0])
+    frames = sightings([*waving(10), *(s + 0.3 * np.eye(14)[0] for s in waving(4))])
+    found, stddev = roll_of(tangents_of(frames), moved_by(TRUE, change))
+    assert found == pytest.approx(roll_rad, abs=0.012)
+    assert 0.0 < stddev < 0.02
+
+
+def test_of_somebody_who_stands_still_no_roll_is_known() -> None:
+    frames = sightings([np.append(reference_posture("front"), [0.0, 0.0])] * 3)
+    assert roll_of(tangents_of(frames), TRUE)[1] == np.inf
+    assert roll_of(TopTangents(CAMERA, OTHER), TRUE)[1] == np.inf
+
+
+def test_only_the_latest_silhouettes_count() -> None:
+    frames = sightings(waving(5))
+    latest = TopTangents(CAMERA, OTHER, [(one.first, one.other) for one in frames], most=2)
+    now = latest.copy()
+    latest.add(frames[0].first, frames[0].other)
+    np.testing.assert_array_equal(now.heights(TRUE), tangents_of(frames[3:]).heights(TRUE))
+    last = tangents_of([frames[4], frames[0]]).heights(TRUE)
+    np.testing.assert_array_equal(latest.heights(TRUE), last)
+
+
 def agreement(extrinsics: Extrinsics, count: int) -> CameraAgreement:
     view = View.of(BODY, CAMERA, OtherCamera(OTHER, extrinsics))
     asked = CameraAgreement(BODY, CAMERA, [view])
@@ -138,6 +165,13 @@ def test_wrong_extrinsics_are_told_and_right_ones_are_not() -> None:
     assert right.turned_deg[0] is not None
     assert wrong.turned_deg[0] is not None
     assert wrong.turned_deg[0] > right.turned_deg[0] + 1.0
+
+
+def test_a_camera_that_is_turned_about_its_own_axis_is_told() -> None:
+    rolled = agreement(moved_by(TRUE, np.array([0.0, 0.0, np.radians(3.0), 0.0, 0.0, 0.0])), 15)
+    rolled.check()
+    assert rolled.rolled_deg[0] == pytest.approx(-3.0, abs=0.8)
+    assert any("about its own axis" in text for text in rolled.remarks(["cam1"]))
 
 
 def test_nothing_is_said_of_a_camera_before_a_window_of_frames() -> None:

@@ -19,6 +19,8 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
+from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
 from cardbox_tracker.estimation.initialization.scale import (
     DepthReference,
     depth_scale,
@@ -143,6 +145,26 @@ def test_the_rating_is_the_mean_of_the_cameras_with_priors_once() -> None:
 def track(tracker: Tracker, state: np.ndarray, seeing: tuple[int, ...] = (0, 1)) -> Estimate:
     seen = [s if i in seeing else None for i, s in enumerate(both(state))]
     return tracker.track_views(seen, [None, None])
+
+
+def test_of_four_arms_that_are_proposed_the_most_promising_one_is_rated(
+    rng: np.random.Generator,
+) -> None:
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
+    track(tracker, state_of(0.3))
+    assert isinstance(tracker.filter, MultiViewFilter)
+    views = tracker.filter._views
+    low, high = ARM_LIMITS.T
+    arms = low + (high - low) * rng.random((40, 4))
+    kept = tracker.filter._promising(arms, 0)
+    each = views.arms_by_points(arms, 0).reshape(10, 4)
+    np.testing.assert_array_equal(views.arms_by_points(kept, 0), each.min(axis=1))
+    # What either camera sees counts, and of a camera that does not see nothing does.
+    alone = [cost.arms_by_points(arms, 0) for cost in views.costs]
+    np.testing.assert_allclose(each.ravel(), (alone[0] + alone[1]) / 2)
+    track(tracker, state_of(0.4), (1,))
+    second = views.costs[1].arms_by_points(arms, 0)
+    np.testing.assert_allclose(views.arms_by_points(arms, 0), second, atol=1e-12)
 
 
 def error_cm(estimate: Estimate, state: np.ndarray) -> float:

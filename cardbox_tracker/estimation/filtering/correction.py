@@ -3,7 +3,8 @@
 An outline is nearly the same for many depths, and the filter's result is one of them. How wrong it
 is on average depends on the posture that was found, on what else would fit, on where the cameras
 stand, and on what was found before. A small recurrent network has learned that dependence from
-rendered recordings with ground truth (``tools/make_correction.py``; the data file names them). Its
+rendered recordings with ground truth (``tools/make_correction.py``; the data file names them). What
+several cameras leave open is something else, so another one has learned from such recordings. Its
 memory also tells motion from noise, so that the result is steadier, without a filter that lags. It
 sees one arm as if it were the left one, so both arms share it, and gives for each where the middle
 of the shoulders is beside the place found, and where elbow and hand are beside that, in metres
@@ -26,13 +27,16 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
-from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.networks import (
+    RecurrentNetwork,
+    load_recurrent_network,
+)
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
 from cardbox_tracker.vision.camera import Camera
 
-DATA = "correction.npz"
-"""Name of the network's data file."""
+DATA, DATA_OF_SEVERAL = "correction.npz", "correction_views.npz"
+"""Names of the data files of the networks: for one camera, with or without depth, and several."""
 # Place and arms move; the torso keeps its angles.
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
 _STEPS = 1
@@ -84,6 +88,11 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
                 result[end, axis] = result[begin, axis] + scale * ahead[axis]
 
 
+def network_for(cameras: int) -> RecurrentNetwork:
+    """Return the network that corrects what so many cameras have found."""
+    return load_recurrent_network(DATA if cameras == 1 else DATA_OF_SEVERAL)
+
+
 class Correction:
     """Corrects the results of the whole-body filter for one body.
 
@@ -92,14 +101,20 @@ class Correction:
         found_m: keypoints before the last correction, (6, 3), metres in the optical frame.
     """
 
-    def __init__(self, cost: WholeBodyCost, camera: Camera, smoothing_s: float = 0.0) -> None:
+    def __init__(
+        self, cost: WholeBodyCost, camera: Camera, smoothing_s: float = 0.0, cameras: int = 1
+    ) -> None:
         """Prepare for the body of ``cost`` before ``camera``, the first one.
 
-        ``smoothing_s`` is the time constant by which joints and the torso's angles are steadied.
+        Args:
+            cost: of the first camera.
+            camera: the first one.
+            smoothing_s: time constant by which joints and the torso's angles are steadied.
+            cameras: how many there are.
         """
         self._cost, self._camera = cost, camera
         self._keypoints, self._turns = LowPass(smoothing_s), LowPass(smoothing_s)
-        self._network = load_recurrent_network(DATA)
+        self._network = network_for(cameras)
         # Who comes back is the same person, so nothing makes it forget.
         self._memory = self._network.new_memory(2)
         self.features, self.found_m = np.empty((2, 0)), np.empty((6, 3))

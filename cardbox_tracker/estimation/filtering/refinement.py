@@ -50,7 +50,7 @@ class Refinement:
         self._yaws_rad = [0.0, *(view.yaw_rad for _, view in others)]
         self.see(range(len(self._yaws_rad)))
         self.correction = (
-            Correction(cost, camera, config.output_smoothing_s)
+            Correction(cost, camera, config.output_smoothing_s, 1 + len(others))
             if config.learned_correction
             else None
         )

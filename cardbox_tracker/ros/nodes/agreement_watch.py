@@ -37,9 +37,11 @@ class AgreementWatch:
         """Return by how much each further camera seems to be turned, for the diagnostics."""
         if self._agreement is None:
             return {}
+        said = {"turned": self._agreement.turned_deg, "rolled": self._agreement.rolled_deg}
         return {
-            f"{name} turned (deg)": "not yet known" if degrees is None else f"{degrees:.1f}"
-            for name, degrees in zip(self._names, self._agreement.turned_deg, strict=True)
+            f"{name} {how} (deg)": "not yet known" if degrees is None else f"{degrees:.1f}"
+            for how, found in said.items()
+            for name, degrees in zip(self._names, found, strict=True)
         }
 
     def warnings(self) -> dict[str, str]:

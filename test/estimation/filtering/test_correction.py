@@ -15,7 +15,13 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
-from cardbox_tracker.estimation.filtering.correction import DATA, Correction, moved
+from cardbox_tracker.estimation.filtering.correction import (
+    DATA,
+    DATA_OF_SEVERAL,
+    Correction,
+    moved,
+    network_for,
+)
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints
@@ -125,6 +131,18 @@ def test_results_come_near_what_the_network_says() -> None:
     wanted = moved(points, answers_m)
     off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
     assert off < 0.5 * before
+
+
+def test_several_cameras_have_a_network_of_their_own() -> None:
+    assert network_for(1) is load_recurrent_network(DATA)
+    assert network_for(2) is network_for(4) is load_recurrent_network(DATA_OF_SEVERAL)
+    one, two = (
+        Correction(COST, CAMERA, cameras=cameras)(
+            *(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS)
+        )
+        for cameras in (1, 2)
+    )
+    assert not np.allclose(one, two)
 
 
 def test_what_was_before_counts() -> None:

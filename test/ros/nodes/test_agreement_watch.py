@@ -17,6 +17,7 @@ class Agreement:
     def __init__(self) -> None:
         self.is_due = True
         self.turned_deg: list[float | None] = [None]
+        self.rolled_deg: list[float | None] = [None]
         self.checks = 0
         self.go_on = threading.Event()
 
@@ -34,14 +35,15 @@ def test_a_check_runs_beside_the_tracking_and_is_said() -> None:
     assert watch.values() == watch.warnings() == {}
     for _ in range(3):
         watch.see(agreement)  # type: ignore[arg-type]
-    assert watch.values() == {"right turned (deg)": "not yet known"}
+    unknown = {"right turned (deg)": "not yet known", "right rolled (deg)": "not yet known"}
+    assert watch.values() == unknown
     assert watch.warnings() == {}
     # Python waits for those that are no daemons; others in compiled code abort it at its end.
     assert [one.daemon for one in threading.enumerate() if one.name == "agreement"] == [False]
     agreement.go_on.set()
     watch.wait()
     assert agreement.checks == 1
-    assert watch.values() == {"right turned (deg)": "2.0"}
+    assert watch.values() == unknown | {"right turned (deg)": "2.0"}
     assert list(watch.warnings().values()) == ["right: 2.0"]
 
 
