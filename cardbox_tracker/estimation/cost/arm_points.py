@@ -24,10 +24,8 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     HEIGHT,
     TOP_WIDTH,
     UPPER_ARM,
-    _new_arm,
     _pose,
     _pose_arm,
-    _turn_arm,
 )
 
 # Points of the upper arm, the elbow among them, and of the forearm, to the end of the fingers.
@@ -36,10 +34,25 @@ _POINTS = (3, 4)
 _NEAREST_M = 0.05
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def joints_of_arms(
+    arms: Floats, side: float, parts: Floats, girdle: Floats, joints: Floats
+) -> None:
+    """Write shoulder, elbow and hand of arms (N, 4) to ``joints`` (N, 3, 3), in the torso's frame.
+
+    ``side`` is 1 for the left arm, -1 for the right; angles in rad, joints in metres.
+    """
+    directions = np.empty(6)
+    for i in range(arms.shape[0]):
+        _pose_arm(arms[i], side, parts, girdle, joints[i], directions)
+
+
+@_compile
 def add_costs_of_arms(
-    arms: Floats,
-    side: float,
+    joints: Floats,
     torso: Floats,
     parts: Floats,
     drawn: Floats,
@@ -50,11 +63,10 @@ def add_costs_of_arms(
     scale: float,
     costs: Floats,
 ) -> None:
-    """Add the approximate costs of arms (N, 4) beside the state ``torso`` (14,) to ``costs`` (N,).
+    """Add the approximate costs of arms beside the state ``torso`` (14,) to ``costs`` (N,).
 
     Args:
-        arms: angles, rad.
-        side: 1 for the left arm, -1 for the right.
+        joints: of the arms in the torso's frame, (N, 3, 3), metres.
         torso: state whose trunk the arms are at.
         parts: the measured parts, (6, 6), metres.
         drawn: those whose outlines are drawn, (6, 6), metres.
@@ -66,28 +78,34 @@ def add_costs_of_arms(
         costs: shares of the silhouette.
     """
     rows, width = uncovered.shape[0], uncovered.shape[1] - 1
-    rotation, hip, arm, lens = np.empty((3, 3)), np.empty(3), _new_arm(), View(*view)
+    rotation, hip, lens = np.empty((3, 3)), np.empty(3), View(*view)
+    seen_m, axis = np.empty((3, 3)), np.empty(3)
     _pose(torso, Place(*place), lens, rotation, hip)
-    for i in range(arms.shape[0]):
-        _pose_arm(arms[i], side, parts, girdle, arm.points, arm.directions)
-        _turn_arm(arm, rotation, hip)
+    for i in range(joints.shape[0]):
+        for joint in range(3):
+            x, y, z = joints[i, joint, 0], joints[i, joint, 1], joints[i, joint, 2]
+            for j in range(3):
+                turned = rotation[j, 0] * x + rotation[j, 1] * y + rotation[j, 2] * z
+                seen_m[joint, j] = hip[j] + turned
         total = 0.0
         for limb in range(2):
-            joint, axis = arm.joints[limb], arm.axes[limb]
-            long_m, wide_m = drawn[UPPER_ARM + limb, HEIGHT], drawn[UPPER_ARM + limb, TOP_WIDTH]
-            far_m = max(joint[2] + 0.5 * long_m * axis[2], _NEAREST_M)
+            start, part = seen_m[limb], UPPER_ARM + limb
+            long_m, wide_m = drawn[part, HEIGHT], drawn[part, TOP_WIDTH]
+            for j in range(3):
+                axis[j] = (seen_m[limb + 1, j] - start[j]) / parts[part, HEIGHT]
+            far_m = max(start[2] + 0.5 * long_m * axis[2], _NEAREST_M)
             # How long the limb looks: what of its axis lies across the line of sight.
-            across = axis[0] - axis[2] * joint[0] / far_m
-            down = axis[1] - axis[2] * joint[1] / far_m
-            seen_m = sqrt(across * across + down * down) * long_m + 0.5 * wide_m
-            part_px = seen_m * wide_m * lens.fx * lens.fy / (far_m * far_m * _POINTS[limb])
+            across = axis[0] - axis[2] * start[0] / far_m
+            down = axis[1] - axis[2] * start[1] / far_m
+            looks_m = sqrt(across * across + down * down) * long_m + 0.5 * wide_m
+            part_px = looks_m * wide_m * lens.fx * lens.fy / (far_m * far_m * _POINTS[limb])
             for k in range(_POINTS[limb]):
                 along_m = long_m * (k + 1.0) / _POINTS[limb]
-                ahead_m = joint[2] + along_m * axis[2]
+                ahead_m = start[2] + along_m * axis[2]
                 if ahead_m < _NEAREST_M:
                     continue
-                column = lens.fx * (joint[0] + along_m * axis[0]) / ahead_m + lens.cx + 0.5
-                row = lens.fy * (joint[1] + along_m * axis[1]) / ahead_m + lens.cy + 0.5
+                column = lens.fx * (start[0] + along_m * axis[0]) / ahead_m + lens.cx + 0.5
+                row = lens.fy * (start[1] + along_m * axis[1]) / ahead_m + lens.cy + 0.5
                 if 0.0 <= column < width and 0.0 <= row < rows:
                     u, v = int(column), int(row)
                     total += part_px * (uncovered[v, u + 1] - uncovered[v, u])

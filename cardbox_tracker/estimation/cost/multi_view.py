@@ -97,7 +97,8 @@ class MultiViewCost:
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
         """Return about what arms (N, 4) cost, 0 left or 1 right, without priors, (N,)."""
-        return self._sum(lambda cost, _: cost.arms_by_points(arms, arm))
+        joints = self.costs[0].joints(arms, arm)
+        return self._sum(lambda cost, _: cost.arms_by_points(joints, arm))
 
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels of all cameras, (N,)."""

@@ -16,7 +16,7 @@ from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
-from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms
+from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms, joints_of_arms
 from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
 from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
@@ -164,14 +164,20 @@ class WholeBodyCost:
             self._beside_arm = arm
         return self._beside
 
-    def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return about what arms (N, 4) cost, 0 left or 1 right, without priors, (N,).
+    def joints(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return shoulder, elbow and hand (N, 3, 3) of arms (N, 4), metres in the torso's frame."""
+        joints = np.empty((len(arms), 3, 3))
+        joints_of_arms(arms, 1.0 - 2.0 * arm, self.parts, self.girdle, joints)
+        return joints
+
+    def arms_by_points(self, joints: FloatArray, arm: int) -> FloatArray:
+        """Return about what arms with ``joints`` cost, 0 left or 1 right, without priors, (N,).
 
         See :mod:`cardbox_tracker.estimation.cost.arm_points`.
         """
-        costs = np.zeros(len(arms))
-        of_arm = 1.0 - 2.0 * arm, self._torso, *self.figure
-        add_costs_of_arms(arms, *of_arm, self.uncovered(arm), self._scale, costs)
+        costs = np.zeros(len(joints))
+        seen = self.uncovered(arm), self._scale
+        add_costs_of_arms(joints, self._torso, *self.figure, *seen, costs)
         return costs
 
     def arms(self, arms: FloatArray, arm: int) -> FloatArray:

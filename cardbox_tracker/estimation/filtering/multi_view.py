@@ -33,6 +33,9 @@ from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 # Of the rounds of all joints: the fraction of states that moves by differences, and how the noise
 # shrinks from one round to the next.
 _DIFFERING, _ROUND_DECAY = 0.8, 0.8
+# Share of the arms near the best ones that does as well as all of them where the most promising are
+# chosen.
+_NEAR_ARMS = 0.6
 # Before all joints move together, so many states, of which so many are alike and the others so far
 # apart, m, are moved by so many Gauss-Newton steps.
 _FITTED, _FIT_STEPS = (3, 1, 0.1), 2
@@ -228,6 +231,7 @@ def _with_more_evidence(config: TrackerConfig) -> TrackerConfig:
     whole = config.whole_body
     whole = replace(
         whole,
+        arms_again=max(int(_NEAR_ARMS * whole.arms_again), 1),
         smoothing=whole.smoothing / 3,
         round_decay=max(whole.round_decay, _ROUND_DECAY),
         differing=max(whole.differing, _DIFFERING),

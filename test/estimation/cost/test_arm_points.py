@@ -30,6 +30,10 @@ def cost_of(silhouette: FloatArray) -> WholeBodyCost:
     return cost
 
 
+def about_of(cost: WholeBodyCost, arms: FloatArray) -> FloatArray:
+    return cost.arms_by_points(cost.joints(arms, 0), 0)
+
+
 def everywhere(value: int) -> FloatArray:
     return np.full((CAMERA.height, CAMERA.width), value, np.uint8)
 
@@ -44,7 +48,7 @@ def test_an_arm_stretched_aside_by_hand() -> None:
         ("forearm_width", size("forearm_length") + WholeBodyCostConfig().fingers_m),
     ):
         expected_px += size(wide) * (long_m + 0.5 * size(wide)) * px_per_m**2
-    found_px = cost.arms_by_points(ASIDE[None], 0)[0] * cost.silhouette_px
+    found_px = about_of(cost, ASIDE[None])[0] * cost.silhouette_px
     assert found_px == pytest.approx(-expected_px, rel=0.02)
 
 
@@ -54,15 +58,15 @@ def test_of_background_it_costs_what_of_foreground_it_gains() -> None:
     # The left arm is on the right of the image.
     silhouette[:, 95:] = 0
     mixed = cost_of(silhouette)
-    gain = covered.arms_by_points(ASIDE[None], 0)[0] * covered.silhouette_px
-    assert mixed.arms_by_points(ASIDE[None], 0)[0] * mixed.silhouette_px == pytest.approx(-gain)
+    gain = about_of(covered, ASIDE[None])[0] * covered.silhouette_px
+    assert about_of(mixed, ASIDE[None])[0] * mixed.silhouette_px == pytest.approx(-gain)
 
 
 def test_before_the_trunk_and_beyond_the_image_it_costs_nothing() -> None:
     """The upper arm hangs; the forearm points aside, or back before the trunk."""
     cost = cost_of(everywhere(255))
     directions = np.array([(0.0, 0.0, -1.0, 0.0, y, 0.0) for y in (1.0, -1.0)])
-    outwards, inwards = cost.arms_by_points(angles_of_arms(directions, 1.0, ARM_LIMITS), 0)
+    outwards, inwards = about_of(cost, angles_of_arms(directions, 1.0, ARM_LIMITS))
     size, px_per_m = BODY.size, CAMERA.fx / BODY.placement.distance_m
     long_m = size("forearm_length") + WholeBodyCostConfig().fingers_m + 0.5 * size("forearm_width")
     forearm_px = size("forearm_width") * long_m * px_per_m**2
@@ -70,7 +74,7 @@ def test_before_the_trunk_and_beyond_the_image_it_costs_nothing() -> None:
     away = FRONT.copy()
     away[0] = 5.0
     cost.fix_torso(away)
-    assert cost.arms_by_points(ASIDE[None], 0)[0] == 0.0
+    assert about_of(cost, ASIDE[None])[0] == 0.0
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -88,5 +92,5 @@ def test_they_order_arms_much_as_drawn_ones_do(seed: int) -> None:
         silhouette[max(v.min(), 0) : max(v.max(), 0), max(u.min(), 0) : max(u.max(), 0)] = 255
     cost.see(silhouette, state)
     cost.fix_torso(state)
-    about, drawn = cost.arms_by_points(arms, 0), cost.arms(arms, 0)
+    about, drawn = about_of(cost, arms), cost.arms(arms, 0)
     assert np.corrcoef(np.argsort(np.argsort(about)), np.argsort(np.argsort(drawn)))[0, 1] > 0.7
