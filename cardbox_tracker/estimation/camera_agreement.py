@@ -27,7 +27,7 @@ from cardbox_tracker.estimation.silhouette_tangents import TopTangents, roll_of
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
-DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.35
+DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.5
 """Cameras that are turned by more, aside or about their own axis, are told of."""
 
 # Every so many frames one is kept, so many make a window: 12 s at 15 images a second. The first one
