@@ -93,9 +93,12 @@ def test_with_further_cameras_those_that_see_count() -> None:
     refine, alone = (Refinement(COST, CAMERA, CONFIG, o) for o in ([(COST, view)], ()))
     refine.see([0])
     frame = seen()
-    assert np.array_equal(refined(refine, frame)[1], refined(alone, frame)[1])
+    both = refined(refine, frame), refined(alone, frame)
+    assert np.array_equal(both[0][0], both[1][0])
     assert refine.correction is not None and alone.correction is not None
+    # The network of several cameras sees what that of one would.
     assert np.array_equal(refine.correction.features, alone.correction.features)
+    assert not np.array_equal(both[0][1], both[1][1])
     fit = fitted()
     refine.see([0, 1])
     refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
