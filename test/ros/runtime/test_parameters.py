@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, get_type_hints
 
 import pytest
@@ -40,6 +40,8 @@ ROOT = Path(__file__).resolve().parents[3]
 class Sample(NodeParameters):
     """Parameters of a test."""
 
+    retired = MappingProxyType({"middle": "give low and high"})
+
     low: float = parameter(1.0, "lower end", unit="m", limits=(0.0, 10.0))
     high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
     count: int = parameter(3, "a count", limits=(1, 5))
@@ -73,6 +75,11 @@ def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     assert len(said) == 2
     assert "'lo' is no parameter of node 'tested'" in said[0] and "mean 'low'?" in said[0]
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
+
+
+def test_a_name_of_a_former_version_is_refused_with_what_to_do(make_node: Callable) -> None:
+    with pytest.raises(CardboxError, match=r"middle.*removed.*give low and high"):
+        LiveParameters(make_node("-p", "middle:=1.5"), Sample)
 
 
 def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:
