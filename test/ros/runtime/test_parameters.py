@@ -15,13 +15,11 @@ from rclpy.parameter import Parameter
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
-from cardbox_tracker.ros.nodes.node_parameters import (
-    NODES,
-    BackgroundParameters,
-    InitializerParameters,
-    TrackerParameters,
-)
+from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
     NEXT_IMAGE,
     RESTARTS,
