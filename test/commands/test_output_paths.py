@@ -80,7 +80,7 @@ def run(options):
     with BagWriter(options.output / "bag") as bag, atomic_path(options.output / "out.csv"):
         bag.write_string("chatter", 1, "hello")
         print("begun", flush=True)
-        time.sleep(600)
+        signal.pause()
 
 # Below nohup it is ignored, which the command respects.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
