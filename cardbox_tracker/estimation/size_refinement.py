@@ -84,7 +84,7 @@ class SizeRefinement:
             return None
         now = cost.outline_rating(state)
         for other in self._costs:
-            other.share_sight(cost)
+            other.share_silhouette(cost)
         ratings = np.array([other.outline_rating(state) for other in self._costs])
         self._sums += ratings.reshape(-1, 2) - now
         self._rated += 1
