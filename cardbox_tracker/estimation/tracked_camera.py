@@ -99,9 +99,7 @@ class TrackedCamera:
             silhouette = self._region.select(silhouette, posture, is_sure, image)
         upper = np.ascontiguousarray(silhouette[: self._rows])
         foreground_px = cv2.countNonZero(upper)
-        return Frame(
-            silhouette, self._rows, foreground_px, image, posture, depth_m, interval_s
-        )
+        return Frame(silhouette, self._rows, foreground_px, image, posture, depth_m, interval_s)
 
     def _check(self, observation: Observation) -> None:
         for name, pixels, most in (

@@ -33,9 +33,7 @@ class ArmSearch:
         """Begin anew."""
         self.spreads_m: list[float] = [0.0, 0.0, 0.0, 0.0]
 
-    def __call__(
-        self, pool: FloatArray, arm: int, draws: Draws
-    ) -> tuple[FloatArray, FloatArray]:
+    def __call__(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
 
         Args:

@@ -88,12 +88,8 @@ class WholeBodyFilter:
         self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
         first, *others = cost.costs
         self._arm = ArmSearch(cost, self._plan)
-        self._locator = Locator(
-            cost, self._body.placement.distance_m, views, self._plan.crosses
-        )
-        self.refine = Refinement(
-            first, camera, self._config, list(zip(others, views, strict=True))
-        )
+        self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
+        self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(cost.parts[TORSO, 0] + cost.parts[TORSO, 1])
 

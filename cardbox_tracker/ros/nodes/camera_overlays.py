@@ -1,4 +1,4 @@
-"""The model over what each of several cameras sees: one overlay below each namespace."""
+"""The model over the image of each camera that has a namespace: an overlay below each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import place_of
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_views import Views
+from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 
@@ -30,15 +30,13 @@ class CameraOverlays:
             if camera
         ]
 
-    def publish(self, views: Views, estimate: Estimate, tracker: Tracker) -> None:
+    def publish(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> None:
         """Draw the estimate over the images, or else the silhouettes, that it was made from."""
         for number, publisher in enumerate(self._publishers):
-            header, silhouette = views.headers[number], views.silhouettes[number]
+            header, silhouette = seen.headers[number], seen.observations[number].silhouette
             if header is None or silhouette is None or not publisher.get_subscription_count():
                 continue
-            image = views.images[number]
-            picture = silhouette if image is None else image
-            drawn = _draw(number, picture, estimate, tracker)
+            drawn = _draw(number, seen.picture(number), estimate, tracker)
             publisher.publish(conversions.image_message(header, drawn, "bgr8"))
 
 

@@ -50,7 +50,7 @@ def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
 
 def refined(refine: Refinement, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """The state that fits the outlines, and the result."""
-    fit = refine.outline(frame, STATE)
+    fit = refine.outline([frame], STATE)
     return fit, refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
 
 

@@ -21,10 +21,10 @@ from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
 from cardbox_tracker.estimation.estimate import Estimate  # noqa: E402
 from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
-    camera_info_message,
     image_message,
     stamp_ns,
 )
+from cardbox_tracker.ros.nodes.camera_inputs import Received  # noqa: E402
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
@@ -41,19 +41,18 @@ class Fed:
         self.node = node
         self.trackers: list[Tracker] = []
 
-        def track(
-            tracker: Tracker, silhouette: Any, image: Any = None, stamp_ns: Any = None
-        ) -> Estimate:
+        def track(tracker: Tracker, observations: Any) -> Estimate:
             self.trackers.append(tracker)
             return Estimate("no_person")
 
         monkeypatch.setattr(Tracker, "track", track)
-        node._on_info(camera_info_message(Header(), CAMERA), 0)
+        node._on_cameras(CAMERA, ())
 
     def show(self, *stamps_ns: int) -> None:
         for stamp in stamps_ns:
             header = Header(stamp=Time(sec=stamp // S, nanosec=stamp % S))
-            self.node._pairing.add_silhouette(image_message(header, EMPTY, "mono8"), 0)
+            received = Received(image_message(header, EMPTY, "mono8"), None, 0)
+            self.node._on_input(received, [received])
 
     @property
     def starts(self) -> int:
