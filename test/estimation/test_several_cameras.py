@@ -233,7 +233,7 @@ def test_what_does_not_fit_several_cameras_is_refused() -> None:
     small = Observation(np.zeros((10, 10), np.uint8))
     with pytest.raises(ValueError, match=r"\(10, 10\).*\(120, 160\).*further camera"):
         tracker.track([None, small])
-    with pytest.raises(ValueError, match="3 observations.*2 cameras"):
+    with pytest.raises(ValueError, match=r"3 observations.*2 cameras"):
         tracker.track([None] * 3)
     with pytest.raises(ValueError, match="stamp_ns"):
         tracker.track([None, None], stamp_ns=1)

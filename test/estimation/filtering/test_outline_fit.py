@@ -67,7 +67,7 @@ def test_it_comes_nearer_to_the_truth(wrong: dict[int, float], camera: Camera) -
 @given(st.lists(st.floats(-1.0, 1.0), min_size=14, max_size=14))
 def test_whatever_the_state_it_moves_by_little_and_stays_finite(off: list[float]) -> None:
     begin = np.clip(TRUTH + off, *STATE_LIMITS.T)
-    found = OutlineFit(COST, CAMERA, 2)(frame(drawn()), begin)
+    found = OutlineFit(COST, CAMERA, 2)([frame(drawn())], begin)
     assert np.isfinite(found).all()
     assert np.abs(found - begin).max() <= 2 * 0.25 + 1e-9
 

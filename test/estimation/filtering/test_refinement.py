@@ -45,7 +45,7 @@ def seen(depth_m: np.ndarray | None = None) -> Frame:
 def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
     frame = seen(depth_m)
     COST.see(frame.silhouette, STATE)
-    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
+    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)([frame], STATE)
 
 
 def refined(refine: Refinement, frame: Frame) -> tuple[np.ndarray, np.ndarray]:

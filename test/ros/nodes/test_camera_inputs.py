@@ -12,7 +12,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time  # noqa: E402
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image  # noqa: E402
+from sensor_msgs.msg import CameraInfo, CompressedImage  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.errors import CameraError  # noqa: E402
@@ -283,6 +283,7 @@ def test_a_camera_that_pauses_has_no_other_clock(
 
 def test_one_camera_is_a_list_of_one() -> None:
     alone = Watching(depth="", cameras=())
+    alone.source.wait_for_images(False)
     pixels = np.zeros((48, 64), np.uint8)
     alone.node.hear("/silhouette/image", image_message(header(S), pixels, "mono8"))
     # Every message is handed on: the node counts those that come twice or too late.
