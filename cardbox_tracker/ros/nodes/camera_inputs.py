@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -206,28 +206,29 @@ class CameraInputs:
         """
         first = self._poses.first
         assert first is not None
-        lead, seen = self._lead_of(received), received[: self._count]
-        stamp_ns = _stamp_ns(lead.message)
-        depth_m = self._depth(received[self._count :], first)
+        lead, messages = self._lead_of(received), received[: self._count]
         cameras = [first, *(other.camera for other in self._poses.others)]
-        observations = []
-        for number, (stream, one, camera) in enumerate(
-            zip(self._streams[: self._count], seen, cameras, strict=True)
-        ):
-            silhouette, image = _picture(stream, one, camera)
-            own = (depth_m, stamp_ns) if number == 0 else ()
-            observations.append(Observation(silhouette, image, *own))
+        streams = self._streams[: self._count]
+        observations = [
+            Observation(*_picture(*each)) for each in zip(streams, messages, cameras, strict=True)
+        ]
         if all(one.silhouette is None for one in observations):
-            problems = [stream.problem for stream in self._streams if stream.problem]
+            problems = [stream.problem for stream in streams if stream.problem]
             raise CameraError("; ".join(problems))
+        depth_m = self._depth(received[self._count :], first)
+        stamp_ns = _stamp_ns(lead.message)
+        observations[0] = replace(observations[0], depth_m=depth_m, stamp_ns=stamp_ns)
         header = lead.message.header
         if received[0] is None:
             header = Header(stamp=header.stamp, frame_id=self._poses.frame_id)
         return ObservationSet(
             header,
-            [None if one is None else one.message.header for one in seen],
+            [
+                one.message.header if one is not None and seen.silhouette is not None else None
+                for one, seen in zip(messages, observations, strict=True)
+            ],
             observations,
-            max(one.sent_ns for one in seen if one is not None),
+            max(one.sent_ns for one in messages if one is not None),
             np.zeros((first.height, first.width), np.uint8),
         )
 

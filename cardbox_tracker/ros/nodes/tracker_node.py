@@ -12,12 +12,12 @@ from std_msgs.msg import String
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.agreement_watch import AgreementWatch
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
