@@ -23,6 +23,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("ergonomics", "retargeting"),
     ("drawing",),
     ("outputs",),
+    ("tracking_report",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import measured_body
-from cardbox_tracker.recordings.cameras import CameraSources, FrameSet
+from cardbox_tracker.recordings.recording import FrameSet, open_recording
 
 KINDS = ("covered", "silent")
 _SPANS = {"during": (None, 0.0), "1 s after": (0.0, 1.0), "1 to 4 s after": (1.0, 4.0)}
@@ -50,8 +51,8 @@ def rows_of(folder: Path, lasts_s: float, seeds: int) -> Iterator[Row]:
     """
     session = load_session(folder)
     truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
-    with CameraSources(
-        session.bag, session.truth.cameras, session.spans["empty"], session.extrinsics
+    with open_recording(
+        session.bag, session.spans["empty"], session.truth.cameras, session.extrinsics
     ) as source:
         bodies = [measured_body(session, source.first, seed) for seed in range(seeds)]
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
@@ -85,7 +86,7 @@ def rows_of(folder: Path, lasts_s: float, seeds: int) -> Iterator[Row]:
             return {span: float(np.mean(values)) for span, values in off.items()}, lost
 
         before = [errors(None, "", seed)[0] for seed in range(seeds)]
-        for number, name in enumerate(source.cameras):
+        for number, name in enumerate(source.names):
             for kind in KINDS:
                 found = [errors(number, kind, seed) for seed in range(seeds)]
                 yield Row(
@@ -103,14 +104,14 @@ def rows_of(folder: Path, lasts_s: float, seeds: int) -> Iterator[Row]:
 
 
 def _track(tracker: Tracker, frame: FrameSet, camera: int | None, kind: str) -> Estimate:
-    silhouettes = [one and one.silhouette for one in frame.frames]
-    images = [one and one.image for one in frame.frames]
+    observations = frame.observations
     if camera is not None:
-        seen, image = silhouettes[camera], images[camera]
-        silhouettes[camera] = images[camera] = None
-        if kind == "covered" and seen is not None and image is not None:
-            silhouettes[camera], images[camera] = np.full_like(seen, 255), np.zeros_like(image)
-    return tracker.track_views(silhouettes, images, stamp_ns=frame.stamp_ns)
+        one = observations[camera]
+        silhouette = image = None
+        if kind == "covered" and one.silhouette is not None and one.image is not None:
+            silhouette, image = np.full_like(one.silhouette, 255), np.zeros_like(one.image)
+        observations[camera] = replace(one, silhouette=silhouette, image=image)
+    return tracker.track(observations)
 
 
 def table(session: RecordedSession, rows: Iterator[Row]) -> str:

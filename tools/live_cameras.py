@@ -28,7 +28,7 @@ from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_se
 from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, track_session
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.cameras import STEREO
+from cardbox_tracker.recordings.recording import STEREO
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
 from tools.readme_figures import replaced
 

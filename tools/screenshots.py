@@ -30,7 +30,7 @@ from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.session import synthesize_session
 
@@ -82,7 +82,7 @@ def _shots(
         for motion, part in _MOMENTS.items()
     }
     overlays: dict[str, ImageArray] = {}
-    frames: dict[str, Frame] = {}
+    frames: dict[str, RecordedFrame] = {}
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
     span = segments["neutral"].start_s, max(moments.values()) + 1.0

@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import measured_body
-from cardbox_tracker.recordings.cameras import CameraSources
+from cardbox_tracker.recordings.recording import open_recording
 
 _AXES = ("up or down", "about the vertical", "about its own axis")
 
@@ -32,7 +32,7 @@ def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, flo
     """
     session = load_session(folder)
     names, empty = session.truth.cameras[:2], session.spans["empty"]
-    with CameraSources(session.bag, names, empty, session.extrinsics) as source:
+    with open_recording(session.bag, empty, names, session.extrinsics) as source:
         body = measured_body(session, source.first, seed)
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         frames = list(source.frames(session.start_s + offset_s))
@@ -47,9 +47,7 @@ def found_of(folder: Path, degrees: float, seed: int) -> Iterator[tuple[str, flo
                 agreement = tracker.agreement
                 assert agreement is not None
                 for frame in frames:
-                    seen = [one and one.silhouette for one in frame.frames]
-                    images = [one and one.image for one in frame.frames]
-                    tracker.track_views(seen, images, stamp_ns=frame.stamp_ns)
+                    tracker.track(frame.observations)
                     if agreement.is_due:
                         agreement.check()
                 agreement.check(is_last=True)

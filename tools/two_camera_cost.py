@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import measured_body
-from cardbox_tracker.recordings.cameras import CameraSources
+from cardbox_tracker.recordings.recording import open_recording
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 Result = TypeVar("Result")
@@ -49,12 +49,12 @@ def costs_of(folder: Path, count: int) -> tuple[float, float, float]:
     session = load_session(folder)
     names, empty = session.truth.cameras, session.spans["empty"]
     cut: list[float] = []
-    with CameraSources(session.bag, names, empty, session.extrinsics) as source:
+    with open_recording(session.bag, empty, names, session.extrinsics) as source:
         body = measured_body(session, source.first, 0)
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         spent: tuple[list[float], list[float]] = [], []
         one, several = (
-            timed(to, Tracker(body, source.first.camera, default_preset(), others=o).track_views)
+            timed(to, Tracker(body, source.first.camera, default_preset(), others=o).track)
             for to, o in zip(spent, ((), source.others), strict=True)
         )
         plain = SilhouettePipeline.silhouette
@@ -66,8 +66,7 @@ def costs_of(folder: Path, count: int) -> tuple[float, float, float]:
     for begin in range(0, len(frames), _BLOCK):
         for track, cameras in ((one, 1), (several, len(names))):
             for frame in frames[begin : begin + _BLOCK]:
-                seen = frame.frames[:cameras]
-                track([x and x.silhouette for x in seen], [x and x.image for x in seen])
+                track(frame.observations[:cameras])
     return float(np.median(cut)), float(np.median(spent[0])), float(np.median(spent[1]))
 
 

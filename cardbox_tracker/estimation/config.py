@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
@@ -135,6 +136,10 @@ class TrackerConfig:
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")
+
+    def with_depth(self) -> TrackerConfig:
+        """Return the same settings with the term of a measured depth."""
+        return replace(self, terms=(*self.terms, Depth()))
 
     def with_particles(self, particles: int) -> TrackerConfig:
         """Return the same settings with N = ``particles`` in each of the three filters."""

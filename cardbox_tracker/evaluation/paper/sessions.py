@@ -25,7 +25,7 @@ from cardbox_tracker.estimation.initialization.config import InitializationConfi
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.session import synthesize_session
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
@@ -187,7 +187,7 @@ def _span(truth: GroundTruth, name: str, folder: Path) -> TimeSpan:
 
 
 def _session(
-    frames: list[Frame],
+    frames: list[RecordedFrame],
     truth: GroundTruth,
     camera: Camera,
     body: BodyModel,

@@ -45,12 +45,12 @@ def seen(depth_m: np.ndarray | None = None) -> Frame:
 def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
     frame = seen(depth_m)
     COST.see(frame.silhouette, STATE)
-    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
+    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)([frame], STATE)
 
 
 def refined(refine: Refinement, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """The state that fits the outlines, and the result."""
-    fit = refine.outline(frame, STATE)
+    fit = refine.outline([frame], STATE)
     return fit, refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
 
 

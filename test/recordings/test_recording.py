@@ -1,4 +1,4 @@
-"""Several cameras of one recording, whose topics are below namespaces."""
+"""The cameras of a recording, whose topics are below namespaces if there are several."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import yaml
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.cameras import CameraSources, open_recording
 from cardbox_tracker.recordings.depth_silhouettes import Within
+from cardbox_tracker.recordings.recording import Recording, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 
@@ -53,12 +53,12 @@ def chain(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def sources(two: Path, chain: Path) -> Iterator[CameraSources]:
-    with CameraSources(two, ["one", "/two/"], EMPTY, chain) as opened:
+def sources(two: Path, chain: Path) -> Iterator[Recording]:
+    with open_recording(two, EMPTY, ["one", "/two/"], chain) as opened:
         yield opened
 
 
-def test_each_camera_has_its_own_silhouettes(sources: CameraSources, two: Path) -> None:
+def test_each_camera_has_its_own_silhouettes(sources: Recording, two: Path) -> None:
     sets = list(sources.frames(0.55))
     assert [s.stamp_ns - 10**18 for s in sets] == [i * PERIOD_NS for i in range(6, 10)]
     assert [None in s.frames for s in sets] == [False, True, False, False]
@@ -74,18 +74,21 @@ def test_each_camera_has_its_own_silhouettes(sources: CameraSources, two: Path) 
 def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     with (
         pytest.raises(CameraError, match="nothing says where camera two"),
-        CameraSources(two, ["one", "two"], EMPTY),
+        open_recording(two, EMPTY, ["one", "two"]),
     ):
         pass
     with pytest.raises(BagError, match="0 image topics below /three/"), BagReader(two) as bag:
         bag.image_topic("three")
     with pytest.raises(BagError, match="--cameras NAMESPACE"), open_recording(two, EMPTY):
         pass
-    with pytest.raises(CardboxError, match="different namespaces"):
-        CameraSources(two, ["one", "one"], EMPTY)
+    with (
+        pytest.raises(CardboxError, match="different namespaces"),
+        open_recording(two, EMPTY, ["one", "one"]),
+    ):
+        pass
     with (
         pytest.raises(CameraError, match="left camera the first"),
-        CameraSources(two, ["two", "one"], EMPTY, chain, depth="stereo"),
+        open_recording(two, EMPTY, ["two", "one"], chain, depth="stereo"),
     ):
         pass
 
@@ -112,13 +115,16 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
         assert np.array_equal(frames[0].depth_m > 2.0, frames[0].silhouette == 0)
     within = Within("/one/depth", 2.0)
-    with CameraSources(folder, ["one"], within, depth="/one/depth") as sources:
+    with open_recording(folder, within, ["one"], depth="/one/depth") as sources:
         # Read once, for the silhouette and for whoever asks for the depth.
         taken = list(sources.frames(0.25))
         assert len(taken) == len(frames)
         assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
-    with pytest.raises(CardboxError, match="for one camera only"):
-        CameraSources(folder, ["one", "two"], Within("/one/depth", 2.0))
+    with (
+        pytest.raises(CardboxError, match="for one camera only"),
+        open_recording(folder, within, ["one", "two"]),
+    ):
+        pass
     with (
         pytest.raises(CardboxError, match=r"limit of the depth is 0\.1 m; expected 0\.3 to 20 m"),
         open_recording(folder, Within("/one/depth", 0.1), ["one"]),
@@ -128,12 +134,12 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
 
 def test_a_topic_without_depth_is_refused(two: Path) -> None:
     with (
-        CameraSources(two, ["one"], EMPTY, depth="/one/camera_info") as opened,
+        open_recording(two, EMPTY, ["one"], depth="/one/camera_info") as opened,
         pytest.raises(BagError, match="/one/camera_info has messages of sensor_msgs/msg/Camera"),
     ):
         next(opened.frames())
     with (
-        CameraSources(two, ["one"], EMPTY, depth="/one/image_raw") as opened,
+        open_recording(two, EMPTY, ["one"], depth="/one/image_raw") as opened,
         pytest.raises(CardboxError, match="encoding 'mono8' is no depth"),
     ):
         next(opened.frames())
@@ -148,9 +154,28 @@ def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> N
             depth = np.full((48, 64), 1000 + i, np.uint16)
             stamp = 10**18 + i * PERIOD_NS + LATER_NS
             new.write_image("/one/depth", stamp, "one_frame", depth, "16UC1")
-    with CameraSources(folder, ["one"], EMPTY, depth="/one/depth") as opened:
+    with open_recording(folder, EMPTY, ["one"], depth="/one/depth") as opened:
         depths = [s.depth_m for s in opened.frames(0.55)]
         assert [d is not None for d in depths] == [True, False, True, False]
         assert depths[2] is not None
         assert depths[2].shape == (opened.first.camera.height, opened.first.camera.width)
         np.testing.assert_allclose(depths[2], 1.008, rtol=1e-6)
+
+
+def test_one_camera_is_a_list_of_one(two: Path) -> None:
+    with open_recording(two, EMPTY, ["one"]) as opened:
+        sets = list(opened.frames(0.55))
+        alone = list(opened.first.frames(0.55))
+    assert (opened.names, opened.others) == (("one",), [])
+    for taken, frame in zip(sets, alone, strict=True):
+        (observation,) = taken.observations
+        assert (taken.stamp_ns, observation.stamp_ns) == (frame.stamp_ns, frame.stamp_ns)
+        np.testing.assert_array_equal(observation.silhouette, frame.silhouette)
+        np.testing.assert_array_equal(taken.first.silhouette, frame.silhouette)
+        assert observation.depth_m is None
+
+
+def test_a_camera_without_an_image_gives_an_empty_observation(sources: Recording) -> None:
+    seen = [taken.observations for taken in sources.frames(0.55)]
+    assert [one[1].silhouette is None for one in seen] == [False, True, False, False]
+    assert all(one[0].stamp_ns is not None for one in seen)

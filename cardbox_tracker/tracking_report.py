@@ -1,15 +1,14 @@
-"""What the tracker says of its state in the log and in the diagnostics."""
+"""What is said of the state of tracking, in a log and in diagnostics."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import PLACE_NAMES
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.outputs import FIGURES, place_of
-from cardbox_tracker.ros.nodes.several_cameras import SeveralCameras
-from cardbox_tracker.ros.runtime.node import CardboxNode
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -24,58 +23,58 @@ _REASONS = {
 }
 
 
-class TrackerReport:
-    """Logs each change of state, and adds state and fit to the diagnostics of ``node``."""
+class TrackingReport:
+    """Follows the estimates of a tracker, and describes its state in words and numbers."""
 
-    def __init__(self, node: CardboxNode, cameras: SeveralCameras | None = None) -> None:
-        """Report for ``node`` from now on, and for each of its ``cameras`` if it has several."""
-        self._node = node
-        self._cameras = cameras
+    def __init__(self) -> None:
+        """Start before the first estimate."""
         self._body: BodyModel | None = None
         self._state = ""
         self._counts: dict[str, int] = {}
         self._estimate: Estimate | None = None
-        node.diagnostics.extra = self.values
 
     def start(self, body: BodyModel) -> None:
         """Forget the state: tracking starts anew, with ``body``."""
         self._state, self._body = "", body
 
-    def add(self, estimate: Estimate, body: BodyModel) -> None:
-        """Take note of the estimate of an image, and of whose ``body`` it is."""
+    def add(self, estimate: Estimate, body: BodyModel) -> dict[str, str]:
+        """Take note of the estimate of an image, and of whose ``body`` it is.
+
+        Returns:
+            What has changed with it, by kind.
+        """
+        news = {}
         if body is not self._body:
             self._body = body
-            self._node.get_logger().info(f"fitted to the person in the image:\n{body}")
+            news["body"] = f"fitted to the person in the image:\n{body}"
         self._estimate = estimate
         self._counts[estimate.state] = self._counts.get(estimate.state, 0) + 1
-        if estimate.state != self._state:
-            self._say(estimate.state)
-        self._node.diagnostics.advice = self.warnings
-
-    def _say(self, state: str) -> None:
-        before, self._state = self._state, state
-        reason = _REASONS.get(state)
-        if state == UNCERTAIN:
-            # It may come and go with every other image.
-            text = f"tracking, but {reason}"
-            self._node.diagnostics.say("state", text)
+        before, self._state = self._state, estimate.state
+        reason = _REASONS.get(estimate.state)
+        if estimate.state == before:
+            return news
+        if estimate.state == UNCERTAIN:
+            news["state"] = f"tracking, but {reason}"
         elif before != UNCERTAIN or reason:
-            self._node.diagnostics.say("state", f"not tracking: {reason}" if reason else "tracking")
+            # Uncertain frames may come and go with every other image.
+            news["state"] = f"not tracking: {reason}" if reason else "tracking"
+        return news
 
     def warnings(self) -> dict[str, str]:
-        """Return what is wrong now, if anything is; it is logged already."""
+        """Return what is wrong now, if anything is, by kind."""
         reason = _REASONS.get(self._state)
-        found = {} if self._cameras is None else self._cameras.warnings()
         if reason is None:
-            return found
-        return found | {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
+            return {}
+        return {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
 
-    def values(self) -> dict[str, str]:
-        """Return the state, how often each occurred, and the figures of the last posture."""
+    def values(self, cameras: Mapping[str, str]) -> dict[str, str]:
+        """Return the state, how often each occurred, and the figures of the last posture.
+
+        ``cameras`` are further values, which come before the figures.
+        """
         values = {"state": self._state or "not started"}
         values |= {f"images {state}": str(count) for state, count in self._counts.items()}
-        if self._cameras is not None:
-            values |= self._cameras.values()
+        values |= cameras
         estimate = self._estimate
         if estimate is None or estimate.posture is None:
             return values

@@ -1,4 +1,4 @@
-"""Several cameras of the tracker: where they stand, and what they see at one time."""
+"""The cameras of the tracker, one or several: where they stand, and what they see at one time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time  # noqa: E402
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image  # noqa: E402
+from sensor_msgs.msg import CameraInfo, CompressedImage  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
 from cardbox_tracker.errors import CameraError  # noqa: E402
@@ -20,9 +20,10 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes import camera_poses, camera_views  # noqa: E402
+from cardbox_tracker.ros.nodes import camera_inputs, camera_poses  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses  # noqa: E402
-from cardbox_tracker.ros.nodes.camera_views import CameraViews, Views  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -137,21 +138,26 @@ def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPat
 
 
 class Watching:
-    """What two cameras and a depth image showed together."""
+    """What two cameras and a depth image showed together, or one camera alone."""
 
-    def __init__(self, depth: str = "depth") -> None:
+    def __init__(self, depth: str = "depth", cameras: tuple[str, ...] = ("left", "right")) -> None:
         self.node = Ears()
-        self.views: list[Views] = []
-        self.source = CameraViews(self.node, ["left", "right"], depth, False, self._take)  # type: ignore[arg-type]
+        self.views: list[ObservationSet] = []
+        settings = TrackerParameters(cameras=list(cameras), depth=depth)
+        given = settings, lambda *_: None, self._take
+        self.source = CameraInputs(self.node, *given)  # type: ignore[arg-type]
+        for number, name in enumerate(cameras or ("",)):
+            topic = f"/{name}/silhouette/camera_info".replace("//", "/")
+            self.node.hear(topic, info(name, 0.12 * number))
 
-    def _take(self, lead: Image, seen: Any) -> None:
-        self.views.append(self.source.views(seen, [CAMERA, CAMERA], "left_frame"))
-        assert self.views[-1].header.stamp == lead.header.stamp
+    def _take(self, lead: Any, received: Any) -> None:
+        self.views.append(self.source.observed(received))
+        assert self.views[-1].header.stamp == lead.message.header.stamp
 
     def show(self, name: str, stamp_ns: int, size: tuple[int, int] = (48, 64)) -> None:
         pixels = np.full(size, 255, np.uint8)
         message = image_message(header(stamp_ns, f"{name}_frame"), pixels, "mono8")
-        self.node.hear(f"/{name}/silhouette", message)
+        self.node.hear(f"/{name}/silhouette".replace("//", "/"), message)
 
     def show_depth(self, stamp_ns: int, depth_m: np.ndarray) -> None:
         pixels = depth_m.astype(np.float32)
@@ -159,7 +165,8 @@ class Watching:
 
 
 @pytest.fixture
-def watching() -> Watching:
+def watching(monkeypatch: pytest.MonkeyPatch) -> Watching:
+    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: None)
     return Watching()
 
 
@@ -171,10 +178,11 @@ def test_what_belongs_to_one_time_comes_together(watching: Watching) -> None:
     (views,) = watching.views
     assert views.header == header(S)
     assert [h.frame_id for h in views.headers if h] == ["left_frame", "right_frame"]
-    assert views.images == [None, None]
-    assert views.depth_m is not None
-    assert views.depth_m.shape == (48, 64)
-    assert np.all(views.depth_m == 2.0)
+    left, right = views.observations
+    assert (left.image, right.image, left.stamp_ns) == (None, None, S)
+    assert left.depth_m is not None
+    assert left.depth_m.shape == (48, 64)
+    assert np.all(left.depth_m == 2.0)
 
 
 def test_packed_depth_is_read_too() -> None:
@@ -186,7 +194,7 @@ def test_packed_depth_is_read_too() -> None:
     watching.node.hear("/depth/compressedDepth", packed)
     for name in ("left", "right"):
         watching.show(name, S)
-    depth_m = watching.views[0].depth_m
+    depth_m = watching.views[0].observations[0].depth_m
     assert depth_m is not None
     assert np.allclose(depth_m, 1.7)
     # The camera is that of the topic without the plugin's name.
@@ -202,7 +210,7 @@ def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watchin
     watching.show_depth(S, depth)
     watching.show("right", S)
     watching.show("left", S)
-    found = watching.views[0].depth_m
+    found = watching.views[0].observations[0].depth_m
     assert found is not None
     # Right of the optical axis in one is right of it in the other.
     assert np.all(found[:, :31] == 0)
@@ -213,8 +221,8 @@ def test_without_the_first_camera_the_earliest_image_gives_the_stamp(watching: W
     for number in range(1, 12):
         watching.show("right", number * S // 10)
     assert watching.views[-1].header.frame_id == "left_frame"
-    assert watching.views[-1].silhouettes[0] is None
-    assert not watching.views[-1].picture.any()
+    assert watching.views[-1].observations[0].silhouette is None
+    assert not watching.views[-1].picture().any()
     # Depth alone is nothing to track.
     count = len(watching.views)
     for number in range(20, 30):
@@ -227,8 +235,8 @@ def test_what_cannot_be_read_is_left_out_and_said(watching: Watching) -> None:
         watching.show(name, S, size)
     watching.show_depth(S, np.ones((48, 64)))
     (views,) = watching.views
-    assert views.silhouettes[0] is not None
-    assert views.silhouettes[1] is None
+    assert views.observations[0].silhouette is not None
+    assert views.observations[1].silhouette is None
     (text,) = watching.source.warnings().values()
     assert "/right/silhouette: the silhouette is 32x24" in text
     with pytest.raises(CameraError, match="32x24"):
@@ -242,8 +250,8 @@ def test_what_cannot_be_read_is_left_out_and_said(watching: Watching) -> None:
 def test_silence_and_other_clocks_are_said(
     watching: Watching, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now_s = camera_views.time.monotonic()
-    monkeypatch.setattr(camera_views.time, "monotonic", lambda: now_s)
+    now_s = camera_inputs.time.monotonic()
+    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
     watching.show("left", 100 * S)
     watching.show("right", 90 * S)
     watching.show_depth(100 * S, np.ones((48, 64)))
@@ -264,10 +272,26 @@ def test_silence_and_other_clocks_are_said(
 def test_a_camera_that_pauses_has_no_other_clock(
     watching: Watching, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now_s = camera_views.time.monotonic()
-    monkeypatch.setattr(camera_views.time, "monotonic", lambda: now_s)
+    now_s = camera_inputs.time.monotonic()
+    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
     watching.show("right", 100 * S)
     now_s += 1.5
     watching.show("left", 100 * S + 3 * S // 2)
     watching.show_depth(100 * S + 3 * S // 2, np.ones((48, 64)))
     assert not watching.source.warnings()
+
+
+def test_one_camera_is_a_list_of_one() -> None:
+    alone = Watching(depth="", cameras=())
+    alone.source.wait_for_images(False)
+    pixels = np.zeros((48, 64), np.uint8)
+    alone.node.hear("/silhouette/image", image_message(header(S), pixels, "mono8"))
+    # Every message is handed on: the node counts those that come twice or too late.
+    for stamp_ns in (S, S, 3 * S, 2 * S):
+        alone.show("", stamp_ns)
+    assert [view.observations[0].stamp_ns for view in alone.views] == [S, S, 3 * S, 2 * S]
+    assert [view.observations[0].image is None for view in alone.views] == [False, True, True, True]
+    assert alone.views[0].header.frame_id == "_frame"
+    assert (alone.source.values([0.9]), alone.source.warnings()) == ({}, {})
+    with pytest.raises(CameraError, match="32x24"):
+        alone.show("", 4 * S, (24, 32))

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import threading
 
-import pytest
-
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
-from cardbox_tracker.ros.nodes.agreement_watch import AgreementWatch
+from cardbox_tracker.estimation.agreement_watch import AgreementWatch
 
 
 class Agreement:
