@@ -187,27 +187,23 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 
 
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
-    """Create what works until it is told to stop; return the process's exit code."""
-    with interrupts.only_noted():
-        return _run(create, args, work)
-
-
-def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
+    """Create one node or several, serve them until ROS ends; return the process's exit code."""
     try:
         rclpy.init(args=args)
     except Exception as error:
-        if interrupts.were_received():
-            return 0
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
-    node: N | None = None
     try:
         node = create()
-        # Objects made so far stay as long as the process, compiled code above all; a garbage
+        # Objects made so far, compiled code above all, live as long as the process; a garbage
         # collection that visits them takes a tenth of a second.
         gc.collect()
         gc.freeze()
-        work(node)
+        with interrupts.only_noted():
+            try:
+                work(node)
+            finally:
+                node.close()
     except CardboxError as error:
         if ok():
             get_logger("cardbox_tracker").fatal(str(error))
@@ -216,10 +212,8 @@ def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], No
         pass
     except Exception:
         # A signal shuts ROS down at any point; exceptions that follow from it are expected.
-        if ok() and not interrupts.were_received():
+        if ok() and not interrupts.received():
             raise
     finally:
-        if node is not None:
-            node.close()
         try_shutdown()
     return 0
