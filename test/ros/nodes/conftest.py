@@ -23,7 +23,7 @@ class Bus:
         from cardbox_tracker.ros.runtime.node import CardboxNode
 
         self.sent: dict[str, list[Any]] = defaultdict(list)
-        self._takers: dict[str, Callable[..., None]] = {}
+        self._subscribers: dict[str, Callable[..., None]] = {}
         self._timers: list[Callable[[], None]] = []
         self._nodes: list[Any] = []
 
@@ -51,7 +51,7 @@ class Bus:
 
     def send(self, topic: str, message: Any) -> None:
         """Hand a message to the node that subscribes to ``topic``."""
-        self._takers[topic](message, {"source_timestamp": 0})
+        self._subscribers[topic](message, {"source_timestamp": 0})
 
     def tick(self) -> Any:
         """Run every timer once; return the status that a node has published of itself."""
@@ -63,13 +63,13 @@ class Bus:
         """Return what the messages on ``topic`` hold."""
         return [message.data for message in self.sent[topic]]
 
-    def offer(self, publisher: Any) -> Any:
-        """As of IntraProcess: what is published is kept here already."""
+    def advertise(self, publisher: Any) -> Any:
+        """As of IntraProcess; the publisher keeps the messages here already."""
         return publisher
 
-    def take(self, topic: str, taker: Callable[..., None]) -> bool:
+    def subscribe(self, topic: str, subscriber: Callable[..., None]) -> bool:
         """As of IntraProcess: every subscription is this bus's."""
-        self._takers[topic] = taker
+        self._subscribers[topic] = subscriber
         return True
 
     def close(self) -> None:
