@@ -25,14 +25,14 @@ PERIOD_S = 1.0
 # Without input for so long, and for so many periods, it has ceased.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
-# Results whose latency says something.
+# With fewer results the median latency is not judged.
 _ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
 _PLAYED = (
     "play_bag plays a recording, which may be paused; if not, is every node in between running?"
 )
-# Only a node play_bag has it.
+# Only the node play_bag has this topic.
 _PLAYING = "/play_bag/status"
 
 STATUS = "status"
@@ -93,7 +93,7 @@ class NodeDiagnostics:
             self._node.get_logger().error(text)
 
     def say(self, kind: str, text: str, *, warning: bool = False) -> None:
-        """Log what anybody can cause as often as they like."""
+        """Log an event that other programs can cause at any rate, within the log limit."""
         if self._log.allows(kind, text):
             # rclpy refuses another level from the same line.
             if warning:
