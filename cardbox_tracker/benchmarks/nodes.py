@@ -83,16 +83,16 @@ class _CameraAndListener:
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
+        from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import CameraInfo, Image, JointState
 
         from cardbox_tracker.ros.runtime import qos
-        from cardbox_tracker.ros.runtime.static_executor import make_executor
 
         self._nodes = nodes
         self._processes = processes
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_benchmark", enable_rosout=False)
-        self._executor = make_executor()
+        self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._image = self._node.create_publisher(Image, "image_raw", qos.CAMERA)
         self._info = self._node.create_publisher(CameraInfo, "camera_info", qos.CAMERA)

@@ -1,4 +1,4 @@
-"""What the background node says about its input besides what it waits for."""
+"""Advice about the camera's images: losses, brightness and distance."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ _LARGE_IMAGE_BYTES = 400_000
 _LOSS_TO_WARN = 0.1
 # Well above the noise of a median over the image.
 _DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# More of the image than a person who is wholly in view covers.
+# A person who is wholly in view covers less of the image.
 _COVERAGE_TO_WARN = 0.6
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What is known of the images.
+    """Measurements of the images.
 
     Attributes:
-        topic: where they come from.
+        topic: the images' topic.
         loss: share of them that never arrived.
         image_bytes: size of one.
         drift: how much brighter they are than the background, grey levels.
         follows: True if the light is followed.
         covered: share of the image that is foreground.
-        within_m: whoever is nearer is foreground; 0: whoever is before the background.
+        within_m: pixels nearer than this are foreground, m; 0: the learned background decides.
     """
 
     topic: str

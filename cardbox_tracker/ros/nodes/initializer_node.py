@@ -197,8 +197,8 @@ class InitializerNode(CardboxNode):
 class GuideOutputs:
     """Tells a person what to do next: drawn on ``overlay``, in words to say aloud on ``~/say``.
 
-    Whoever runs the program gets more of it on ``~/status``. ``~/guiding`` is true meanwhile: the
-    tracker then leaves ``overlay`` to the guidance.
+    ``~/status`` has the details for the operator. ``~/guiding`` is true meanwhile: the tracker then
+    leaves ``overlay`` to the guidance.
     """
 
     def __init__(self, node: CardboxNode) -> None:
@@ -252,7 +252,7 @@ class GuideOutputs:
         config = settings.config()
         if self._guide is None or (self._guide.camera, self._guide.config) != (camera, config):
             self._guide = Guide(camera, config)
-        # Of another size it is another's: then the silhouette has to do.
+        # An image of another size is not that of the silhouette, which is drawn instead.
         fits = seen is not None and (seen.height, seen.width) == silhouette.shape
         image = conversions.image_of(seen) if fits else None
         picture = self._guide.draw(step, silhouette, image, settings.mirror)
