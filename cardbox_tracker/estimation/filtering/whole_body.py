@@ -38,9 +38,8 @@ from cardbox_tracker.estimation.filtering.walking import Walk
 _HOME_LIMIT_M = 0.7
 # Deviation of x of torsos that stand upright: larger while the search is young.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-# Arms that are passed on, how many of them are combined with the other side's, and the noise around
-# the best, as a share of that of all.
-_BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 12, 0.45
+# Noise around the best arms, as a share of that of all.
+_AGAIN_NOISE = 0.45
 _STEP_M = 0.05  # across the image: the legs leave the columns where they were
 
 
@@ -57,7 +56,7 @@ class WholeBodyFilter:
         self, config: TrackerConfig, silhouette: SilhouetteTerm, rng: np.random.Generator
     ) -> None:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
-        self._config = c = config.whole_body
+        self._config = c = config.whole_body.scaled()
         self._rng, self._lost_iou = rng, config.lost_iou
         self._use_body(silhouette)
         self._sigma = c.noise()
@@ -161,7 +160,7 @@ class WholeBodyFilter:
         (left, left_ratings), (right, right_ratings) = (
             self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
-        pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
+        pairs = moves.combine(best, left, left_ratings, right, right_ratings, config.paired_arms)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(states, ratings, draws)
@@ -222,7 +221,7 @@ class WholeBodyFilter:
         near = moves.around_best(
             arms,
             ratings,
-            _BEST_ARMS,
+            config.best_arms,
             _AGAIN_NOISE * config.arm_noise_rad,
             ARM_LIMITS,
             draws.for_near_arms(self.candidates * config.arms_again),
