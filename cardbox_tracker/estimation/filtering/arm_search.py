@@ -13,8 +13,8 @@ from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 
-# Arms that are passed on, and the noise around the best, as a share of that of all.
-_BEST_ARMS, _AGAIN_NOISE = 20, 0.45
+# Noise around the best arms, as a share of that of all.
+_AGAIN_NOISE = 0.45
 
 
 class ArmSearch:
@@ -50,7 +50,7 @@ class ArmSearch:
         near = moves.around_best(
             arms,
             ratings,
-            _BEST_ARMS,
+            config.best_arms,
             _AGAIN_NOISE * config.arm_noise_rad,
             ARM_LIMITS,
             draws.for_near_arms(self._candidates * config.arms_again),

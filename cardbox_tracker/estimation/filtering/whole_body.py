@@ -42,7 +42,6 @@ from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 _HOME_LIMIT_M = 0.7
 # Deviation of x of torsos that stand upright: larger while the search is young.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-_PAIRED_ARMS = 12  # of each side that are combined with the other side's
 # Before all joints move together, so many states, of which so many are alike and the others so far
 # apart, m, are moved by so many Gauss-Newton steps.
 _FITTED, _FIT_STEPS = (3, 1, 0.1), 2
@@ -70,7 +69,7 @@ class WholeBodyFilter:
     ) -> None:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
         self._views = tuple(views)
-        self._plan = plan = SearchPlan.of(config.whole_body, 1 + len(views))
+        self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
         self._config = c = plan.config
         self._rng, self._lost_iou = rng, config.lost_iou
         self._use_body(silhouette)
@@ -185,7 +184,7 @@ class WholeBodyFilter:
         (left, left_ratings), (right, right_ratings) = (
             self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
-        pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
+        pairs = moves.combine(best, left, left_ratings, right, right_ratings, config.paired_arms)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(frames, states, ratings, draws)
