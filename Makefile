@@ -3,6 +3,7 @@
 # make example   a small recording, its measured person and their posture, in example/
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
+# make experiments   repeat the paper's experiments (hours); writes docs/evaluation/report.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make lint    ruff and mypy alone
@@ -104,6 +105,13 @@ example: setup
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
+	$(BIN)/python -m tools.readme_figures
+
+# Fewer runs: make experiments RUNS=2
+RUNS ?= 100
+.PHONY: experiments
+experiments: setup
+	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
 	$(BIN)/python -m tools.readme_figures
 
 # All recorded sessions that lie beside the checkout, against their ground truth.

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.benchmarks.mediapipe import full_model
+from benchmarks.mediapipe import full_model
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.recordings.bag_reader import BagReader

@@ -1,1 +1,1 @@
-"""How accurate the tracker is: error measures, ground truth, the paper's experiments."""
+"""How accurate the tracker is: error measures, ground truth, recorded sessions."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.evaluation.paper.report import recorded_results
-from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from cardbox_tracker.evaluation.results import read_json
+from experiments.results import motions_in, recorded_results
 from tools.readme_figures import (
     BEGIN,
     END,

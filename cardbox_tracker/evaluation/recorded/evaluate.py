@@ -12,11 +12,11 @@ from typing import Any
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.precompile import compile_all
-from cardbox_tracker.evaluation.paper.results import provenance, write_json
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, recovery_of, track_session
+from cardbox_tracker.evaluation.results import provenance, write_json
 from cardbox_tracker.files import atomic_path
 
 
