@@ -126,25 +126,22 @@ def _main(results: Results) -> Iterator[str]:
 
 _ELBOWS_AND_HANDS = tuple(name for name in KEYPOINT_NAMES if "shoulder" not in name)
 _COMPARED = (
-    ("cost, px", "mean_cost_px", ("",), 1.0),
-    ("3D error of elbows and hands, cm", "error_m", _ELBOWS_AND_HANDS, 100.0),
-    ("standard deviation over the runs, rad or m", "std_dof", JOINT_NAMES, 1.0),
+    ("cost, px", "mean_cost_px", (), 1.0, 0),
+    ("3D error of elbows and hands, cm", "error_m", _ELBOWS_AND_HANDS, 100.0, 1),
+    ("standard deviation over the runs, rad or m", "std_dof", JOINT_NAMES, 1.0, 3),
 )
-"""Figures in which the paper says that DRS is below SRS: name, key, names, factor."""
+"""Figures in which the paper says that DRS is below SRS: text, key, names, factor, digits."""
 
 
 def _below(
-    results: Results, text: str, figure: str, names: Sequence[str], scale: float
+    results: Results, text: str, figure: str, names: Sequence[str], scale: float, digits: int
 ) -> list[str]:
-    values = np.array(
-        [
-            [[results[m][s][figure][n] if n else results[m][s][figure] for n in names]]
-            for s in ("drs", "srs")
-            for m in motions_in(results)
-        ]
-    ).reshape(2, -1)
-    count = f"{np.count_nonzero(values[0] < values[1])} of {values.shape[1]}"
-    return [text, count, *(f"{scale * mean:.3g}" for mean in values.mean(axis=1))]
+    drs, srs = (
+        np.array([scale * (c[n] if n else c) for c in cells for n in names or ("",)])
+        for cells in ([results[m][s][figure] for m in motions_in(results)] for s in ("drs", "srs"))
+    )
+    count = f"{np.count_nonzero(drs < srs)} of {len(drs)}"
+    return [text, count, *(f"{values.mean():.{digits}f}" for values in (drs, srs))]
 
 
 def _deviations(results: Results, motions: Sequence[str], name: str) -> Iterator[str]:
@@ -337,6 +334,5 @@ def _section(*paragraphs: str) -> Iterator[str]:
 
 
 def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    for row in (header, ["---"] * len(header), *rows):
-        yield f"| {' | '.join(map(str, row))} |"
-    yield ""
+    lines = [f"| {' | '.join(map(str, row))} |" for row in (header, *rows)]
+    yield from (lines[0], "|" + "---|" * len(header), *lines[1:], "")

@@ -16,8 +16,8 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.files import atomic_path
+from tools.marks import replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = "docs/reliability.md"
@@ -63,19 +63,10 @@ def rows_of(report: Path) -> list[Row]:
     return list(rows.values())
 
 
-def with_table(page: str, rows: list[Row]) -> str:
-    """Return the page with the table of ``rows`` between its marks.
-
-    Raises:
-        CardboxError: the page has no such marks.
-    """
-    head, begin, rest = page.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not (begin and end):
-        raise CardboxError(f"{PAGE} has no '{BEGIN}' and '{END}'; put them where the table goes")
+def table_of(rows: list[Row]) -> str:
+    """Return the table of ``rows``, sorted by test."""
     lines = ["| promise | test | tried | survived |", "|---|---|---|---|"]
-    lines += [row.line() for row in sorted(rows, key=lambda row: row.test)]
-    return "\n".join([head + begin, "", *lines, "", end + tail])
+    return "\n".join(lines + [row.line() for row in sorted(rows, key=lambda row: row.test)])
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -89,7 +80,8 @@ def main(arguments: list[str] | None = None) -> int:
         code = run_tests(report, options.examples, options.paths)
         rows = rows_of(report)
     path = ROOT / PAGE
-    page = with_table(path.read_text(encoding="utf-8"), rows)
+    text = path.read_text(encoding="utf-8")
+    page = replaced(text, f"\n{table_of(rows)}\n", BEGIN, END)
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     print(f"{sum(row.tried for row in rows):,} inputs; written: {PAGE}")

@@ -19,7 +19,6 @@ from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import ScoreDistribution
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
-from cardbox_tracker.evaluation.recorded import retarget, rula
 from cardbox_tracker.evaluation.recorded.angles import true_postures
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.robot import load_robot
@@ -28,7 +27,7 @@ from tools import retarget_accuracy, rula_accuracy
 
 BODY = body_from_proportions(1.75, 2.0, 0.4, 0.0)
 COUNT = 20
-ROBOT = load_robot(Path(__file__).parents[3] / "config" / "example_arm.urdf")
+ROBOT = load_robot(Path(__file__).parents[2] / "config" / "example_arm.urdf")
 
 
 def postures() -> np.ndarray:
@@ -68,8 +67,10 @@ def test_the_true_postures_are_those_of_the_keypoints() -> None:
 
 
 def test_whoever_measures_the_truth_has_its_scores(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rula, "track_session", tracked())
-    errors = rula.score_errors(session(), default_preset(), 0, {"task": RulaConfig()})["task"]
+    monkeypatch.setattr(rula_accuracy, "track_session", tracked())
+    errors = rula_accuracy.score_errors(session(), default_preset(), 0, {"task": RulaConfig()})[
+        "task"
+    ]
     for way in ("mean posture", "normal", "particles"):
         assert errors[way].difference == pytest.approx(0.0, abs=0.05)
         assert errors[way].equal == errors[way].within_one == 1.0
@@ -79,17 +80,19 @@ def test_whoever_measures_the_truth_has_its_scores(monkeypatch: pytest.MonkeyPat
 def test_score_errors_are_counted() -> None:
     chances = np.array([0, 0.5, 0.3, 0, 0, 0, 0.2])
     one = ScoreDistribution(chances, chances, chances)
-    error = rula.score_error([one, one, one], np.array([2, 3, 7]))
+    error = rula_accuracy.score_error([one, one, one], np.array([2, 3, 7]))
     assert (error.equal, error.within_one) == pytest.approx((1 / 3, 2 / 3))
     assert error.chance_of_truth == pytest.approx((0.5 + 0.3 + 0.2) / 3)
     assert error.difference == pytest.approx((1.3 + 0.3 + 3.7) / 3)
     assert (error.above, error.true_above) == pytest.approx((0.2, 1 / 3))
 
 
-def robot_error(monkeypatch: pytest.MonkeyPatch, *changes: Any) -> retarget.HandError:
+def robot_error(monkeypatch: pytest.MonkeyPatch, *changes: Any) -> retarget_accuracy.HandError:
     pytest.importorskip("pink", reason="pin-pink is not installed")
-    monkeypatch.setattr(retarget, "track_session", tracked(*changes))
-    (error,) = retarget.hand_errors(session(), default_preset(), 0, ROBOT, [RetargetConfig()])
+    monkeypatch.setattr(retarget_accuracy, "track_session", tracked(*changes))
+    (error,) = retarget_accuracy.hand_errors(
+        session(), default_preset(), 0, ROBOT, [RetargetConfig()]
+    )
     return error
 
 
