@@ -1,7 +1,7 @@
-"""How long the estimation takes: per image, per step, and ratios measured in one run.
+"""Time of the estimation per image and per step, and ratios measured in one run.
 
-Everything runs in one process on one core unless a function says otherwise. What is compared takes
-turns of a few images, so that other load on the machine affects all of it.
+Everything runs in one process on one core unless a function says otherwise. Compared trackers take
+turns of a few images, so that other load on the machine affects all of them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How long the nodes take from an image's stamp to the joint states, over real DDS.
+"""Latency of the nodes from an image's stamp to the joint states, over real DDS.
 
 A publisher in this process plays a camera: the empty scene, then a person who waves to and fro,
 each image stamped with the time it is sent. The nodes are started as a user would, each a process
-of its own or all in one. What counts is when a subscriber's callback has the JointState with that
-stamp; how long before that it had arrived in the subscriber's process is noted, too.
+of its own or all in one. The latency ends when a subscriber's callback has the JointState with that
+stamp; the time of its arrival in the subscriber's process is measured, too.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _LAST_S = 0.5
 def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, Any] | None:
     """Measure every stream at every rate for ``seconds``; None where ROS is not installed.
 
-    ``single_process`` in what is returned has the same of all nodes in one process.
+    ``single_process`` in the result holds the same figures for all nodes in one process.
     """
     try:
         import rclpy  # noqa: F401

@@ -73,7 +73,7 @@ def _mediapipe(frames: int, core: dict[str, Any]) -> dict[str, float] | None:
 
 
 def short_table(results: dict[str, Any]) -> str:
-    """Return the figures that matter most, for the terminal."""
+    """Return the main figures for the terminal."""
     lines = [
         f"a frame of 600 particles, one core  {results['frame_ms_median']:.2f} ms median, "
         f"{results['frame_ms_p95']:.2f} ms p95",

@@ -1,4 +1,4 @@
-"""How long each step of a frame takes, on the particles of a tracker at work."""
+"""Time of each step of a frame, on the particles of a running tracker."""
 
 from __future__ import annotations
 

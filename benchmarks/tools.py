@@ -1,4 +1,4 @@
-"""What all benchmarks of the estimation share."""
+"""Helpers of all benchmarks of the estimation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 
 WARM_UP = 5
-"""So many first images do not count: they wait for memory and, once, for the compiler."""
+"""Number of first images that are not counted: they wait for memory and for the compiler."""
 
 Times = NDArray[np.float64]
 

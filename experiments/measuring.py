@@ -1,4 +1,4 @@
-"""How well the initialization measures people (experiment 8).
+"""Accuracy of the measured sizes of people (experiment 8).
 
 Two things are measured separately: the errors of the 18 sizes of many random people, each measured
 once, and the spread of the sizes of one person when only the seed of the search differs. The
@@ -35,7 +35,7 @@ POSTURE_MISS_DEG = 2.0
 """Standard deviation by which each angle of a reference posture is missed."""
 
 ROUNDS = 60
-"""The curves of cost against rounds end here; who is done earlier keeps the last cost."""
+"""The curves of cost against rounds end here; a search that ends earlier keeps its last cost."""
 
 
 def person_calls(bodies: int, seed: int) -> list[Call]:
@@ -74,7 +74,7 @@ def measure(seed: int, person: int, search_seed: int) -> Arrays:
         posture = reference_posture(name)
         posture[1:] += rng.normal(0.0, np.radians(POSTURE_MISS_DEG), N_JOINTS - 1)
         references[name] = renderer.silhouette(body, posture)
-    # Every random person counts, also one who would be refused.
+    # Every random person counts, also one that the initialization would refuse.
     config = InitializationConfig(
         distance_m=DISTANCE_M, min_iou=0.0, least_iou=0.0, check_postures=False, seed=search_seed
     )

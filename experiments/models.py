@@ -161,7 +161,7 @@ class PlaneObservation(SilhouetteObservation):
 def _cut(corners_m: FloatArray) -> FloatArray:
     """Cut planes (N, planes, 4, 3) at the near plane: (N, planes, 6, 3), the last corner repeated.
 
-    Of what is behind it all corners lie far aside, outside of any image.
+    A plane behind it gets corners far outside of any image.
     """
     cut = np.empty((*corners_m.shape[:-2], 6, 3))
     for index in np.ndindex(corners_m.shape[:-2]):

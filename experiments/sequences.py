@@ -25,7 +25,7 @@ ImageArray = NDArray[np.uint8]
 
 _GAP_PX = 4
 _SCALE = 0.6
-"""Of the figure; sensor noise does not compress."""
+"""Scale of the figure, which keeps the file small."""
 _SHIFT = 8
 _FILL_BGR = (214, 190, 150)
 _EDGE_BGR = (70, 40, 20)

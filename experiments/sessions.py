@@ -29,7 +29,7 @@ from cardbox_tracker.vision.camera import Camera
 FloatArray = NDArray[np.float64]
 
 SEQUENCE_LENGTH = 7
-"""So many images of each motion are kept for the image sequences."""
+"""Number of images of each motion that are kept for the image sequences."""
 
 _NOT_MOTIONS = ("empty", "enter", "front", "side", "arms", "transition", "neutral")
 # People do not take a posture, or leave the view, exactly at the end of a segment.

@@ -35,7 +35,7 @@ RUNS_A_CALL = 10
 
 @dataclass(frozen=True)
 class Setting:
-    """How a session is tracked.
+    """Settings of the tracker for some runs on a session.
 
     Attributes:
         config: settings of the tracker.

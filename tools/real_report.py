@@ -1,4 +1,4 @@
-r"""Track real people whom nobody measured, and compare with what MediaPipe sees in the same images.
+r"""Track real people without measuring them, and compare with MediaPipe on the same images.
 
 python -m tools.real_report --session DIR \
     --output docs/evaluation/real.md --sheet docs/images/real.jpg
@@ -73,7 +73,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Variant:
-    """What is tracked, and with which silhouettes.
+    """One way to track a session.
 
     Attributes:
         name: in the table.
@@ -104,12 +104,12 @@ VARIANTS = (
     Variant("the same without colours", "mediapipe", colors=False),
 )
 SHOWN = VARIANTS[3]
-"""The one that is reported by clip and drawn."""
+"""The variant that is reported by clip and drawn."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came out: estimates and bodies (N,), errors (N, 6) in px (nan without), IoU (N,)."""
+    """Results: estimates and bodies (N,), errors (N, 6) in px (nan without), IoU (N,)."""
 
     estimates: list[Estimate]
     bodies: list[BodyModel]

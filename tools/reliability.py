@@ -1,4 +1,4 @@
-"""What is promised, how often it was tried, and that it held: ``docs/reliability.md``.
+"""Table of the promises, their tests and the number of inputs tried: ``docs/reliability.md``.
 
 ``python -m tools.reliability`` (``make reliability``) runs every test that has the marker
 ``promise`` and writes the table between the marks of that page. A test of examples (hypothesis)
@@ -49,7 +49,7 @@ def run_tests(report: Path, examples: int, paths: list[str]) -> int:
 
 
 def rows_of(report: Path) -> list[Row]:
-    """Return what a report of pytest says of promises, in its order; skipped tests are left out."""
+    """Return the promises in a report of pytest, in its order, without skipped tests."""
     rows: dict[tuple[str, str], Row] = {}
     for case in ElementTree.parse(report).getroot().iter("testcase"):
         found = {entry.get("name"): entry.get("value", "") for entry in case.iter("property")}

@@ -1,4 +1,4 @@
-"""How far a robot that follows the tracker is from one that follows the true joints, as a table.
+"""Distance of a robot that follows the tracker from one that follows the true joints, as a table.
 
 python -m tools.retarget_accuracy SESSION...
 

@@ -1,4 +1,4 @@
-"""How far RULA scores are from those of the true joints, as a table for ``docs/ergonomics.md``.
+"""Error of RULA scores against those of the true joints, as a table for ``docs/ergonomics.md``.
 
 python -m tools.rula_accuracy SESSION...
 
@@ -59,10 +59,10 @@ most frequent true score of the session, for comparison."""
 
 @dataclass(frozen=True)
 class ScoreError:
-    """How far scores are from the true ones, over the images that have both.
+    """Errors of scores over the images with a true score.
 
     Attributes:
-        frames: how many.
+        frames: number of images.
         difference: mean absolute difference of the expected score.
         equal: share of images whose likeliest score is the true one.
         within_one: share of those where it is at most 1 off.
@@ -122,7 +122,7 @@ def score_errors(
 
 
 def true_scores(session: RecordedSession, body: BodyModel, rula: RulaConfig) -> ScoreArray:
-    """Return the grand scores (n,) of the true joints; of ``body`` come the lengths."""
+    """Return the grand scores (n,) of the true joints with the lengths of ``body``."""
     postures = true_postures(session)
     return rula_scores(body, postures, rula).grand
 

@@ -1,1 +1,1 @@
-"""How accurate the tracker is: error measures, ground truth, recorded sessions."""
+"""Accuracy of the tracker: error measures, ground truth, recorded sessions."""

@@ -41,13 +41,13 @@ def evaluate_sessions(
         progress: told the finished fraction.
 
     Returns:
-        What ``sessions.json`` holds.
+        The contents of ``sessions.json``.
 
     Raises:
         CardboxError: a folder is no session, or the results cannot be written.
     """
     for folder in folders:
-        load_session(folder)  # what is wrong shows before the work begins
+        load_session(folder)  # report errors before the work begins
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -101,8 +101,8 @@ def evaluate_session(
 ) -> dict[str, Any]:
     """Return the figures of one session: of each run, and MediaPipe's beside them.
 
-    Of several cameras all track, or the one that ``only`` names, without MediaPipe's figures. With
-    ``recovery`` the first seed's run also has how often it recovered from disturbances.
+    All cameras of the session track, or the one that ``only`` names, without MediaPipe's figures.
+    With ``recovery`` the first seed's run also counts the recoveries from disturbances.
     """
     session = load_session(folder)
     config = PRESETS[preset]()

@@ -1,4 +1,4 @@
-"""``sessions.md``: what the tracker does on recorded sessions, in tables."""
+"""``sessions.md``: results of the tracker on recorded sessions, in tables."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _deviations(results: Results, columns: Mapping[str, Callable[[Results], floa
 
 
 def _recovery(results: Results) -> list[str]:
-    """How often each kind of disturbance was recovered from; empty where it was not measured."""
+    """Recoveries from each kind of disturbance; empty where they were not measured."""
     kinds = dict.fromkeys(
         kind for s in results["sessions"] for run in s["runs"] for kind in run.get("recovery", {})
     )
