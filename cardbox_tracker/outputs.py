@@ -3,7 +3,7 @@
 The nodes, the bag of results, the CSV file and the demo encode what stands here:
 :mod:`.ros.messages.results` as messages, :mod:`.recordings.result_bag` as messages of a bag,
 :mod:`.recordings.track` as rows. A further joint goes into ``JOINT_STATE_NAMES`` and the two
-functions after it, a further topic into ``outputs``, a further number into ``FIGURES``.
+functions after it, a further topic into ``outputs``, a further number into ``METRICS``.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Metric:
     """One number of an estimate.
 
     Attributes:
@@ -193,9 +193,9 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
 OUTPUTS: tuple[Output, ...] = outputs()
 """All topics, with all joints."""
 
-FIGURES: tuple[Figure, ...] = (
-    Figure("cost", "px", "d", lambda estimate: estimate.cost_px),
-    Figure("iou", "", ".4f", lambda estimate: estimate.iou),
+METRICS: tuple[Metric, ...] = (
+    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
+    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
 )
 """How well the model fits."""
 

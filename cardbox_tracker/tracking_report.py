@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import PLACE_NAMES
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
-from cardbox_tracker.outputs import FIGURES, place_of
+from cardbox_tracker.outputs import METRICS, place_of
 
 _REASONS = {
     NO_PERSON: "nobody is in the image",
@@ -78,7 +78,7 @@ class TrackingReport:
         estimate = self._estimate
         if estimate is None or estimate.posture is None:
             return values
-        values |= {figure.label: figure.text(estimate) for figure in FIGURES}
+        values |= {metric.label: metric.text(estimate) for metric in METRICS}
         if estimate.posture_stddev is not None:
             angles = estimate.posture_stddev[1:]
             values["largest deviation (deg)"] = f"{math.degrees(float(angles.max())):.1f}"

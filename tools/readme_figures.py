@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.benchmarks import report as benchmark_report
-from cardbox_tracker.evaluation.paper.report import recorded_results
-from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from benchmarks import report as benchmark_report
 from cardbox_tracker.evaluation.recorded.report import mean_of
+from cardbox_tracker.evaluation.results import read_json
 from cardbox_tracker.files import atomic_path
+from experiments.results import motions_in, recorded_results
+from tools.marks import replaced
 
 BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"
@@ -102,23 +103,11 @@ def sessions_section(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def replaced(text: str, section: str, begin: str = BEGIN, end: str = END) -> str:
-    """Return the README ``text`` with ``section`` between the marks.
-
-    Raises:
-        ValueError: the marks are not there, each once.
-    """
-    if text.count(begin) != 1 or text.count(end) != 1:
-        raise ValueError(f"the README needs the marks {begin} and {end}, each once")
-    before, rest = text.split(begin)
-    return f"{before}{begin}\n{section}\n{end}{rest.split(end)[1]}"
-
-
 def current(root: Path) -> str:
     """Return what the README in ``root`` should read."""
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
-    text = replaced((root / "README.md").read_text(encoding="utf-8"), section)
+    text = replaced((root / "README.md").read_text(encoding="utf-8"), section, BEGIN, END)
     sessions = sessions_section(read_json(folder / "sessions.json"))
     text = replaced(text, sessions, SESSIONS_BEGIN, SESSIONS_END)
     speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))

@@ -4,7 +4,7 @@
 
 A synthetic session is recorded, its person measured and tracked, all without ROS; the same seed
 gives the same images. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` an image, its
-silhouette and the model over it, ``guidance.jpg`` what a person sees who is to be measured.
+silhouette and the model over it, ``guidance.jpg`` the guidance while a person is measured.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def _shots(
 
 
 def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> ImageArray:
-    """What is shown before the references are captured, as in a mirror."""
+    """Draw the mirrored guidance before the references are captured."""
     guide = Guide(source.camera, InitializationConfig(2.0))
     shown = []
     for name, before_s, left_s in _GUIDED:

@@ -20,7 +20,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path, stamp_text
-from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
+from cardbox_tracker.outputs import JOINT_STATE_NAMES, METRICS, joint_values
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
@@ -30,7 +30,7 @@ CSV_HEADER = (
     "state",
     *JOINT_STATE_NAMES[:N_JOINTS],
     *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
-    *(figure.name for figure in FIGURES),
+    *(metric.name for metric in METRICS),
     *JOINT_STATE_NAMES[N_JOINTS:],
 )
 
@@ -143,6 +143,6 @@ def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
         estimate.state,
         *values[:N_JOINTS],
         *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
-        *(figure.text(estimate) for figure in FIGURES),
+        *(metric.text(estimate) for metric in METRICS),
         *values[N_JOINTS:],
     ]

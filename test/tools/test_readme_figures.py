@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.evaluation.paper.report import recorded_results
-from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from cardbox_tracker.evaluation.results import read_json
+from experiments.results import motions_in, recorded_results
 from tools.readme_figures import (
     BEGIN,
     END,
@@ -18,7 +18,6 @@ from tools.readme_figures import (
     current,
     main,
     readme_section,
-    replaced,
     sessions_section,
 )
 
@@ -94,13 +93,6 @@ def test_section_by_hand() -> None:
     assert "`person` are images of rendered, realistically shaped bodies, not films" in words
     assert "(3 runs)" in words
     assert max(len(line) for line in text.splitlines()) <= 100
-
-
-def test_marks_are_needed_once() -> None:
-    assert replaced(f"a {BEGIN}old{END} b", "new") == f"a {BEGIN}\nnew\n{END} b"
-    for text in ("", BEGIN, f"{BEGIN}{END}{BEGIN}{END}"):
-        with pytest.raises(ValueError, match="needs the marks"):
-            replaced(text, "new")
 
 
 def test_sessions_by_hand() -> None:
