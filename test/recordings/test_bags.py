@@ -347,7 +347,7 @@ def test_what_is_no_recording_is_never_replaced(tmp_path: Path, is_file: bool) -
     else:
         target.mkdir()
         (target / "chapter.txt").write_text("one")
-    with pytest.raises(BagError, match="no recording"):
+    with pytest.raises(BagError, match="not a recording"):
         BagWriter(target)
 
 

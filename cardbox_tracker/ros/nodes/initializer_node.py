@@ -20,7 +20,7 @@ from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.body.posture import REFERENCE_NAMES
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, InitializationError
-from cardbox_tracker.estimation.initialization.guidance import Guidance, Step, measuring
+from cardbox_tracker.estimation.initialization.guidance import Guidance, Prompt, measuring
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import (
     answer_text,
@@ -158,8 +158,8 @@ class InitializerNode(CardboxNode):
         references.captured, references.images = {}, {}
         return answer
 
-    def _show(self, step: Step) -> None:
-        self._guide.show(step, self.parameters.value.bell)
+    def _show(self, prompt: Prompt) -> None:
+        self._guide.show(prompt, self.parameters.value.bell)
 
     def _progress(self, fraction: float) -> None:
         self._cancellation.wait(0.0)
