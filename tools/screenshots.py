@@ -24,7 +24,7 @@ from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.initialization.guidance import Step, short_words
+from cardbox_tracker.estimation.initialization.guidance import Prompt, short_words
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
@@ -108,7 +108,7 @@ def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Imag
     shown = []
     for name, before_s, left_s in _GUIDED:
         frame = next(source.frames(segments[name].start_s - before_s))
-        step = Step(name, short_words(name, guide.config.side_turn), left_s)
+        step = Prompt(name, short_words(name, guide.config.side_turn), left_s)
         shown.append(guide.draw(step, frame.silhouette, frame.picture, mirror=True))
     return _row(shown)
 

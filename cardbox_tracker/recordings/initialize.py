@@ -22,7 +22,7 @@ from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.depth_image import median_depth
 
-# More of one posture look alike.
+# Further images of one posture add no information.
 _MOST_IMAGES = 20
 
 
@@ -36,8 +36,8 @@ def initialize_from_recording(
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: the references are unusable, show other postures than they should, or
-            the model does not fit them.
+        InitializationError: the references are unusable, show other postures, or the model does
+            not fit them.
     """
     references, images = {}, {}
     for name, span in spans.items():
@@ -56,12 +56,12 @@ def initialize_from_cameras(
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with the second one.
 
-    The distance of ``config`` is only where the search begins.
+    The search begins at the distance of ``config``.
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: as :func:`initialize_from_recording`, or the second camera does not
-            show that person.
+        InitializationError: see :func:`initialize_from_recording`; or the silhouettes of the
+            second camera do not fit the person.
     """
     first, second = recording.sources[:2]
     references = {
@@ -108,15 +108,15 @@ def _depth_reference(recording: Recording, span: TimeSpan, name: str) -> DepthRe
             depths_m.append(taken.depth_m)
     if not depths_m:
         raise CardboxError(
-            f"no depth image lies in the {name} span {span} s of the recording; give seconds from "
-            "its start, the topic of depth images that are there, or --distance"
+            f"no depth image lies in the {name} span {span} s of the recording; give a span in "
+            "seconds from its start, another depth topic, or --distance"
         )
     kept = slice(None, None, -(-len(depths_m) // _MOST_IMAGES))
     return DepthReference(average_silhouette(silhouettes), median_depth(depths_m[kept]))
 
 
 def describe(result: InitializationResult) -> str:
-    """Return the sizes and the fit, as text for a person."""
+    """Return the body sizes and the fit as text."""
     body, placement = result.body, result.body.placement
     return (
         f"{body}\n"

@@ -66,8 +66,8 @@ def test_the_robot_follows_and_stands_still(
     ("words", "expected"),
     [
         (("--robot", "FOLDER/missing.urdf"), "missing.urdf: No such file or directory"),
-        (("--robot", str(MAP)), "is no URDF"),
-        (("--map", str(ROBOT)), "is no joint map"),
+        (("--robot", str(MAP)), "expected the URDF"),
+        (("--map", str(ROBOT)), "config/example_joint_map.yaml"),
         (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or a hand"),
         (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
         (("--side", "both"), "--side: invalid choice: 'both'"),

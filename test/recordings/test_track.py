@@ -342,7 +342,7 @@ def test_images_without_a_person_have_no_results(
 def test_a_recording_of_that_name_is_kept(recording: Any, tmp_path: Path) -> None:
     before = sorted(os.listdir(recording.folder))
     with (
-        pytest.raises(BagError, match="exists and is a recording already; choose another name"),
+        pytest.raises(BagError, match="exists and is a recording"),
         ResultBag(recording.folder, "camera"),
     ):
         pytest.fail("it must not be opened")

@@ -1,6 +1,6 @@
-"""Where in the image a person can be: the body as last seen, what is near it, what arms reach.
+"""Masks of the image regions in which a person is expected, from the last posture.
 
-All of it is drawn on a grid of square cells, about 80 in a row of the image: 3 to 4 cm at a person.
+The masks are drawn on a grid of square cells, about 80 in a row of the image.
 """
 
 from __future__ import annotations
@@ -19,35 +19,35 @@ from cardbox_tracker.vision.camera import Camera
 
 Mask = NDArray[np.uint8]
 Point = tuple[float, float, float]
-"""Column and row, and cells per metre at its depth."""
+"""Column and row in cells, and cells per metre at the point's depth."""
 
 _CELLS_IN_A_ROW = 80
-# Patches are thinner than a body with clothes.
+# Clothes are added to the widths of the body model.
 _CLOTHES_M = 0.02
-# Around the last posture everything is the person's, even before something that was there.
+# All foreground within this distance of the last posture belongs to the person.
 _BAND_M = 0.1
-# From the middle of the fist to the finger tips, and what keypoints may be wrong by.
+# Distance from the fist to the fingertips, plus the error of keypoints.
 _BEYOND_HAND_M = 0.25
-# Finger tips, as a share of the forearm.
+# Length of the fingers in forearm lengths.
 _FINGERS = 0.15
 _NEAREST_M = 0.2
-# Cells by which anything is made larger at most.
+# Limit of the dilation in cells.
 _WIDEST = 40
-# Among the points of a figure; an arm has three.
+# Indices of the points of a posture; an arm has three points.
 _HIP, _NECK, _HEAD, _LEFT, _RIGHT = 0, 1, 2, 3, 6
-# Around head and shoulders: what the outline has inside, and what is around it.
+# Gap and width of the background ring around head and shoulders.
 _GAP_M, _RING_M = 0.05, 0.2
 
 
 @dataclass(frozen=True)
-class Figure:
-    """Where the person may be, on the grid, (h, w), 0 or 1.
+class PersonMasks:
+    """Regions of the expected person on the grid, each (h, w), 0 or 1.
 
     Attributes:
-        core: the drawn body.
-        band: everything within 10 cm of it.
-        near: everything that may be part of the person in the next frame.
-        reach: everything that arms could reach.
+        core: the body in the last posture.
+        band: all cells within 10 cm of the body.
+        near: cells that the person can occupy in the next frame.
+        reach: cells that the arms can reach.
         hip: column and row of mid-hip, cells.
     """
 
@@ -58,18 +58,18 @@ class Figure:
     hip: tuple[float, float]
 
 
-class FigureDrawer:
-    """Draws figures of one body before one camera.
+class PersonDrawer:
+    """Draws the masks of one body for one camera.
 
     Attributes:
-        cell_px: pixels along a side of a cell.
+        cell_px: side of a cell, px.
         shape: rows and columns of the grid.
-        front: the front reference where the person was measured, (14,).
-        cells_per_m: at the person's distance in the body model.
+        front: state (14,) of the front reference at the measured place.
+        cells_per_m: scale at the person's distance in the body model.
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, pitched as it stands."""
+        """Set up the grid; ``camera`` includes the pitch."""
         self._body = body
         self.cell_px = cell = max(1, round(camera.width / _CELLS_IN_A_ROW))
         self.shape = -(-camera.height // cell), -(-camera.width // cell)
@@ -87,12 +87,12 @@ class FigureDrawer:
         self.front[:N_JOINTS] = reference_posture("front")
         self.front[0] = body.placement.lateral_m
 
-    def figure(self, posture: FloatArray, near_m: float) -> Figure:
-        """Return where a person is and can be whose last posture was this one.
+    def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
+        """Return the masks of a person for their last posture.
 
         Args:
             posture: (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
-            near_m: how far a part may be from there.
+            near_m: largest movement of a body part until the next frame.
         """
         points = self._points(posture)
         core: Mask = np.zeros(self.shape, np.uint8)
@@ -111,16 +111,16 @@ class FigureDrawer:
         for first in (_LEFT, _RIGHT):
             depth_m = self._camera.fx / points[first][2]
             radius_m = min(length_m, 0.9 * depth_m)
-            # A sphere looks wider than a disc of its radius.
+            # The silhouette of a sphere is wider than a disc of its radius.
             radius_m *= depth_m / float(np.sqrt(depth_m**2 - radius_m**2))
             _disc(reach, points[first], radius_m * points[first][2])
-        return Figure(core, band, near, reach, points[_HIP][:2])
+        return PersonMasks(core, band, near, reach, points[_HIP][:2])
 
     def head_and_shoulders(self) -> tuple[list[NDArray[np.float32]], tuple[int, int]]:
-        """Return two kernels, and the column and row in them of the hips of who they fit.
+        """Return a head kernel, a trunk kernel, and column and row of the hips in them.
 
-        Their products with a silhouette on the grid are the shares of the head and of the trunk
-        that are foreground, either minus that of what is around head and shoulders.
+        A kernel's product with a silhouette on the grid is the foreground share of head or trunk,
+        minus the foreground share of the ring around head and shoulders.
         """
         points = self._points(self.front)
         head, trunk, gap, ring = (np.zeros(self.shape, np.uint8) for _ in range(4))
@@ -146,7 +146,7 @@ class FigureDrawer:
         return kernels, (column, row)
 
     def _points(self, posture: FloatArray) -> list[Point]:
-        """Return hip, neck, head, then shoulder, elbow and finger tips of either arm."""
+        """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
         place, camera = self._body.placement, self._camera
         x_m, z_m = posture[N_JOINTS:].tolist() or (0.0, 0.0)
         moved = self._body.with_values(
@@ -166,13 +166,13 @@ class FigureDrawer:
         return [(column, row, scale) for column, row, scale in table]
 
     def _draw_head(self, mask: Mask, points: list[Point], grow_m: float) -> None:
-        """Draw head and neck, larger by ``grow_m``."""
+        """Draw head and neck, widened by ``grow_m``."""
         size, neck, head = self._body.size, points[_NECK], points[_HEAD]
         _line(mask, neck, head, 2 * head[2] * (0.3 * size("head_width") + grow_m))
         _disc(mask, head, head[2] * (0.5 * size("head_height") + grow_m))
 
     def _draw_torso(self, mask: Mask, points: list[Point], grow_m: float) -> None:
-        """Draw the torso and what is below the hips, larger by ``grow_m``."""
+        """Draw the torso and the region below the hips, widened by ``grow_m``."""
         size, hip, neck = self._body.size, points[_HIP], points[_NECK]
         half_m = 0.5 * max(size("torso_top_width"), size("torso_bottom_width"))
         wide = 2 * hip[2] * (half_m + grow_m)
