@@ -70,7 +70,7 @@ def test_a_chunk_that_holds_more_than_it_says_is_not_unpacked(name: str) -> None
     packed = CODECS[name](bytes(200 * MB))
     tracemalloc.start()
     try:
-        with pytest.raises(BagError, match="unpacks to more than 1000 bytes"):
+        with pytest.raises(BagError, match="1000 bytes"):
             bag_limits._MCAP.DECOMPRESSORS[name](packed, 1000)
         with pytest.raises(BagError, match="cut off"):
             bag_limits._MCAP.DECOMPRESSORS[name](packed[:50], 300 * MB)
@@ -90,7 +90,7 @@ def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Pa
     struct.pack_into("<Q", data, at + 9 + 16, size)
     file.write_bytes(data)
     for path in (file, file.parent):
-        with pytest.raises(BagError, match=r"would unpack to .* MB"), BagReader(path):
+        with pytest.raises(BagError, match=r"unpack.* MB"), BagReader(path):
             pytest.fail("it was opened")
 
 
@@ -98,7 +98,7 @@ def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Pa
 def test_many_chunks_that_are_large_together_are_refused(tmp_path: Path) -> None:
     chunk = struct.pack("<BQQQQIIQ", 0x06, 40, 0, 0, bag_limits.MOST_BYTES // 3, 0, 0, 0)
     (tmp_path / "bag.mcap").write_bytes(b"\x89MCAP0\r\n" + chunk * 4)
-    with pytest.raises(BagError, match="would unpack to"), BagReader(tmp_path / "bag.mcap"):
+    with pytest.raises(BagError, match="unpack"), BagReader(tmp_path / "bag.mcap"):
         pytest.fail("it was opened")
 
 
@@ -111,11 +111,11 @@ def test_messages_and_files_that_are_compressed_each_are_bounded(
     with (
         packed.open("rb") as file,
         bag_limits._READER.zstd.open(file, "rb") as unpacked,
-        pytest.raises(BagError, match="far more than it holds"),
+        pytest.raises(BagError, match="more than it holds"),
     ):
         while unpacked.read(MB):
             pass
-    with pytest.raises(BagError, match="unpacks to more than"):
+    with pytest.raises(BagError, match=r"unpack.* more than"):
         bag_limits._READER.zstd.decompress(zstd(bytes(257 * MB)))
 
 
@@ -125,7 +125,7 @@ def test_messages_and_files_that_are_compressed_each_are_bounded(
 def test_metadata_that_no_recorder_wrote_are_refused(metadata: str, tmp_path: Path) -> None:
     bag = record(tmp_path / "bag")
     (bag / "metadata.yaml").write_text(metadata)
-    with pytest.raises(BagError, match="is not what a recorder writes"), BagReader(bag):
+    with pytest.raises(BagError, match="recorder"), BagReader(bag):
         pytest.fail("it was opened")
 
 
@@ -180,7 +180,7 @@ def test_broken_images_are_left_out_counted_and_named(tmp_path: Path) -> None:
 def test_a_recording_of_broken_images_says_so(tmp_path: Path) -> None:
     with (
         BagReader(record(tmp_path / "bag", broken=tuple(range(12)))) as bag,
-        pytest.raises(CardboxError, match=r"0 images lie in the background span.*12 images cannot"),
+        pytest.raises(CardboxError, match=r"0 images .*background.*12 images"),
     ):
         SilhouetteSource(bag, TimeSpan(0.0, 0.5))
 
@@ -212,7 +212,7 @@ def test_a_type_that_is_not_that_of_ros_is_refused(
     monkeypatch.setattr(BagReader, "deserialize", lambda *_: odd)
     with BagReader(record(tmp_path / "bag")) as bag:
         for use in (lambda: list(bag.images()), bag.calibration):
-            with pytest.raises(BagError, match="is damaged"):
+            with pytest.raises(BagError, match="damaged"):
                 use()
 
 
@@ -221,5 +221,5 @@ def test_bytes_that_are_no_message_are_refused(tmp_path: Path) -> None:
         writer.write_camera_info("/camera_info", START_NS, "eye", CAMERA)
         kind = "sensor_msgs/msg/CompressedImage"
         writer.write_raw("/image_raw/compressed", kind, b"\0\1\0\0" + b"\xff" * 30, START_NS)
-    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="is damaged"):
+    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="damaged"):
         list(bag.images())

@@ -230,7 +230,7 @@ def test_a_bag_of_results_is_known_for_one(tmp_path: Path) -> None:
             bag.write_image(name, START_NS, "optical", image(0), "mono8")
         bag.write_string("/tracking_state", START_NS, "tracking")
     text = refusal(tmp_path / "bag")
-    assert "a bag of results; give the recording that it was made from" in text
+    assert "bag of results" in text and "give the recording" in text
     assert "--cameras" not in text
 
 
@@ -259,7 +259,7 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) 
 def test_a_recording_without_camera_info_says_so(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as bag:
         bag.write_image(IMAGE, START_NS, "optical", image(0), "mono8")
-    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="0 CameraInfo topics"):
+    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="0 CameraInfo"):
         bag.calibration()
 
 
@@ -331,7 +331,7 @@ def test_a_recording_appears_only_when_it_is_whole(tmp_path: Path) -> None:
 
 def test_a_recording_is_replaced_only_when_asked_to(tmp_path: Path) -> None:
     record(tmp_path / "bag")
-    with pytest.raises(BagError, match="a recording already"):
+    with pytest.raises(BagError, match="already"):
         BagWriter(tmp_path / "bag")
     with BagWriter(tmp_path / "bag", overwrite=True) as bag:
         bag.write_string("/text", START_NS, "x")

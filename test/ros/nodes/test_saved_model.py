@@ -43,15 +43,15 @@ def context(ros_domain: int) -> Iterator[Context]:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fifo", "it is no file"),
-        ("/dev/zero", "it is no file"),
-        ("/dev/null", "it is no file"),
+        ("fifo", "no file"),
+        ("/dev/zero", "no file"),
+        ("/dev/null", "no file"),
         (".", "Is a directory"),
-        ("missing/model.yaml", "No such file or directory; choose a folder"),
+        ("missing/model.yaml", "No such file .*; choose a folder"),
         ("text/model.yaml", "Not a directory"),
         ("n" * 300, "File name too long"),
-        ("~nobody-here/model.yaml", "there is no such user"),
-        ("text", "expected a mapping"),
+        ("~nobody-here/model.yaml", "user"),
+        ("text", "mapping"),
     ],
 )
 def test_what_cannot_be_used_is_told_at_the_start(name: str, words: str, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_home_folder_is_known_to_every_node(
         {name: "~/bad.yaml", "file": "video"} if make is CameraNode else {name: "~/bad.yaml"}
     )
     overrides = [Parameter(key, value=value) for key, value in parameters.items()]
-    with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: expected a mapping"):
+    with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: .*mapping"):
         make(context=context, parameter_overrides=overrides, enable_rosout=False)
 
 
@@ -118,7 +118,7 @@ def test_a_folder_that_is_gone_costs_no_second_posing(
     captured = {name: np.zeros((24, 32), np.uint8) for name in REFERENCE_NAMES}
     references.captured = dict(captured)
     shutil.rmtree(folder)
-    with pytest.raises(CardboxError, match=r"published, but not saved: .*call initialize again"):
+    with pytest.raises(CardboxError, match=r"not saved: .*call initialize"):
         node._measure()
     assert references.captured.keys() == captured.keys()
     folder.mkdir()

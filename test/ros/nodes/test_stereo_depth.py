@@ -101,7 +101,7 @@ def test_what_is_no_rectified_pair_is_said(node: StereoDepthNode) -> None:
     node._on_left(left, 0)
     node._on_right(right, 0)
     assert node._depth.messages == []
-    for stamp_ms, p03, text in ((80, 0.0, "no rectified pair"), (120, 30.0, "left camera the")):
+    for stamp_ms, p03, text in ((80, 0.0, "rectified"), (120, 30.0, "left camera")):
         give_infos(node, p03)
         left, right = pair(stamp_ms, stamp_ms)
         node._on_left(left, 0)
