@@ -41,9 +41,9 @@ REP155_PLACE: tuple[str, ...] = ("x_body", "z_body")
 """Joint names of ``torso_x`` and ``torso_z``, which follow the others."""
 
 LOWEST_RAISE_RAD = -np.pi / 3
-"""Swing of an arm through rest before its other pair of angles is taken, rad."""
+"""Lowest p: an arm that swings further through rest gets its other pair of angles, rad."""
 LOWEST_BEND_RAD = -np.pi / 6
-"""Lowest value of the elbow, which REP-155 bends in one direction only, rad."""
+"""Lowest e of the elbow, which REP-155 bends in one direction only, rad."""
 
 # Nearer than this to the singular direction the other angle is kept.
 _MEANINGLESS_RAD = 1e-3
