@@ -1,4 +1,4 @@
-"""The ``cardbox`` command: its subcommands, and what it does when one of them fails."""
+"""The ``cardbox`` command: parses the arguments, runs a subcommand and reports its errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.interrupts import INTERRUPTED, were_received
 
-# In the order of 'cardbox --help'.
+# The order is that of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
     demo,
     synthesize,
@@ -44,7 +44,7 @@ COMMANDS: tuple[Command, ...] = (
     call,
     evaluate,
 )
-# Subcommands of former versions, and what replaces each.
+# Replacements of the subcommands of former versions.
 RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
@@ -64,7 +64,7 @@ Times are seconds from the start of the recording.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``cardbox``; return its exit code: 0, or 1 after an error told in words.
+    """Run ``cardbox``; return its exit code: 0, or 1 after an error that was printed.
 
     Raises:
         SystemExit: the arguments are wrong (code 2), or they ask for help or the version (code 0).
@@ -88,15 +88,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _interrupted(name)
     except BrokenPipeError:
-        # As in 'cardbox urdf MODEL.yaml | head': the reader has closed the pipe, which is no error.
+        # The reader has closed the pipe, as in 'cardbox urdf MODEL.yaml | head', which is no error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
         if were_received():
-            # What a signal interrupts may fail in its own way: ROS, an import.
+            # An interrupted call of ROS or an interrupted import may raise an error of its own.
             return _interrupted(name)
         if not isinstance(error, OSError):
             raise
-        # Such as a full disk. Files are written under another name first: none is left half done.
+        # This may be a full disk. Outputs are written atomically, so none is left incomplete.
         where = f"{error.filename}: " if error.filename else ""
         print(f"cardbox {name}: {where}{error.strerror or error}", file=sys.stderr)
         return 1
@@ -112,8 +112,8 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
     """Return the parser of ``cardbox``.
 
     Args:
-        words: what was typed. Only a subcommand among them gets its arguments, for their choices
-            may need slow imports. Without ``words``, all subcommands get theirs.
+        words: arguments of the command line. Only the subcommand among them gets its arguments,
+            since their choices may need slow imports; if None, all subcommands get theirs.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG
@@ -136,7 +136,7 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
-    """Mentions a default only where there is one."""
+    """Help formatter that shows a default only if there is one."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=26)

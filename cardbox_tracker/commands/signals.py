@@ -1,4 +1,4 @@
-"""What ends a command from outside ends it as Ctrl-C does: nothing half written is left."""
+"""Makes SIGTERM and SIGHUP end a command like Ctrl-C, without incomplete files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from types import FrameType
 
 from cardbox_tracker import interrupts
 
-# Of 'kill', a time limit or a shutdown; and of a terminal that is closed.
+# SIGTERM is sent by 'kill', a time limit or a shutdown, SIGHUP by a closed terminal.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
@@ -18,7 +18,7 @@ class Terminated(KeyboardInterrupt):
     """The process was asked to end by a signal other than Ctrl-C's.
 
     Attributes:
-        signal: its number.
+        signal: number of the signal.
     """
 
     def __init__(self, number: int) -> None:
@@ -29,7 +29,7 @@ class Terminated(KeyboardInterrupt):
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Raise :class:`Terminated` where a signal asks the process to end; ignored ones stay so."""
+    """Raise :class:`Terminated` on signals that end the process; ignored ones stay ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -26,7 +26,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 
 SPREAD = "within_two_deviations"
-"""Suffix of the entities with the uncertainty of a plot's joints."""
+"""Entity below a plot that contains the uncertainty of its joints."""
 
 
 # The viewpoint is beside the camera and looks at a person two metres before it.
