@@ -52,7 +52,6 @@ LONGER = (
     "estimation/filtering/whole_body_moves.py",
     "evaluation/paper/report.py",
 )
-MAX_NODE_LINES = 200
 
 
 @cache
@@ -230,13 +229,6 @@ def test_recordings_are_handled_without_rclpy() -> None:
     for folder in ("recordings", "simulation", "viewing"):
         for path in (SOURCES / folder).rglob("*.py"):
             assert not [n for n in imported_by(path) if n.split(".")[0] in ("rclpy", *MESSAGES)]
-
-
-@pytest.mark.parametrize(
-    "path", sorted((SOURCES / "ros" / "nodes").glob("*_node.py")), ids=lambda path: path.name
-)
-def test_nodes_are_thin(path: Path) -> None:
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_NODE_LINES
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,13 @@
 """How long the estimation takes: per image, per step, and ratios measured in one run.
 
-Everything runs in one process on one core unless a function says otherwise. What is compared takes
-turns of a few images, so that other load on the machine affects all of it.
+Everything runs in one process on one core. What is compared takes turns of a few images, so that
+other load on the machine affects all of it.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,7 +19,6 @@ from cardbox_tracker.benchmarks.tools import (
     WARM_UP,
     Times,
     extractor_of,
-    one_core,
     pinned,
     rss_mb,
     summary,
@@ -44,9 +42,9 @@ _MOST_S = 3.0
 def follow(
     scene: BenchmarkScene, config: TrackerConfig, cost: str = "compiled"
 ) -> Callable[[int], object]:
-    """Return what tracks the ``i``-th silhouette of ``scene``, the arms one after the other."""
+    """Return what tracks the ``i``-th silhouette of ``scene``."""
     made = make_silhouette_term(cost, scene.body, scene.camera)
-    tracker = Tracker(scene.body, scene.camera, one_core(config), silhouette=made)
+    tracker = Tracker(scene.body, scene.camera, config, silhouette=made)
     return partial(_track, tracker, scene)
 
 
@@ -79,7 +77,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
     ``image_to_posture`` also cuts the silhouette out of the image.
     """
     extractor = extractor_of(scene)
-    whole = Tracker(scene.body, scene.camera, one_core(paper_preset()))
+    whole = Tracker(scene.body, scene.camera, paper_preset())
     times = frame_times_ms(
         scene,
         {
@@ -101,7 +99,7 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
     As in a live node: while it waits, the processor slows down and its caches lose its data.
     """
     extractor = extractor_of(scene)
-    tracker = Tracker(scene.body, scene.camera, one_core(default_preset()))
+    tracker = Tracker(scene.body, scene.camera, default_preset())
     times: dict[bool, list[float]] = {True: [], False: []}
     for paused in (False, True):
         for image in scene.images:
@@ -113,27 +111,6 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
         "without_ms": float(np.median(times[False][WARM_UP:])),
         "with_ms": float(np.median(times[True][WARM_UP:])),
     }
-
-
-def measure_parallel(scene: BenchmarkScene) -> dict[str, Any]:
-    """Compare both arms at the same time with one after the other, on two cores.
-
-    With few particles, and with many, where it saves time.
-    """
-    result: dict[str, Any] = {}
-    with pinned(2) as cores:
-        for count in (600, 6000):
-            config = paper_preset().with_particles(count // 3)
-            both = Tracker(scene.body, scene.camera, replace(config, parallel_from=0))
-            times = frame_times_ms(
-                scene,
-                {
-                    "one after the other": follow(scene, config),
-                    "parallel": partial(_track, both, scene),
-                },
-            )
-            result[str(count)] = {name: summary(values) for name, values in times.items()}
-    return {"cores": cores, "particles": result}
 
 
 def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:
@@ -170,31 +147,27 @@ def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, flo
 
 def measure_particles(
     scene: BenchmarkScene, counts: tuple[int, ...] = PARTICLES
-) -> dict[str, dict[str, float]]:
-    """Measure a frame on one core and on two for several numbers of particles in all filters."""
-    result: dict[str, dict[str, float]] = {}
-    for cores, config in ((1, one_core(paper_preset())), (2, paper_preset())):
-        with pinned(cores):
-            for count in counts:
-                settings = config.with_particles(count // 3)
-                tracker = Tracker(scene.body, scene.camera, settings)
-                times: list[float] = []
-                for silhouette in scene.silhouettes:
-                    start = time.perf_counter()
-                    tracker.track(silhouette)
-                    times.append(1e3 * (time.perf_counter() - start))
-                    if len(times) > 2 * WARM_UP and sum(times) > 1e3 * _MOST_S:
-                        break
-                entry = result.setdefault(str(3 * (count // 3)), {})
-                entry[f"cores_{cores}_ms"] = float(np.median(times[WARM_UP:]))
+) -> dict[str, float]:
+    """Measure a frame for several numbers of particles in all filters: median by number, ms."""
+    result: dict[str, float] = {}
+    for count in counts:
+        config = paper_preset().with_particles(count // 3)
+        track = partial(_track, Tracker(scene.body, scene.camera, config), scene)
+        times: list[float] = []
+        for i in range(len(scene.silhouettes)):
+            start = time.perf_counter()
+            track(i)
+            times.append(1e3 * (time.perf_counter() - start))
+            if len(times) > 2 * WARM_UP and sum(times) > 1e3 * _MOST_S:
+                break
+        result[str(3 * (count // 3))] = float(np.median(times[WARM_UP:]))
     return result
 
 
-def particles_at_30hz(particles: dict[str, dict[str, float]]) -> int:
-    """Return how many particles two cores manage in 1/30 s, interpolated between those measured."""
+def particles_at_30hz(particles: dict[str, float]) -> int:
+    """Return how many particles a core manages in 1/30 s, interpolated between those measured."""
     counts = np.array([float(count) for count in particles])
-    times = np.array([entry["cores_2_ms"] for entry in particles.values()])
-    times = np.maximum.accumulate(times)
+    times = np.maximum.accumulate(np.array(list(particles.values())))
     if times[0] > FRAME_30HZ_MS:
         return 0
     return int(np.interp(FRAME_30HZ_MS, times, counts))
@@ -214,8 +187,7 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         scenes = [make_scene(w, h, max(2 * WARM_UP, frames // 3), 2) for w, h in RESOLUTIONS]
         resolutions = measure_resolutions(scenes)
         report(0.7)
-    parallel = measure_parallel(scene)
-    particles = measure_particles(scene)
+        particles = measure_particles(scene)
     report(1.0)
     frame = results["frames"]["paper"]
     double = resolutions["640x480"]["median_ms"] / resolutions["320x240"]["median_ms"]
@@ -230,7 +202,6 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         "frames": results["frames"],
         "after_pauses": pauses,
         "stages": stages,
-        "parallel_arms": parallel,
         "resolutions": resolutions,
         "particles": particles,
     }

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from cardbox_tracker.benchmarks.nodes import PERCENTILES
-from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.files import atomic_path
 
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
@@ -36,7 +35,7 @@ def report(results: Mapping[str, Any]) -> str:
         "# Benchmarks",
         f"Made by `{COMMAND}` on {results['cpu']} with {results['cores']} cores; {versions}; "
         f"commit {results['commit']}. Numbers: [benchmarks.json](benchmarks.json).",
-        "The first four tables were measured on one core unless they say otherwise, on "
+        "The first four tables were measured on one core, on "
         f"{results['measured_frames']} images (320x240) of a synthetic person who waves. What is "
         "compared takes turns of ten images. p95 is the 95th percentile.",
         "## One image",
@@ -62,15 +61,11 @@ def report(results: Mapping[str, Any]) -> str:
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
         "## Particles",
-        f"Two cores manage {results['particles_at_30hz']:,} particles per image at 30 Hz.",
+        f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
         _table(
-            ("particles in all filters", "one core", "two cores"),
-            [
-                (count, f"{times['cores_1_ms']:.2f} ms", f"{times['cores_2_ms']:.2f} ms")
-                for count, times in results["particles"].items()
-            ],
+            ("particles in all filters", "median"),
+            [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
         ),
-        _parallel(results["parallel_arms"]),
         *_nodes(results["nodes"]),
         "A live node waits between images; meanwhile the processor slows down and its caches lose "
         "the node's data. Image to posture, preset `default`, takes "
@@ -107,7 +102,7 @@ def readme_section(results: Mapping[str, Any]) -> str:
             ),
         ]
     rows.append(
-        ("particles per image that two cores manage at 30 Hz", f"{results['particles_at_30hz']:,}")
+        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}")
     )
     nodes = results["nodes"]
     for words, measured in (
@@ -161,19 +156,6 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
         f"Ready after: {ready} (from the start of the process, with compiled code in the cache). "
         f"Memory: {memory}.",
     ]
-
-
-def _parallel(times: Mapping[str, Any]) -> str:
-    parts = [
-        f"{measured['parallel']['median_ms']:.2f} instead of "
-        f"{measured['one after the other']['median_ms']:.2f} ms with {count} particles"
-        for count, measured in times["particles"].items()
-    ]
-    return (
-        f"With both arms at the same time on {times['cores']} cores an image takes "
-        f"{' and '.join(parts)}. The tracker does so from {TrackerConfig().parallel_from} "
-        "particles per arm on."
-    )
 
 
 def _mediapipe(results: Mapping[str, Any]) -> str:

@@ -81,7 +81,7 @@ def short_table(results: dict[str, Any]) -> str:
         f"cardbox against boxes               {results['ratio_volumetric']:.1f} times faster",
         f"against MediaPipe Pose              {_times(results['ratio_mediapipe'])}",
         f"twice the width and height          {results['ratio_double_resolution']:.2f} as long",
-        f"particles at 30 Hz, two cores       {results['particles_at_30hz']}",
+        f"particles at 30 Hz, one core        {results['particles_at_30hz']}",
         f"memory                              {results['rss_mb']:.0f} MB",
     ]
     nodes = results["nodes"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.benchmarks.scene import BenchmarkScene
-from cardbox_tracker.benchmarks.tools import WARM_UP, extractor_of, one_core, summary
+from cardbox_tracker.benchmarks.tools import WARM_UP, extractor_of, summary
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import TrackerConfig, paper_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
@@ -24,7 +24,7 @@ T = TypeVar("T")
 def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
     """Measure the steps of a frame one by one, on the particles of a tracker at work."""
     extractor = extractor_of(scene)
-    paper = one_core(paper_preset())
+    paper = paper_preset()
     term = CompiledSilhouette(scene.body, scene.camera)
     filters = _Filters(paper, scene, term)
     times: dict[str, list[float]] = {}

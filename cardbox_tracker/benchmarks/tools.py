@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.benchmarks.scene import BenchmarkScene
-from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 
 WARM_UP = 5
@@ -39,11 +37,6 @@ def summary(milliseconds: Times | list[float]) -> dict[str, float]:
         "median_ms": float(np.median(milliseconds)),
         "p95_ms": float(np.percentile(milliseconds, 95)),
     }
-
-
-def one_core(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` with the arms one after the other."""
-    return replace(config, parallel_from=None)
 
 
 def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:

@@ -24,6 +24,16 @@ REFERENCES = {
 """Reference postures by name, with the description for the person."""
 
 
+def add_retired(parser: argparse.ArgumentParser, flag: str, instead: str) -> None:
+    """Refuse the option ``flag`` of a former version; ``instead`` says what to do or expect."""
+
+    class Refuse(argparse.Action):
+        def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+            parser.error(f"{flag} was removed: {instead}")
+
+    parser.add_argument(flag, action=Refuse, nargs="?", help=argparse.SUPPRESS)
+
+
 def add_recording(
     parser: argparse.ArgumentParser, required: bool = True, needs_background: bool = True
 ) -> None:

@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     add_depth,
     add_preset,
     add_recording,
+    add_retired,
     add_seed,
     background_of,
     particle_count,
@@ -87,11 +88,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
         metavar="N",
         help="particles of each of the three filters; without it, the preset's",
     )
-    parser.add_argument(
-        "--refine-sizes",
-        action="store_true",
-        help="refine the breadths while tracking, slowly and near the model's",
-    )
+    add_retired(parser, "--refine-sizes", "breadths stay as they were measured")
     add_seed(parser, "the filters")
 
 
@@ -186,9 +183,7 @@ def _config(options: argparse.Namespace) -> TrackerConfig:
     from cardbox_tracker.estimation.config import PRESETS
     from cardbox_tracker.estimation.cost.depth import Depth
 
-    config = replace(
-        PRESETS[options.preset](), strategy=options.strategy, refine_sizes=options.refine_sizes
-    )
+    config = replace(PRESETS[options.preset](), strategy=options.strategy)
     if options.depth is not None:
         config = replace(config, terms=(*config.terms, Depth()))
     if options.particles is None:

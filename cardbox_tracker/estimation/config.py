@@ -69,7 +69,7 @@ class TrackerConfig:
         whole_body: settings of the filter ``whole_body``.
 
     The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
-    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``refine_sizes`` and
+    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``lost_iou`` and
     ``lost_frames``.
     """
 
@@ -87,9 +87,6 @@ class TrackerConfig:
         "drs", "resampling strategy of the filters", choices=tuple(STRATEGIES), restarts=True
     )
     cycles: int = setting(1, "estimation cycles an image", limits=(1, 100))
-    noise_decay: float = setting(
-        1.0, "factor on the noise from one cycle of an image to the next", limits=(0.0, 1.0)
-    )
     terms: tuple[TermSettings, ...] = ()
     whole_body: WholeBodyConfig = WholeBodyConfig()
     average: int = setting(
@@ -98,24 +95,11 @@ class TrackerConfig:
         limits=(1, 1_000_000),
         restarts=True,
     )
-    explore: float = setting(
-        0.0,
-        "fraction of the arms' particles drawn from anywhere within the joint limits, so that an "
-        "arm that was lost is found again",
-        limits=(0.0, 0.9),
-    )
     # Rated alone, the torso leans forward to cover the upper arms.
     torso_beside_arms: bool = setting(
         True,
         "rate a torso beside the arms found last, where they are in the image, so that the whole "
         "model is drawn as in equation (2)",
-        restarts=True,
-    )
-    # With fewer, waking the other thread costs more than it saves.
-    parallel_from: int | None = setting(
-        500,
-        "arms of this many particles or more are estimated in two threads; None: never",
-        limits=(0, 1_000_000),
         restarts=True,
     )
     relocalize: bool = setting(
@@ -125,12 +109,6 @@ class TrackerConfig:
         False,
         "only the parts of the silhouette count that can be the person, not a door, a chair or "
         "somebody who passes by",
-        restarts=True,
-    )
-    refine_sizes: bool = setting(
-        False,
-        "breadths of trunk, arms and head are refined while tracking, slowly and near the measured "
-        "ones; with the filter whole_body and one camera",
         restarts=True,
     )
     lost_iou: float = setting(

@@ -39,7 +39,6 @@ from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.further_camera import FurtherCamera
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.estimation.sampling import likely_postures
-from cardbox_tracker.estimation.size_refinement import SizeRefinement
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
@@ -69,9 +68,8 @@ class Tracker:
         """Set up for ``body``; the camera is pitched as the body model says.
 
         Args:
-            body: the person. What is unknown of them is fitted while tracking, and with
-                ``refine_sizes`` their breadths are refined; either replaces the attribute
-                ``body``. Until what is unknown is known, no estimate is better than ``uncertain``.
+            body: the person. What is unknown of them is fitted while tracking, which replaces
+                the attribute ``body``. Until then, no estimate is better than ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
@@ -99,7 +97,6 @@ class Tracker:
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next silhouette on."""
         self.body, self._silhouette = body, silhouette
-        self._refinement: SizeRefinement | None = None
         self._terms = self._built(self.config)
         self._further = [
             FurtherCamera(body, self.camera, other, self.config) for other in self._others
@@ -107,15 +104,6 @@ class Tracker:
         views = [further.view for further in self._further]
         self.agreement = CameraAgreement(body, self.camera, views) if views else None
         self.reset()
-
-    def _refine(self) -> None:
-        """Let the last frame, which was sure, say what it does of the sizes."""
-        if self._refinement is None or not isinstance(self._filter, WholeBodyFilter):
-            return
-        if (body := self._refinement.add(*self._filter.best())) is not None:
-            self.body, self._silhouette = body, CompiledSilhouette(body, self.camera)
-            self._terms = self._built(self.config)
-            self._filter.use_body(self._silhouette)
 
     def _built(self, config: TrackerConfig) -> list[Term]:
         return [settings.build(self.body, self.camera) for settings in config.terms]
@@ -129,12 +117,6 @@ class Tracker:
             further.reset(self.config)
         self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
         self._region = PersonRegion(self.body, self.camera) if self.config.select_person else None
-        is_refined = self.config.refine_sizes and not (self._others or self.body.unknown)
-        if not is_refined:
-            self._refinement = None
-        elif self._refinement is None and isinstance(self._filter, WholeBodyFilter):
-            cost = self.config.whole_body.cost
-            self._refinement = SizeRefinement(self.body, self.camera, cost)
         self._poor_frames = 0
         self._stamp_ns: int | None = None
         self._particles: Particles | None = None
@@ -291,8 +273,6 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
-        if not fit.is_uncertain and not fit.is_poor:
-            self._refine()
         if self.agreement is not None and fit.offset_m is not None:
             seen = [other.silhouette for other in self._others_now]
             self.agreement.see(self._before, frame.silhouette, seen)

@@ -16,7 +16,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.errors import BagError, cut
-from cardbox_tracker.recordings.bag_limits import check_sizes
+from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.encodings import (
@@ -107,7 +107,8 @@ class BagReader:
                     f"{path} is not a rosbag2 recording (it has no metadata.yaml); give the folder "
                     "that 'ros2 bag record' or 'cardbox synthesize' made"
                 )
-        check_sizes(path)
+        check_recording(path)
+        limit_decompression()
         try:
             store = get_typestore(Stores.ROS2_JAZZY)
             self._reader = AnyReader([path], default_typestore=store)

@@ -28,7 +28,7 @@ def test_the_paper_preset_is_table_one() -> None:
     assert (config.torso.sigma_gamma_px, config.arm.sigma_gamma_px) == (8000.0, 4000.0)
     assert config.strategy == "drs"
     # One cycle a frame whose best particle is the result, and nothing else.
-    assert (config.cycles, config.average, config.terms, config.explore) == (1, 1, (), 0.0)
+    assert (config.cycles, config.average, config.terms) == (1, 1, ())
     assert not config.relocalize and not config.select_person
 
 
@@ -80,9 +80,7 @@ def test_a_filter_value_out_of_range_is_named(name: str, values: tuple[float, ..
     ("name", "values"),
     [
         ("cycles", (0, -1, 101)),
-        ("noise_decay", (-0.1, 1.1)),
         ("average", (0, -3, 201)),
-        ("explore", (-0.1, 0.91)),
         ("lost_iou", (-0.1, 1.1)),
         ("lost_frames", (0, -1)),
     ],

@@ -70,7 +70,8 @@ class Cycles:
         seen = self._term.observe(self._frame)
         observation = SumOfTerms((seen, *(term.observe(self._frame) for term in terms)))
         if self._started:
-            self._iterate(observation)
+            for _ in range(self._config.cycles):
+                self.hierarchy.iterate(observation)
         else:
             self._start(observation)
         posture = self.hierarchy.estimate()
@@ -80,12 +81,6 @@ class Cycles:
         stddev = self.hierarchy.stddev()
         return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, posture, iou)
 
-    def _iterate(self, observation: SumOfTerms) -> None:
-        """Run the cycles of one frame, with falling noise; the first one explores."""
-        for cycle in range(self._config.cycles):
-            explore = self._config.explore if cycle == 0 else 0.0
-            self.hierarchy.iterate(observation, self._config.noise_decay**cycle, explore)
-
     def _start(self, observation: SumOfTerms) -> None:
         """Start around the front reference where the person stands, then settle."""
         self._started = True
@@ -94,9 +89,8 @@ class Cycles:
             reference[0] = self._lateral_m(self._frame.silhouette)
         self.hierarchy.initialize(observation, clip_to_limits(reference))
         if self._config.relocalize:
-            for cycle in range(_RECOVERY_CYCLES):
-                noise_scale = _RECOVERY_NOISE * self._config.noise_decay**cycle
-                self.hierarchy.iterate(observation, noise_scale)
+            for _ in range(_RECOVERY_CYCLES):
+                self.hierarchy.iterate(observation, _RECOVERY_NOISE)
 
     def _lateral_m(self, silhouette: Silhouette) -> float:
         """``torso_y`` under which the silhouette's median column lies."""

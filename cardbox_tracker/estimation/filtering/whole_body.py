@@ -59,7 +59,7 @@ class WholeBodyFilter:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
         self._config = c = config.whole_body
         self._rng, self._lost_iou = rng, config.lost_iou
-        self.use_body(silhouette)
+        self._use_body(silhouette)
         self._sigma = c.noise()
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[4:12] = 0.0
@@ -68,18 +68,14 @@ class WholeBodyFilter:
         self._reference[0] = self._body.placement.lateral_m
         self.forget()
 
-    def use_body(self, silhouette: SilhouetteTerm) -> None:
-        """Go on with another body from the next frame on, or begin with it."""
+    def _use_body(self, silhouette: SilhouetteTerm) -> None:
+        """Prepare rating and refinement for the body of ``silhouette``."""
         self._body = silhouette.body
         self._one = WholeBodyCost(silhouette.body, silhouette.camera, self._config.cost)
         self._cost: WholeBodyCost | MultiViewCost = self._one
         self.refine = Refinement(self._one, silhouette.camera, self._config)
         # From the hips to the torso's top: about where the shoulders are.
         self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
-
-    def best(self) -> tuple[WholeBodyCost, FloatArray]:
-        """Return what has rated the last frame, of the first camera, and the best state (14,)."""
-        return self._one, self.states[int(np.argmin(self.ratings))]
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""

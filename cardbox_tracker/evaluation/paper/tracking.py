@@ -69,9 +69,9 @@ class Runs:
 
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` changed so that no image is left out and a run stays in one thread."""
+    """Return ``config`` changed so that no image is left out."""
     never_lost = replace(config.whole_body, lost_from=1.0, largest_person=1000.0)
-    return replace(config, lost_iou=0.0, parallel_from=None, whole_body=never_lost)
+    return replace(config, lost_iou=0.0, whole_body=never_lost)
 
 
 def tasks_of(setting: Setting, runs: int, effort: float) -> list[Task]:

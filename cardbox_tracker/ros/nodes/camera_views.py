@@ -21,9 +21,9 @@ from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
-from cardbox_tracker.ros.runtime.stream import StreamStatistics
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
+from cardbox_tracker.vision.stamps import StreamStatistics
 
 _SILENT_S = 3.0
 # The stamps of cameras are compared only while all of them send: one that pauses is behind.

@@ -28,9 +28,9 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.stream import Step
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.stamps import StampOrder
 
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 
@@ -150,7 +150,7 @@ class TrackerNode(CardboxNode):
         """Return whether a silhouette can be used; one of a time before starts tracking anew."""
         self._now_ns = conversions.stamp_ns(message.header.stamp)
         step = self.diagnostics.input.add(self._now_ns)
-        if step is Step.RESTART:
+        if step is StampOrder.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
         return step.is_usable
 

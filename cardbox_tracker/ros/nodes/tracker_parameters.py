@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
@@ -54,6 +55,10 @@ def _chosen(text: str, preset: bool) -> bool:
 class TrackerParameters(NodeParameters):
     """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
 
+    retired = MappingProxyType(
+        {"refine_sizes": "breadths stay as they were measured; for others measure again"}
+    )
+
     preset: str = parameter(
         "default",
         "paper: its Table I; default: what tracks best",
@@ -87,7 +92,6 @@ class TrackerParameters(NodeParameters):
     select_person: str = shared(
         TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")
     )
-    refine_sizes: bool = shared(TrackerConfig, "refine_sizes")
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
     seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1), effect=_NEXT_START)
@@ -151,7 +155,6 @@ class TrackerParameters(NodeParameters):
             average=self.average or base.average,
             relocalize=_chosen(self.relocalize, base.relocalize),
             select_person=_chosen(self.select_person, base.select_person),
-            refine_sizes=self.refine_sizes,
             lost_iou=self.lost_iou,
             lost_frames=self.lost_frames,
         )

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
-from cardbox_tracker.ros.runtime.stream import WINDOW, StreamStatistics
+from cardbox_tracker.vision.stamps import WINDOW, StreamStatistics
 
 PERIOD_S = 1.0
 # Without input for so long, and for so many periods, it has ceased.

@@ -6,8 +6,10 @@ does while the node runs; one made by :func:`shared` takes most of that from a s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, get_type_hints
+from types import MappingProxyType
+from typing import Any, ClassVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
@@ -74,7 +76,13 @@ def shared(kind: Any, name: str, **changes: Any) -> Any:
 
 @dataclass(frozen=True)
 class NodeParameters:
-    """Base of the parameter dataclasses; every field is made by :func:`parameter`."""
+    """Base of the parameter dataclasses; every field is made by :func:`parameter`.
+
+    Attributes:
+        retired: names of former versions, and what to do instead of giving each.
+    """
+
+    retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
         """Raise ValueError where values do not go together; ranges are checked before."""

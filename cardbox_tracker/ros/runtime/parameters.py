@@ -132,11 +132,13 @@ class LiveParameters(Generic[T]):
     def _warn_of_unknown(self) -> None:
         """Say which names given at the start are no parameters: ROS leaves them out without a word.
 
-        No error, for a file may be for several nodes.
+        No error, for a file may be for several nodes; only what was one of this node is refused.
         """
         # rclpy has no public name for what was given.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:
+            if name in self._kind.retired:
+                raise self._refusal(f"'{name}' was removed: {self._kind.retired[name]}")
             if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
             near = difflib.get_close_matches(name, self._specs, 1)

@@ -16,7 +16,7 @@ from cardbox_tracker.ros.runtime.diagnostics import (
     WORKING,
     NodeDiagnostics,
 )
-from cardbox_tracker.ros.runtime.stream import Step, StreamStatistics
+from cardbox_tracker.vision.stamps import StampOrder, StreamStatistics
 
 PERIOD_NS = 66_666_667
 
@@ -64,9 +64,9 @@ def test_the_period_is_that_of_the_latest_stamps() -> None:
 
 def test_stamps_that_go_back_are_noticed() -> None:
     statistics = fed(list(range(40)))
-    assert statistics.add(1_000_000_000) is Step.RESTART
+    assert statistics.add(1_000_000_000) is StampOrder.RESTART
     assert statistics.out_of_order == 1
-    assert statistics.add(1_000_000_000 + PERIOD_NS) is Step.NEXT
+    assert statistics.add(1_000_000_000 + PERIOD_NS) is StampOrder.NEXT
 
 
 def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callable) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, get_type_hints
 
 import pytest
@@ -15,13 +15,11 @@ from rclpy.parameter import Parameter
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
-from cardbox_tracker.ros.nodes.node_parameters import (
-    NODES,
-    BackgroundParameters,
-    InitializerParameters,
-    TrackerParameters,
-)
+from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
     NEXT_IMAGE,
     RESTARTS,
@@ -39,6 +37,8 @@ ROOT = Path(__file__).resolve().parents[3]
 @dataclass(frozen=True)
 class Sample(NodeParameters):
     """Parameters of a test."""
+
+    retired = MappingProxyType({"middle": "give low and high"})
 
     low: float = parameter(1.0, "lower end", unit="m", limits=(0.0, 10.0))
     high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
@@ -73,6 +73,11 @@ def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     assert len(said) == 2
     assert all(name in said[0] for name in ("'lo'", "'tested'", "'low'"))
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
+
+
+def test_a_name_of_a_former_version_is_refused_with_what_to_do(make_node: Callable) -> None:
+    with pytest.raises(CardboxError, match=r"middle.*removed.*give low and high"):
+        LiveParameters(make_node("-p", "middle:=1.5"), Sample)
 
 
 def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:

@@ -6,11 +6,9 @@ import threading
 
 import pytest
 
-pytest.importorskip("rclpy", reason="rclpy is not installed")
-
 from cardbox_tracker.errors import InitializationError
+from cardbox_tracker.estimation.initialization.cancellation import Cancellation
 from cardbox_tracker.estimation.initialization.guidance import CANCELLED, FAILED, FINISHED
-from cardbox_tracker.ros.nodes.cancellation import Cancellation
 
 
 def test_without_an_initialization_there_is_nothing_to_cancel() -> None:

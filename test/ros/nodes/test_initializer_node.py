@@ -14,8 +14,8 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.estimation.initialization.guidance import BAD, GOOD, Step
 from cardbox_tracker.ros.messages.conversions import image_message
-from cardbox_tracker.ros.nodes.guide_outputs import GuideOutputs
-from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.initializer_node import GuideOutputs
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(80, 60, 80.0, 80.0, 39.5, 29.5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,13 +16,12 @@ from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
-from cardbox_tracker.body.model_file import load_body_model, save_body_model  # noqa: E402
+from cardbox_tracker.body.model_file import load_body_model  # noqa: E402
 from cardbox_tracker.body.posture import REFERENCE_NAMES  # noqa: E402
 from cardbox_tracker.errors import CardboxError  # noqa: E402
 from cardbox_tracker.estimation.initialization.config import InitializationResult  # noqa: E402
 from cardbox_tracker.ros.nodes import initializer_node, second_camera  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
-from cardbox_tracker.ros.nodes.saved_model import SavedModel  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
 
@@ -37,49 +35,6 @@ def context(ros_domain: int) -> Iterator[Context]:
     rclpy.init(context=context, domain_id=ros_domain)
     yield context
     context.try_shutdown()
-
-
-@pytest.mark.promise("A model_file that cannot be used is told when the node starts")
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("fifo", "no file"),
-        ("/dev/zero", "no file"),
-        ("/dev/null", "no file"),
-        (".", "Is a directory"),
-        ("missing/model.yaml", "No such file .*; choose a folder"),
-        ("text/model.yaml", "Not a directory"),
-        ("n" * 300, "File name too long"),
-        ("~nobody-here/model.yaml", "user"),
-        ("text", "mapping"),
-    ],
-)
-def test_what_cannot_be_used_is_told_at_the_start(name: str, words: str, tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "fifo")
-    (tmp_path / "text").write_text("no model")
-    with pytest.raises(CardboxError, match=words):
-        SavedModel(name if name.startswith("~") else str(tmp_path / name))
-
-
-def test_a_file_that_is_there_is_read_and_one_that_is_not_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "model.yaml"
-    saved = SavedModel(str(path))
-    assert saved.body is None and not saved.warning
-    assert saved.save(BODY) == f"; saved to {path}"
-    assert SavedModel(str(path)).body == BODY
-    none = SavedModel("")
-    assert none.body is None and none.save(BODY) == ""
-
-
-def test_a_file_that_can_only_be_read_is_used_with_a_warning(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    save_body_model(BODY, tmp_path / "model.yaml")
-    # Root may write everywhere.
-    monkeypatch.setattr("cardbox_tracker.files.os.access", lambda *_: False)
-    saved = SavedModel(str(tmp_path / "model.yaml"))
-    assert saved.body == BODY
-    assert "Permission denied" in saved.warning and "will not be saved" in saved.warning
 
 
 @pytest.mark.parametrize("make", [TrackerNode, initializer_node.InitializerNode, CameraNode])

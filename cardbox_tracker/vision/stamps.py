@@ -1,25 +1,25 @@
-"""What the stamps of a stream of images say: what is next, what was lost, what is out of order.
+"""Order and losses of a stream of images, judged by their stamps.
 
-Time is the image's stamp. A camera that sets none, or one whose clock jumps, must neither stop the
-nodes nor make tracking start again with every image.
+A camera that sets no stamps, or one whose clock jumps, must neither stop the nodes nor make
+tracking start again with every image.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections import deque
+from collections import Counter, deque
 from enum import Enum
 
 WINDOW = 120
 _PAUSE_NS = 2_000_000_000
 # Further back than the network reorders messages: the source has started again.
 _RESTART_NS = 1_000_000_000
-# So many images of one clock in a row, and the other clock is forgotten.
+# After this many images of one clock in a row the other clock is forgotten.
 _PATIENCE = 5
 
 
-class Step(Enum):
-    """How an image follows the one before."""
+class StampOrder(Enum):
+    """How the stamp of an image follows the one before."""
 
     NEXT = "later than the one before, or the first"
     GAP = "more than two seconds later"
@@ -31,15 +31,16 @@ class Step(Enum):
 
     @property
     def is_usable(self) -> bool:
-        """False for an image that must not be taken for a later one."""
-        return self not in (Step.LATE, Step.REPEATED, Step.FOREIGN)
+        """Whether the image may be processed as the next one."""
+        return self not in (StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
 
 
-class StampOrder:
-    """Says of each stamp how it follows those before.
+class StampSequence:
+    """Classifies each stamp by those before it.
 
-    A jump is followed at once. If the next image is of the time before the jump, that goes on, and
-    images of the other time are foreign: two publishers with different clocks, or one wrong stamp.
+    A jump is followed at once. If the next image continues the time before the jump, that time goes
+    on and images of the other time are foreign: two publishers with different clocks, or one wrong
+    stamp.
     """
 
     def __init__(self) -> None:
@@ -50,32 +51,32 @@ class StampOrder:
         self._has_jumped = False
         self._foreign = 0
 
-    def see(self, stamp_ns: int) -> Step:
-        """Take the next stamp; 0 stands for none."""
+    def add(self, stamp_ns: int) -> StampOrder:
+        """Return how the next stamp follows; 0 stands for none."""
         if stamp_ns == 0:
-            return Step.UNSTAMPED
+            return StampOrder.UNSTAMPED
         last_ns = self._last_ns
         if last_ns is None:
             self._last_ns = stamp_ns
-            return Step.NEXT
+            return StampOrder.NEXT
         spacing_ns = stamp_ns - last_ns
         if -_RESTART_NS <= spacing_ns < _PAUSE_NS:
             self._foreign, self._has_jumped = 0, False
             if spacing_ns <= 0:
-                return Step.LATE if spacing_ns else Step.REPEATED
+                return StampOrder.LATE if spacing_ns else StampOrder.REPEATED
             self._last_ns = stamp_ns
-            return Step.NEXT
+            return StampOrder.NEXT
         if self._has_jumped and self._left_ns is not None:
             if 0 < stamp_ns - self._left_ns < _PAUSE_NS:
                 self._has_jumped, self._left_ns, self._last_ns = False, last_ns, stamp_ns
-                return Step.NEXT
+                return StampOrder.NEXT
         elif self._is_foreign(stamp_ns):
-            return Step.FOREIGN
+            return StampOrder.FOREIGN
         self._has_jumped, self._left_ns, self._last_ns = True, last_ns, stamp_ns
-        return Step.GAP if spacing_ns > 0 else Step.RESTART
+        return StampOrder.GAP if spacing_ns > 0 else StampOrder.RESTART
 
     def _is_foreign(self, stamp_ns: int) -> bool:
-        """Whether a stamp goes on where those before the jump have ended."""
+        """Return whether a stamp continues those before the jump."""
         left_ns = self._left_ns
         if left_ns is None or not -_RESTART_NS <= stamp_ns - left_ns < _PAUSE_NS:
             return False
@@ -89,37 +90,37 @@ class StampOrder:
 
 
 class StreamStatistics:
-    """Counts the messages of one stream, and by their stamps those that never arrived."""
+    """Counts the messages of a stream and, by their stamps, those that never arrived."""
 
     def __init__(self) -> None:
         """Start with nothing received."""
         self.received = 0
         self.dropped = 0
-        self.counts: dict[Step, int] = dict.fromkeys(Step, 0)
-        self._order = StampOrder()
+        self.counts: dict[StampOrder, int] = dict.fromkeys(StampOrder, 0)
+        self._sequence = StampSequence()
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
         # The same, sorted: the period is needed with every image.
         self._ordered_ns: list[int] = []
-        self._latest: deque[Step] = deque(maxlen=WINDOW)
+        self._latest: deque[StampOrder] = deque(maxlen=WINDOW)
 
-    def add(self, stamp_ns: int) -> Step:
+    def add(self, stamp_ns: int) -> StampOrder:
         """Count a message of that stamp and return how it follows those before."""
         self.received += 1
-        step = self._order.see(stamp_ns)
-        self.counts[step] += 1
-        self._latest.append(step)
-        if not step.is_usable or step is Step.UNSTAMPED:
-            return step
+        order = self._sequence.add(stamp_ns)
+        self.counts[order] += 1
+        self._latest.append(order)
+        if not order.is_usable or order is StampOrder.UNSTAMPED:
+            return order
         last_ns, self._last_ns = self._last_ns, stamp_ns
-        if step is Step.RESTART:
+        if order is StampOrder.RESTART:
             self._spacings_ns.clear()
             self._ordered_ns.clear()
-        elif step is Step.NEXT and last_ns is not None:
+        elif order is StampOrder.NEXT and last_ns is not None:
             self._note(spacing_ns := stamp_ns - last_ns)
             if len(self._spacings_ns) >= 5:
                 self.dropped += max(round(spacing_ns / self.period_ns) - 1, 0)
-        return step
+        return order
 
     def _note(self, spacing_ns: int) -> None:
         if len(self._spacings_ns) == WINDOW:
@@ -129,8 +130,11 @@ class StreamStatistics:
 
     @property
     def out_of_order(self) -> int:
-        """How many were not later than the one before."""
-        return sum(self.counts[s] for s in (Step.RESTART, Step.LATE, Step.REPEATED, Step.FOREIGN))
+        """Number of messages that were not later than the one before."""
+        return sum(
+            self.counts[s]
+            for s in (StampOrder.RESTART, StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
+        )
 
     @property
     def period_ns(self) -> int:
@@ -149,33 +153,30 @@ class StreamStatistics:
         return max(1.0 - len(self._spacings_ns) / expected, 0.0)
 
     def remarks(self) -> dict[str, str]:
-        """Return what is wrong with the stamps of the latest images, by kind; nothing if they fit.
-
-        One image that came late is not worth a word.
-        """
+        """Return the faults of the latest stamps, a text by kind; a single late image is none."""
         texts = {}
-        latest = {step: self._latest.count(step) for step in Step}
-        few = len(self._latest) // 10 + 1
-        if latest[Step.UNSTAMPED]:
+        latest = Counter(self._latest)
+        count = len(self._latest)
+        if latest[StampOrder.UNSTAMPED]:
             texts["stamps that are zero"] = (
                 "the images have no stamp (it is zero), so they are used in the order of arrival "
                 "and losses are not seen; set header.stamp in the camera's driver"
             )
-        if latest[Step.REPEATED] > few:
+        if latest[StampOrder.REPEATED] > count // 10 + 1:
             texts["stamps that repeat"] = (
-                f"{latest[Step.REPEATED]} of the latest {len(self._latest)} images repeat the "
-                "stamp of the one before and are left out; does the driver send them twice, or are "
-                "there two publishers?"
+                f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
+                "the one before and are left out; does the driver send them twice, or are there "
+                "two publishers?"
             )
-        if latest[Step.FOREIGN]:
+        if latest[StampOrder.FOREIGN]:
             texts["stamps of two clocks"] = (
                 "the stamps jump to and fro between two times, and images of one of them are left "
                 "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
             )
-        if latest[Step.RESTART] > 2:
+        if latest[StampOrder.RESTART] > 2:
             texts["stamps that go back"] = (
-                f"the stamps of the latest {len(self._latest)} images went back "
-                f"{latest[Step.RESTART]} times by more than a second, and tracking started again "
-                "each time; is the clock of the camera's computer being set?"
+                f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
+                "times by more than a second, and tracking started again each time; is "
+                "the clock of the camera's computer being set?"
             )
         return texts
