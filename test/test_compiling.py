@@ -144,7 +144,7 @@ def test_a_folder_that_somebody_planted_is_not_used(
         assert compiling.njit(cache=True)(triple)(14) == 42
     assert not list(nowhere.parent.rglob("*.nb*"))
     (record,) = caplog.records
-    assert "set NUMBA_CACHE_DIR to a folder that only you can write to" in record.message
+    assert "set NUMBA_CACHE_DIR" in record.message
 
 
 def test_a_full_disk_does_not_end_it(

@@ -1,4 +1,4 @@
-"""The ``cardbox`` command: its subcommands, and what it does when one of them fails."""
+"""The ``cardbox`` command: parses the arguments, runs a subcommand and reports its errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cardbox_tracker.commands import (
 from cardbox_tracker.commands.command import Command
 from cardbox_tracker.errors import CardboxError
 
-# In the order of 'cardbox --help'.
+# The order is that of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
     demo,
     synthesize,
@@ -43,7 +43,7 @@ COMMANDS: tuple[Command, ...] = (
     call,
     evaluate,
 )
-# Subcommands of former versions, and what replaces each.
+# Replacements of the subcommands of former versions.
 RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _interrupted(name)
     except BrokenPipeError:
-        # As in 'cardbox urdf MODEL.yaml | head': the reader has closed the pipe, which is no error.
+        # The reader has closed the pipe, as in 'cardbox urdf MODEL.yaml | head', which is no error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
         if interrupts.received():
@@ -92,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _interrupted(name)
         if not isinstance(error, OSError):
             raise
-        # Such as a full disk. Files are written under another name first: none is left half done.
+        # This may be a full disk. Outputs are written atomically, so none is left incomplete.
         where = f"{error.filename}: " if error.filename else ""
         print(f"cardbox {name}: {where}{error.strerror or error}", file=sys.stderr)
         return 1
@@ -110,8 +110,8 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
     """Return the parser of ``cardbox``.
 
     Args:
-        words: what was typed. Only a subcommand among them gets its arguments, for their choices
-            may need slow imports. Without ``words``, all subcommands get theirs.
+        words: arguments of the command line. Only the subcommand among them gets its arguments,
+            since their choices may need slow imports; if None, all subcommands get theirs.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG
@@ -134,7 +134,7 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
-    """Mentions a default only where there is one."""
+    """Help formatter that shows a default only if there is one."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=26)

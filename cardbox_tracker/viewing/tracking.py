@@ -1,4 +1,4 @@
-"""A recording that is tracked while it is shown."""
+"""Shows a recording while it is tracked."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _SCALE = 2
 
 
 class ShownTracking:
-    """Shows each image; an observer of :func:`~cardbox_tracker.recordings.track.track_recording`.
+    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that shows each image.
 
     Attributes:
-        count: images that have a posture.
+        count: number of images with a posture.
     """
 
     def __init__(self, feed: Feed) -> None:
-        """Begin."""
+        """Start with no images."""
         self._feed = feed
         self._described: object = None
         self.count = 0

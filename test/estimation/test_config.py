@@ -42,8 +42,8 @@ def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected more than the 58 special ones"),
-        ({"fresh_torsos": 17}, "fresh_torsos, torso_explorers and torsos are 17, 16, 70"),
+        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected .*58"),
+        ({"fresh_torsos": 17}, "fresh_torsos, .*17, 16, 70"),
         ({"best_torsos": 71}, "best_torsos is 71; expected 1 to 70"),
         ({"alike": 33}, "alike is 33; expected 1 to 32"),
     ],
@@ -92,7 +92,7 @@ def test_a_tracker_value_out_of_range_is_named(name: str, values: tuple[float, .
 
 
 def test_an_unknown_strategy_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"strategy is 'best'; expected one of drs, srs"):
+    with pytest.raises(ValueError, match=r"strategy .*'best'; .*drs, srs"):
         TrackerConfig(strategy="best")
 
 

@@ -268,7 +268,7 @@ def test_a_second_camera_measures_how_far_away_the_person_is(guessed: float) -> 
     found = measured_scale(scaled(BODY, guessed), CAMERA, OTHER, references)
     assert found * guessed == pytest.approx(1.0, abs=0.02)
     nobody = {"front": np.zeros((120, 160), np.uint8)}
-    with pytest.raises(InitializationError, match="does not show the person"):
+    with pytest.raises(InitializationError, match="not show the person"):
         measured_scale(BODY, CAMERA, OTHER, nobody)
 
 
@@ -292,12 +292,12 @@ def test_depth_images_measure_how_far_away_the_person_is(guessed: float) -> None
 
 
 def test_depth_images_of_something_else_are_refused() -> None:
-    with pytest.raises(InitializationError, match="at no distance at which the silhouettes do"):
+    with pytest.raises(InitializationError, match="at no distance"):
         depth_scale(BODY, CAMERA, seen_with_depth(-20.0))
     unknown = {
         name: one._replace(depth_m=0 * one.depth_m) for name, one in seen_with_depth(0).items()
     }
-    with pytest.raises(InitializationError, match="know 0 pixels of the person; expected 100"):
+    with pytest.raises(InitializationError, match=r"0 pixels .*100"):
         depth_scale(BODY, CAMERA, unknown)
 
 

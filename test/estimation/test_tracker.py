@@ -311,7 +311,7 @@ def test_the_camera_is_pitched_as_the_body_model_says() -> None:
 @pytest.mark.parametrize("shape", [(120, 161), (160, 120), (240, 320)])
 def test_a_silhouette_of_another_size_is_refused(shape: tuple[int, int]) -> None:
     tracker = make()
-    with pytest.raises(ValueError, match=r"silhouette has shape .* camera's is \(120, 160\)"):
+    with pytest.raises(ValueError, match=r"silhouette .*\(120, 160\)"):
         tracker.track(np.zeros(shape, np.uint8))
     # It changes nothing for the next one.
     assert_same(tracker.track(seen(front())), make().track(seen(front())))
@@ -450,7 +450,7 @@ def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> N
 
 
 def test_an_image_of_another_size_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"image has shape \(60, 80, 3\); the camera's is"):
+    with pytest.raises(ValueError, match=r"image .*\(60, 80, 3\)"):
         make().track(seen(front()), np.zeros((60, 80, 3), np.uint8))
 
 

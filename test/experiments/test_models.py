@@ -96,7 +96,7 @@ def test_a_volumetric_model_covers_the_cardbox(session: Session) -> None:
 
 def test_a_silhouette_of_another_size_is_refused(session: Session) -> None:
     term = PlaneSilhouette(MODELS["cardbox"], session.body, session.camera)
-    with pytest.raises(ValueError, match="silhouette has shape"):
+    with pytest.raises(ValueError, match=r"silhouette .*shape"):
         term.look(np.zeros((5, 5), np.uint8))
 
 

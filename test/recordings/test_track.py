@@ -109,7 +109,7 @@ def test_a_reference_outside_of_the_recording_is_refused(
     recording: Any, source: SilhouetteSource
 ) -> None:
     spans = {name: TimeSpan(7.0, 8.0) for name in ("front", "side")} | {"arms": TimeSpan(70, 80)}
-    with pytest.raises(CardboxError, match="no image lies in the arms span 70:80 s of a bag of"):
+    with pytest.raises(CardboxError, match=r"arms.* 70:80 s"):
         initialize_from_recording(source, spans, InitializationConfig())
 
 
@@ -237,9 +237,7 @@ def test_one_seed_gives_the_same_bytes_and_another_others(
 def test_a_start_after_the_end_is_refused_and_leaves_nothing(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    with pytest.raises(
-        CardboxError, match="no image lies after --start 99 s; give seconds from the bag's start"
-    ):
+    with pytest.raises(CardboxError, match="--start 99 s; give seconds"):
         track(recording, source, tmp_path / "person.csv", start_s=99.0)
     assert os.listdir(tmp_path) == []
 

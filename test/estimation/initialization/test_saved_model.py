@@ -19,15 +19,15 @@ BODY = BodyModel.of(distance_m=2.3)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fifo", "it is no file"),
-        ("/dev/zero", "it is no file"),
-        ("/dev/null", "it is no file"),
+        ("fifo", "no file"),
+        ("/dev/zero", "no file"),
+        ("/dev/null", "no file"),
         (".", "Is a directory"),
-        ("missing/model.yaml", "No such file or directory; choose a folder"),
+        ("missing/model.yaml", "No such file .*; choose a folder"),
         ("text/model.yaml", "Not a directory"),
         ("n" * 300, "File name too long"),
-        ("~nobody-here/model.yaml", "there is no such user"),
-        ("text", "expected a mapping"),
+        ("~nobody-here/model.yaml", "user"),
+        ("text", "mapping"),
     ],
 )
 def test_what_cannot_be_used_is_told_at_the_start(name: str, words: str, tmp_path: Path) -> None:

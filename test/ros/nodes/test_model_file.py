@@ -49,7 +49,7 @@ def test_a_home_folder_is_known_to_every_node(
         {name: "~/bad.yaml", "file": "video"} if make is CameraNode else {name: "~/bad.yaml"}
     )
     overrides = [Parameter(key, value=value) for key, value in parameters.items()]
-    with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: expected a mapping"):
+    with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: .*mapping"):
         make(context=context, parameter_overrides=overrides, enable_rosout=False)
 
 
@@ -73,7 +73,7 @@ def test_a_folder_that_is_gone_costs_no_second_posing(
     captured = {name: np.zeros((24, 32), np.uint8) for name in REFERENCE_NAMES}
     references.captured = dict(captured)
     shutil.rmtree(folder)
-    with pytest.raises(CardboxError, match=r"published, but not saved: .*call initialize again"):
+    with pytest.raises(CardboxError, match=r"not saved: .*call initialize"):
         node._measure()
     assert references.captured.keys() == captured.keys()
     folder.mkdir()

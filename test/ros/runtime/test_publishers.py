@@ -33,6 +33,6 @@ def test_two_publishers_are_named_until_one_has_gone(make_node: Callable[..., An
     other = second.create_publisher(String, "/image_raw", 1)
     ((kind, text),) = wait_for(watch.remarks).items()
     assert kind == "publishers of /image_raw"
-    assert text.startswith("2 publishers send /image_raw: /left, /right; expected one camera")
+    assert "/image_raw: /left, /right; expected one" in text
     second.destroy_publisher(other)
     wait_for(lambda: not watch.remarks())
