@@ -1,6 +1,6 @@
 """Track recorded sessions with several cameras through running nodes, beside ``cardbox track``.
 
-python -m tools.live_cameras --sessions DIR... --output docs/research/two-cameras.md
+python -m tools.live_cameras --sessions DIR... --output docs/two-cameras.md
 
 ``play_bag`` plays each session over DDS in its own time; a background node for each camera, the
 tracker, and for a rectified pair ``stereo_depth`` follow. The body is measured from the recording,
