@@ -97,7 +97,6 @@ class Tracker:
         self.agreement = CameraAgreement(body, self.camera, views) if views else None
         self.reset()
 
-
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
