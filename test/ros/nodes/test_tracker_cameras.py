@@ -62,9 +62,7 @@ def node(make_node: Callable[..., Any], hands: Any, tmp_path: Path) -> Iterator[
     made.destroy_node()
 
 
-def test_each_fit_is_told_and_a_camera_may_be_silent(
-    node: TrackerNode, hands: Any
-) -> None:
+def test_each_fit_is_told_and_a_camera_may_be_silent(node: TrackerNode, hands: Any) -> None:
     seen = silhouettes()
 
     def show(first: int, names: tuple[str, ...]) -> dict[str, str]:
