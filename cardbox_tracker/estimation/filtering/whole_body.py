@@ -1,10 +1,9 @@
 """The whole-body filter: a few dozen whole postures survive from frame to frame.
 
 A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
-the best torso, then all joints together. ``docs/architecture.md`` has the steps with their numbers
-and what was tried. Proposals are in :mod:`.whole_body_moves`, ratings in
-:mod:`cardbox_tracker.estimation.cost.multi_view`, what depends on the number of cameras in
-:mod:`.search_plan`.
+the best torso, then all joints together (``docs/architecture.md``). Proposals are in
+:mod:`.whole_body_moves`, ratings in :mod:`cardbox_tracker.estimation.cost.multi_view`, what depends
+on the number of cameras in :mod:`.search_plan`.
 """
 
 from __future__ import annotations
@@ -100,7 +99,6 @@ class WholeBodyFilter:
         self._age, self._home_m = 0, 0.0
         self._locator.forget()
         self._output: FloatArray | None = None
-        self._result: FloatArray | None = None
         self.refine.forget()
         self._arm.forget()
         self._chance: float | None = None
@@ -122,15 +120,12 @@ class WholeBodyFilter:
     def look(self, frames: Sequence[Frame]) -> Presence:
         """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
-        found = [self._presence_in(cost) for cost in self._cost.costs]
+        limits = self._config.smallest_person, self._config.largest_person
+        found = [presence_of(c.silhouette_px / c.frontal_px, *limits) for c in self._cost.costs]
         self._seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if self._seeing:
             return Presence.PERSON
         return Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY
-
-    def _presence_in(self, cost: WholeBodyCost) -> Presence:
-        share = cost.silhouette_px / cost.frontal_px
-        return presence_of(share, self._config.smallest_person, self._config.largest_person)
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -159,12 +154,7 @@ class WholeBodyFilter:
         self.refine.see(seeing)
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
-        cost.observe(
-            [
-                [term.observe(frame) for term in some] if number in seeing else []
-                for number, (frame, some) in enumerate(zip(frames, terms, strict=True))
-            ]
-        )
+        cost.observe(frames, terms)
         return location
 
     def _search(self, frames: Sequence[Frame], location: Location) -> None:
@@ -310,12 +300,6 @@ class WholeBodyFilter:
 
     def ious(self) -> list[float | None]:
         """See :class:`~.pose_filter.PoseFilter`."""
-        found: list[float | None] = [None] * len(self._cost.costs)
-        if self._output is None or self._result is None:
-            return found
-        for number in self._seeing:
-            cost = self._cost.costs[number]
-            state = self._cost.to_views[number](self._result)
-            _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
-            found[number] = iou_of(cost.silhouette_px, drawn_px, differ_px)
-        return found
+        if self._output is None:
+            return [None] * len(self._cost.costs)
+        return self._cost.ious(self._result, self._seeing)
