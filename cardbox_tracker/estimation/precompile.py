@@ -14,7 +14,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation import person_region
-from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import background
@@ -38,7 +38,7 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
             looks = Appearance(
                 np.zeros((len(PARTS), bins_of(channels)), np.uint8), np.full(channels, 128.0)
             )
-            config = PRESETS[name]().with_particles(2)
+            config = quickest(PRESETS[name]())
             image = np.full(shape, 128, np.uint8)
             for others in ((), (beside,)) if config.has_several_views else ((),):
                 person = body.with_values(appearance=looks)
@@ -46,6 +46,13 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
                 for _ in range(2):
                     views = 1 + len(others)
                     tracker.track_views([silhouette] * views, [image] * views)
+
+
+def quickest(config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with as few states as its filter allows."""
+    if config.filter == "hierarchical":
+        return config.with_particles(2)
+    return config.changed({"whole_body": {"effort": 0.25}})
 
 
 if __name__ == "__main__":
