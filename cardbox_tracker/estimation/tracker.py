@@ -250,6 +250,7 @@ class Tracker:
             others=self._others_now,
             depth_m=self._depth_m,
             interval_s=self._interval_s,
+            stamp_ns=self._stamp_ns,
         )
         sight = self._filter.look(frame)
         if sight is Sight.NOBODY:
