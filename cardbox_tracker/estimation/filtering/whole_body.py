@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
+from cardbox_tracker.estimation.cost.whole_body import iou_of
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     N_STATE,
     TORSO,

@@ -152,8 +152,8 @@ class NodeDiagnostics:
             return {}
         return {
             "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
-            f"{period_ms:.0f} ms, so that images wait or are left out; take fewer particles or "
-            "cycles, a smaller working resolution, or fewer images a second"
+            f"{period_ms:.0f} ms, so that images wait or are left out; lower the effort of "
+            "the tracker, take a smaller working resolution, or fewer images a second"
         }
 
     def _remarks(self) -> list[str]:
