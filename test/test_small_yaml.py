@@ -56,8 +56,8 @@ def test_what_has_few_levels_is_read_as_it_was_written(value: object) -> None:
         ("a: !!int ''", "tag"),
         ("a: !!timestamp x", "tag"),
         ("a: 1\na: 2", "key 'a' is given twice"),
-        ("? [1]\n: 2", "no plain word"),
-        ("<<: {a: 1}", "no plain word"),
+        ("? [1]\n: 2", "plain word"),
+        ("<<: {a: 1}", "plain word"),
         ("a: 2001-99-99", "not valid YAML"),
         ("a: 2001-01-01 00:00:00 +99:99", "not valid YAML"),
         ("a: " + "9" * 5000, "not valid YAML"),
@@ -109,7 +109,7 @@ def test_a_pipe_is_not_waited_for_and_a_device_not_read(tmp_path: Path) -> None:
     reading = threading.Thread(target=read, daemon=True)
     reading.start()
     reading.join(30)
-    assert told == ["it is no file"] * 3
+    assert ["pipe or a device" in text for text in told] == [True] * 3
 
 
 @pytest.mark.parametrize(

@@ -258,7 +258,7 @@ def test_a_poor_fit_is_refused_with_its_numbers() -> None:
     assert text.startswith("the model fits the references poorly (IoU front 0.")
     for part in ("mean 0.", "expected 0.60 or more", "person_distance_m (2 m)", "pitch (0 degrees"):
         assert part in text
-    assert "the side the person turned to (left)" in text
+    assert "turned (left)" in text
 
 
 def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
@@ -272,7 +272,7 @@ def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
     assert text.startswith("the model fits '")
     for name in poor:
         assert f"'{name}'" in text.split("poorly")[0]
-    assert f"expected {least:.2f} or more of each" in text
+    assert f"expected {least:.2f} or more" in text
 
 
 @pytest.mark.parametrize(
@@ -309,7 +309,7 @@ def test_without_arms_nothing_is_measured() -> None:
     arms = references["arms"]
     arms[:] = 0
     arms[20:, 150:169] = 255
-    with pytest.raises(InitializationError, match="reference 'arms': no arms are seen; capture"):
+    with pytest.raises(InitializationError, match=r"'arms'.* capture it again"):
         initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
 
 

@@ -43,10 +43,10 @@ def context(ros_domain: int) -> Iterator[Context]:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fifo", "it is no file"),
-        ("/dev/zero", "it is no file"),
-        ("/dev/null", "it is no file"),
-        (".", "Is a directory"),
+        ("fifo", "a pipe or a device"),
+        ("/dev/zero", "a pipe or a device"),
+        ("/dev/null", "a pipe or a device"),
+        (".", "directory"),
         ("missing/model.yaml", "No such file or directory; choose a folder"),
         ("text/model.yaml", "Not a directory"),
         ("n" * 300, "File name too long"),
