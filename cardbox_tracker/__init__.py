@@ -1,10 +1,10 @@
 """Upper-body posture of one person from the silhouettes of one fixed camera.
 
-The folders follow the data: :mod:`.body` is what a person is, :mod:`.vision` what the camera sees,
-:mod:`.estimation` how a posture is found, :mod:`.ros` the nodes around it.
+The folders follow the data: :mod:`.body` has the body model, :mod:`.vision` cameras and
+silhouettes, :mod:`.estimation` the tracker, :mod:`.ros` the nodes.
 
-The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported when it is
-first used, so that ``import cardbox_tracker`` costs nothing.
+The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported at its
+first use, so that ``import cardbox_tracker`` is fast.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name of ``__all__`` when it is first used (PEP 562)."""
+    """Import a name of ``__all__`` at its first use (PEP 562)."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
@@ -137,5 +137,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the Python interface, also before it is imported."""
+    """Return the Python interface, including names that are not imported yet."""
     return sorted({*globals(), *__all__})

@@ -1,10 +1,10 @@
-"""The errors a user can cause; ``str(error)`` says what was wrong, what was expected, what to do.
+"""The errors that users can cause; the text has the fault, the expectation and the remedy.
 
 CardboxError
     BodyModelError       a body model file or a size
     CameraError          a calibration or a CameraInfo
     EncodingError        an image's encoding or its bytes
-    InitializationError  the reference silhouettes cannot give a body
+    InitializationError  reference silhouettes from which no body can be measured
     BackgroundFileError  a file with a learned background
     BagError             a recording that cannot be read or written
     NotFiniteError       a result with values that are not finite numbers
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 
 class CardboxError(Exception):
-    """Base of every error a user can cause; programs show its text and no traceback."""
+    """Base of all errors that users can cause; programs print the text without a traceback."""
 
 
 class BodyModelError(CardboxError):
@@ -35,14 +35,14 @@ class EncodingError(CardboxError):
 
 
 class InitializationError(CardboxError):
-    """The reference silhouettes do not allow the body to be measured.
+    """The body cannot be measured from the reference silhouettes.
 
     Attributes:
-        words: what the person in front of the camera should do, in a few words.
+        words: short instruction for the person in front of the camera.
     """
 
     def __init__(self, text: str, words: str = "Once more, please") -> None:
-        """``text`` says what was wrong and what to do, to whoever runs the program."""
+        """Store fault and remedy for the operator in ``text``, the instruction in ``words``."""
         super().__init__(text)
         self.words = words
 
@@ -56,10 +56,10 @@ class NotFiniteError(CardboxError):
 
 
 class RosMissingError(CardboxError):
-    """ROS 2 is not installed, and what was asked for needs it."""
+    """The requested command needs ROS 2, which is not installed."""
 
     def __init__(self, error: ImportError) -> None:
-        """Say what could not be imported and what to do."""
+        """Name the module that cannot be imported and the remedy."""
         super().__init__(
             f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
             "a ROS 2 Jazzy installation"
@@ -71,15 +71,15 @@ _MOST_OF_A_VALUE = 60
 
 
 def cut(text: str, most: int = _MOST_CHARACTERS) -> str:
-    """Return ``text`` or its beginning: what strangers send must not fill the log."""
+    """Return ``text``, or its beginning if it is long, so that foreign input cannot fill a log."""
     return text if len(text) <= most else f"{text[:most]}..."
 
 
 def quoted(value: object) -> str:
-    """Return ``value`` as it would be written in Python, or the beginning of that."""
+    """Return the ``repr`` of ``value``, or its beginning if it is long."""
     if isinstance(value, str):
         return repr(value[:_MOST_OF_A_VALUE]) + "..." * (len(value) > _MOST_OF_A_VALUE)
     try:
         return cut(repr(value), _MOST_OF_A_VALUE)
-    except (ValueError, RecursionError):  # such as of a number of thousands of digits
+    except (ValueError, RecursionError):  # for example an integer with thousands of digits
         return f"a value of type {type(value).__name__}"

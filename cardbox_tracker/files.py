@@ -1,4 +1,4 @@
-"""Write a result so that a reader finds the whole of it or none of it."""
+"""Atomic writing of files: a reader finds the complete file or none."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError
 
-# In the names of temporary files: whoever finds one after a crash knows what it is.
+# Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
 _MOST_LINKS = 40
@@ -26,14 +26,14 @@ _MOST_LINKS = 40
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside ``path`` with the same suffix; rename it when all went well.
+    """Yield a temporary path beside ``path`` with the same suffix, and rename it at the end.
 
-    Where ``path`` is a link, the file that it points to is replaced. A pipe or a device, such as
-    ``/dev/stdout``, is not replaced but written to, at the end. Temporary files for the same
-    ``path`` whose writer was killed are removed.
+    If ``path`` is a link, its target is replaced. If it is a pipe or a device, such as
+    ``/dev/stdout``, the content is copied to it at the end. Temporary files for the same ``path``
+    are removed if their writer was killed. After an exception ``path`` is unchanged.
 
     Raises:
-        CardboxError: the folder of ``path`` cannot be written, or ``path`` is no file that can.
+        CardboxError: ``path`` or its folder cannot be written.
     """
     if is_written_in_place(path):
         with _copied_to(Path(path)) as temporary:
@@ -43,17 +43,17 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     with claimed_name(target, is_folder=False) as temporary:
         yield temporary
         with contextlib.suppress(OSError):
-            # Whoever could read the former file can read the new one.
+            # The new file keeps the permissions of the previous one.
             os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
         os.replace(temporary, target)
 
 
 @contextmanager
 def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
-    """Yield a new empty file or folder beside ``target``; remove what is left of it at the end.
+    """Yield a new empty file or folder beside ``target``, and remove it at the end if it exists.
 
-    Its name is unpredictable and nothing that exists is opened. It is locked as long as this
-    process lives, so that the next run can tell a leftover from the work of another process.
+    Its name is unpredictable, and no existing file is opened. It is locked while this process
+    lives, so that the next run can recognize files of killed processes.
 
     Raises:
         CardboxError: the folder of ``target`` cannot be written.
@@ -79,10 +79,10 @@ def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """Return the file that ``path`` means: where it is a link, what the link points to.
+    """Return the file to write for ``path``, which is the target if ``path`` is a link.
 
     Raises:
-        CardboxError: it is a folder, or its links lead in a circle.
+        CardboxError: ``path`` is a folder or a circular link.
     """
     target = Path(path)
     if target.is_dir():
@@ -91,27 +91,27 @@ def resolved(path: str | os.PathLike[str]) -> Path:
         return target
     end = Path(os.path.realpath(target))
     if end.is_symlink():
-        raise CardboxError(f"cannot write {target}: its links lead in a circle; remove it")
+        raise CardboxError(f"cannot write {target}: it is a circular link; remove it")
     return end
 
 
 def user_path(name: str) -> Path:
-    """Return the path that a user wrote, where ``~`` is a home folder.
+    """Return the path of a user's text, with ``~`` replaced by a home folder.
 
     Raises:
-        CardboxError: it is that of a user who is not there.
+        CardboxError: the user after ``~`` does not exist.
     """
     try:
         return Path(name).expanduser()
     except RuntimeError:
-        raise CardboxError(f"{name}: there is no such user; give the whole path") from None
+        raise CardboxError(f"{name}: there is no such user; give the full path") from None
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Say before the work what :func:`atomic_path` would say after it.
+    """Check before a long computation that :func:`atomic_path` can write ``path``.
 
     Raises:
-        CardboxError: the folder of ``path`` cannot be written, or ``path`` is no file that can.
+        CardboxError: ``path`` or its folder cannot be written.
     """
     try:
         if is_written_in_place(path):
@@ -129,10 +129,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def is_written_in_place(path: str | os.PathLike[str]) -> bool:
-    """Return whether ``path`` is no file that can be replaced: a pipe, a terminal, ``/dev/null``.
+    """Return whether ``path`` cannot be replaced, as a pipe, a terminal or ``/dev/null``.
 
     Raises:
-        CardboxError: it is a disk or a socket.
+        CardboxError: ``path`` is a disk or a socket.
     """
     try:
         mode = os.stat(path).st_mode
@@ -145,7 +145,7 @@ def is_written_in_place(path: str | os.PathLike[str]) -> bool:
 
 
 def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
-    """The name in /proc of the open file that ``path`` leads to, such as of /dev/stdout."""
+    """Return the name in /proc of the open file behind ``path``, such as /dev/stdout."""
     here = os.path.abspath(path)
     for _ in range(_MOST_LINKS):
         folder, name = os.path.split(here)
@@ -160,7 +160,7 @@ def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
 
 @contextmanager
 def _copied_to(target: Path) -> Iterator[Path]:
-    """Yield a path in a folder of its own; copy what was written there to ``target``."""
+    """Yield a path in a temporary folder, and copy the file to ``target`` at the end."""
     with tempfile.TemporaryDirectory(prefix="cardbox-") as folder:
         temporary = Path(folder) / f"output{target.suffix}"
         temporary.touch()
@@ -176,17 +176,17 @@ def _copied_to(target: Path) -> Iterator[Path]:
 
 
 def _open(target: Path) -> int:
-    """Open for writing without creating or emptying anything."""
+    """Open for writing without creating or truncating the file."""
     name = _descriptor_behind(target)
     own = f"/proc/{os.getpid()}/fd/"
     if name is not None and name.startswith(own):
-        # Opened anew it would begin at the start of the file, and what is printed later, too.
+        # A duplicate shares the offset, so that later output does not overwrite this one.
         return os.dup(int(name.removeprefix(own)))
     return os.open(target, os.O_WRONLY | os.O_APPEND)
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove temporary files and folders of ``target`` whose writer is gone."""
+    """Remove temporary files and folders of ``target`` whose writer was killed."""
     stem, suffix = re.escape(target.stem[:_STEM_LENGTH]), re.escape(target.suffix)
     pattern = re.compile(rf"\.{stem}{re.escape(_MARK)}[0-9a-f]{{16}}{suffix}")
     with contextlib.suppress(OSError), os.scandir(target.parent) as entries:
@@ -206,7 +206,7 @@ def _remove_leftovers(target: Path) -> None:
 def _lock(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # somebody has it, or the file system knows no locks
+    except OSError:  # it is locked already, or the file system has no locks
         return False
     return True
 
@@ -226,15 +226,15 @@ def _refused(target: Path, error: OSError | str) -> CardboxError:
 
 
 def stamp_text(stamp_ns: int) -> str:
-    """Return a stamp, ns, as seconds with nine decimals."""
+    """Return a stamp in ns as seconds with nine decimals."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a CSV file, whole or not at all.
+    """Write a CSV file atomically.
 
     Raises:
-        CardboxError: it cannot be written.
+        CardboxError: the file cannot be written.
     """
     with (
         atomic_path(path) as temporary,

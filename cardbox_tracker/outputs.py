@@ -1,9 +1,9 @@
-"""What the tracker says of an image, described once: topics, joints, figures.
+"""The tracker's outputs for an image: topics, joints and figures.
 
-The nodes, the bag of results, the CSV file and the demo encode what stands here:
-:mod:`.ros.messages.results` as messages, :mod:`.recordings.result_bag` as messages of a bag,
-:mod:`.recordings.track` as rows. A further joint goes into ``JOINT_STATE_NAMES`` and the two
-functions after it, a further topic into ``outputs``, a further number into ``METRICS``.
+:mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
+as messages of a bag, and :mod:`.recordings.track` as rows of a CSV file. Add a joint to
+``JOINT_STATE_NAMES`` and the two functions after it, a topic to ``outputs``, and a number to
+``METRICS``.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ class Points(NamedTuple):
 
 
 class Markers(NamedTuple):
-    """Shapes to show; none removes those shown before."""
+    """Shapes to show; without shapes, all earlier ones are removed."""
 
     shapes: tuple[MarkerShape, ...]
 
 
 class Text(NamedTuple):
-    """A word."""
+    """A text."""
 
     text: str
 
@@ -55,10 +55,10 @@ class Output:
 
     Attributes:
         topic: relative name.
-        kind: class of the values, which decides the message type.
-        of: value for an estimate that has a posture; None if it has no such value.
-        absent: value that says that there is no posture any more; None: nothing is sent.
-        needs_posture: False if ``of`` has a value for every estimate, which is always sent.
+        kind: class of the values, which determines the message type.
+        of: value for an estimate with a posture; None if the estimate has no such value.
+        absent: value that is sent once when the posture is lost; None if nothing is sent.
+        needs_posture: False if ``of`` has a value for every estimate.
     """
 
     topic: str
@@ -73,10 +73,10 @@ class Metric:
     """One number of an estimate.
 
     Attributes:
-        name: of its column.
+        name: name of the column.
         unit: empty for a plain number.
-        format: how it is written.
-        of: the number; None where there is none.
+        format: format specification of the number.
+        of: the number of an estimate; None if it has no such number.
     """
 
     name: str
@@ -86,35 +86,35 @@ class Metric:
 
     @property
     def label(self) -> str:
-        """Name with its unit, as in the diagnostics."""
+        """Name with its unit for the diagnostics."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
     def text(self, estimate: Estimate) -> str:
-        """Return the number as text; empty where there is none."""
+        """Return the number as text; empty if there is no number."""
         value = self.of(estimate)
         return "" if value is None else format(value, self.format)
 
 
 JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES)
-"""Joints of ``joint_states``, in order: the posture's, then where the person stands."""
+"""Joints of ``joint_states``: those of the posture, then the person's place."""
 
 
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
 
-    Without ``torso_place`` they are the posture's 12.
+    Without ``torso_place``, these are the 12 joints of the posture.
     """
     return _joints(estimate.posture, place_of(estimate) if torso_place else None)
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
-    """Return the standard deviation of each joint; None if it is not known."""
+    """Return the standard deviation of each joint; None if unknown."""
     place = _or_zeros(estimate.offset_stddev_m)
     return _joints(estimate.posture_stddev, place if torso_place else None)
 
 
 def place_of(estimate: Estimate) -> FloatArray:
-    """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 where the filter keeps them constant."""
+    """Return ``torso_x`` and ``torso_z`` (2,), metres; 0 if the filter keeps them constant."""
     return _or_zeros(estimate.offset_m)
 
 
@@ -131,7 +131,7 @@ def _joints(posture: FloatArray | None, place_m: FloatArray | None) -> JointValu
 
 
 def posture_from(joints: JointValues) -> FloatArray:
-    """Return the posture (12,) among named joints in any order.
+    """Return the posture (12,) from named joints in any order.
 
     Raises:
         ValueError: a joint of the posture is missing.
@@ -144,7 +144,7 @@ def posture_from(joints: JointValues) -> FloatArray:
 
 
 def place_from(joints: JointValues) -> FloatArray | None:
-    """Return ``torso_x`` and ``torso_z`` (2,) among named joints; None unless both are there."""
+    """Return ``torso_x`` and ``torso_z`` (2,) from named joints; None if one is missing."""
     by_name = positions_of(joints)
     if not by_name.keys() >= set(PLACE_NAMES):
         return None
@@ -152,7 +152,7 @@ def place_from(joints: JointValues) -> FloatArray | None:
 
 
 def positions_of(joints: JointValues) -> dict[str, float]:
-    """Return the value of each joint by its name."""
+    """Return the joint values by name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
 
 
@@ -169,12 +169,12 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
 
 
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:
-    """Return the topics of the tracker, in the order in which they are sent.
+    """Return the topics of the tracker in the order of publication.
 
-    ``torso_place`` puts ``torso_x`` and ``torso_z`` among the joints.
+    With ``torso_place``, the joints include ``torso_x`` and ``torso_z``.
     """
     return (
-        # First, so that who gets a posture knows already whether it may be wrong.
+        # The state comes first, so that subscribers have it when the posture arrives.
         Output(
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
@@ -185,7 +185,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             lambda found, _: joint_deviations(found, torso_place),
         ),
         Output("keypoints", Points, _keypoints),
-        # What is not removed stays in the air when the person has gone.
+        # Markers stay visible until they are removed.
         Output("markers", Markers, _markers, absent=Markers(())),
     )
 
@@ -197,14 +197,14 @@ METRICS: tuple[Metric, ...] = (
     Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
     Metric("iou", "", ".4f", lambda estimate: estimate.iou),
 )
-"""How well the model fits."""
+"""Numbers that describe the fit of the model."""
 
 
 class OutputStream:
-    """The values of one image after the other: state and posture, or once that there is none."""
+    """The output values of a sequence of images; ``absent`` values are sent once."""
 
     def __init__(self, topics: tuple[Output, ...] = OUTPUTS) -> None:
-        """Start before the first image; ``topics`` are those of :func:`outputs`."""
+        """Begin before the first image with the ``topics`` of :func:`outputs`."""
         self._topics = topics
         self._state = ""
 
@@ -214,7 +214,7 @@ class OutputStream:
         tracker: Tracker,
         wanted: Callable[[Output], bool] = lambda _: True,
     ) -> Iterator[tuple[Output, Value]]:
-        """Yield what is to be sent of an image; what is not ``wanted`` is not computed."""
+        """Yield the values to send for an image; only ``wanted`` ones are computed."""
         is_new, self._state = estimate.state != self._state, estimate.state
         for output in self._topics:
             has_value = estimate.posture is not None or not output.needs_posture

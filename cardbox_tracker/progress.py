@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 @contextmanager
 def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
-    """Yield a function that takes the finished fraction, 0 to 1, and draws it."""
+    """Yield a function that updates the bar to a finished fraction, 0 to 1."""
     with tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
 
         def show(fraction: float) -> None:

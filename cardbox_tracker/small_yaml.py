@@ -1,4 +1,7 @@
-"""Read YAML that anybody may have written: small, flat and plain, in time linear to its size."""
+"""Reader of small and plain YAML from untrusted sources: PyYAML's safe loader with limits.
+
+The safe loader alone accepts aliases, which can expand to gigabytes, and any depth and size.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +19,19 @@ MOST_DEPTH = 8
 
 
 class SmallYamlError(CardboxError):
-    """A text is no YAML, or more of it than is read here; the text names no source."""
+    """A text is not valid YAML, or exceeds the limits of this module."""
 
 
 def parse_small_yaml(text: str) -> Any:
-    """Return the mapping, list or value that a YAML text holds.
+    """Return the mapping, list or value of a YAML text.
 
-    Aliases, tags, a key given twice, and more than 64 kB or 8 levels are refused: no file of ours
-    has them, and a small text can stand for gigabytes with them.
+    Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused.
 
     Raises:
-        SmallYamlError: it holds one of these, or is no YAML.
+        SmallYamlError: the text has one of these, or is not valid YAML. The message does not name
+            the source.
     """
-    # No character has fewer bytes than one.
+    # The first comparison avoids encoding a long text, because a character has at least one byte.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
         raise SmallYamlError(f"it has more than {MOST_BYTES // 1024} kB; expected a few")
     try:
@@ -36,12 +39,12 @@ def parse_small_yaml(text: str) -> Any:
     except yaml.YAMLError as error:
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        # What conversions raise, such as of a date that no calendar has.
+        # PyYAML does not catch errors of conversions, for example of an impossible date.
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
 
 
 class _Loader(yaml.SafeLoader):
-    """Checks each node before what is inside it is read."""
+    """Safe loader that checks each node before it reads the node's content."""
 
     _depth = 0
 
@@ -63,7 +66,7 @@ class _Loader(yaml.SafeLoader):
         seen: set[str] = set()
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode) or key.tag.endswith(":merge"):
-                raise SmallYamlError("it has a key that is no plain word")
+                raise SmallYamlError("it has a key that is not a plain word; write it as a word")
             if key.value in seen:
                 raise SmallYamlError(f"key {quoted(key.value)} is given twice; keep one")
             seen.add(key.value)
@@ -71,19 +74,19 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_small_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a file of at most 64 kB; never wait for one.
+    """Return the text of a regular file of at most 64 kB, without waiting for pipes.
 
     Raises:
-        SmallYamlError: it cannot be read, is no file or no text, or is larger.
+        SmallYamlError: the file cannot be read, is too large, or is not a text file.
     """
     try:
-        # A pipe without a writer would be waited for.
+        # Without O_NONBLOCK, opening a pipe waits for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with os.fdopen(descriptor, "rb") as file:
             mode = os.fstat(descriptor).st_mode
             if not stat.S_ISREG(mode):
-                what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file"
-                raise SmallYamlError(what)
+                what = "a directory" if stat.S_ISDIR(mode) else "a pipe or a device"
+                raise SmallYamlError(f"it is {what}, not a file")
             data = file.read(MOST_BYTES + 1)
     except OSError as error:
         raise SmallYamlError(error.strerror or str(error)) from None

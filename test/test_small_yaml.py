@@ -55,16 +55,16 @@ def test_what_has_few_levels_is_read_as_it_was_written(value: object) -> None:
         ("!!python/object/apply:os.system ['true']", "tag:yaml.org,2002:python/object"),
         ("a: !!int ''", "tag"),
         ("a: !!timestamp x", "tag"),
-        ("a: 1\na: 2", "'a' .*twice"),
-        ("? [1]\n: 2", "no plain word"),
-        ("<<: {a: 1}", "no plain word"),
-        ("a: 2001-99-99", "YAML"),
-        ("a: 2001-01-01 00:00:00 +99:99", "YAML"),
-        ("a: " + "9" * 5000, "YAML"),
-        ("a: [1", "YAML"),
-        ("\x00", "YAML"),
-        ("\ud800", "YAML"),
-        ("a: 1\n---\nb: 2", "YAML"),
+        ("a: 1\na: 2", "key 'a' is given twice"),
+        ("? [1]\n: 2", "plain word"),
+        ("<<: {a: 1}", "plain word"),
+        ("a: 2001-99-99", "not valid YAML"),
+        ("a: 2001-01-01 00:00:00 +99:99", "not valid YAML"),
+        ("a: " + "9" * 5000, "not valid YAML"),
+        ("a: [1", "not valid YAML"),
+        ("\x00", "not valid YAML"),
+        ("\ud800", "not valid YAML"),
+        ("a: 1\n---\nb: 2", "not valid YAML"),
     ],
 )
 def test_what_is_not_small_and_plain_is_refused_in_few_words(text: str, words: str) -> None:
@@ -109,7 +109,7 @@ def test_a_pipe_is_not_waited_for_and_a_device_not_read(tmp_path: Path) -> None:
     reading = threading.Thread(target=read, daemon=True)
     reading.start()
     reading.join(30)
-    assert told == ["it is no file"] * 3
+    assert ["pipe or a device" in text for text in told] == [True] * 3
 
 
 @pytest.mark.parametrize(

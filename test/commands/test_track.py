@@ -34,7 +34,7 @@ import pytest
         (("--settings", "FOLDER/person.yaml"), "person.yaml: 'format' is no setting; "),
         (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),
         (("--model", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give the"),
-        (("--model", "FOLDER/session"), "Is a directory"),
+        (("--model", "FOLDER/session"), "directory"),
         (("--model", "FOLDER/text.txt"), "text.txt"),
         (("--model", "FOLDER/binary.yaml"), "binary.yaml"),
         (("--model", "FOLDER/list.yaml"), "list.yaml"),

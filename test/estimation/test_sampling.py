@@ -61,5 +61,5 @@ def test_samples_spread_as_the_estimate_says_and_change_nothing(preset: str) -> 
 
 def test_without_a_posture_there_is_nothing_to_draw() -> None:
     tracker = Tracker(BODY, CAMERA)
-    with pytest.raises(ValueError, match="without a posture"):
+    with pytest.raises(ValueError, match="no posture"):
         tracker.sample(Estimate(LOST), 10, np.random.default_rng(0))

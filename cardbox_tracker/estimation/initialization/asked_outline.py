@@ -90,7 +90,7 @@ def check_asked(
     likest = max(ious, key=lambda other: ious[other])
     if ious[likest] >= LEAST_IOU and ious[likest] - ious[name] >= CLEARLY:
         raise InitializationError(
-            f"reference '{name}': the silhouette looks like '{likest}' (IoU of the outline "
+            f"reference '{name}': it looks like '{likest}' (IoU of the outline "
             f"{rounded_down(ious[name])} with '{name}', {rounded_down(ious[likest])} with "
             f"'{likest}'); {POSTURE_TEXT[name]}",
             "Not this posture",

@@ -138,7 +138,7 @@ class _Search:
         skeleton = measure_skeleton(references, camera, config.distance_m)
         if skeleton is None:
             raise InitializationError(
-                f"reference 'arms': no arms are visible; capture it again: {POSTURE_TEXT['arms']}"
+                f"reference 'arms': no arms are seen; capture it again: {POSTURE_TEXT['arms']}"
             )
         stature = stature_m(references["front"], skeleton, camera, config.distance_m)
         self._shoulder_height_m = skeleton.shoulder_height_m

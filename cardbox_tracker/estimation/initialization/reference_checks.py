@@ -127,7 +127,7 @@ def posture_problems(
         return [mixed_up]
     arms = _arms(view)
     if arms is None:
-        return [f"reference 'arms': no arms are visible; {_again('arms')}"]
+        return [f"reference 'arms': no arms are seen; {_again('arms')}"]
     # The checks of `front` and `side` use the span of `arms`, so `arms` is checked first.
     for problem in (_problem_of_arms, _problem_of_front, _problem_of_side, _problem_of_height):
         found = problem(view, arms)
