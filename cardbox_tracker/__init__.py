@@ -1,7 +1,7 @@
 """Upper-body posture of one person from the silhouettes of one fixed camera.
 
-The folders follow the data: :mod:`.body` is what a person is, :mod:`.vision` what the camera sees,
-:mod:`.estimation` how a posture is found, :mod:`.ros` the nodes around it.
+The folders follow the data: :mod:`.body` models the person, :mod:`.vision` processes images,
+:mod:`.estimation` tracks the posture, :mod:`.ros` has the nodes.
 
 The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported when it is
 first used, so that ``import cardbox_tracker`` costs nothing.

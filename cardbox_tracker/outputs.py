@@ -1,6 +1,6 @@
-"""What the tracker says of an image, described once: topics, joints, figures.
+"""Outputs of the tracker, defined once: topics, joints, numbers.
 
-The nodes, the bag of results, the CSV file and the demo encode what stands here:
+The nodes, the bag of results, the CSV file and the demo encode these outputs:
 :mod:`.ros.messages.results` as messages, :mod:`.recordings.result_bag` as messages of a bag,
 :mod:`.recordings.track` as rows. A further joint goes into ``JOINT_STATE_NAMES`` and the two
 functions after it, a further topic into ``outputs``, a further number into ``FIGURES``.

@@ -12,7 +12,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Setting:
-    """What is known of one setting besides its name, type and default.
+    """Description of one setting besides its name, type and default.
 
     Attributes:
         description: what it does, one sentence.

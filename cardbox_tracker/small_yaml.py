@@ -1,4 +1,4 @@
-"""Read YAML that anybody may have written: small, flat and plain, in time linear to its size."""
+"""Reads untrusted YAML that is small, flat and plain, in linear time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ MOST_DEPTH = 8
 
 
 class SmallYamlError(CardboxError):
-    """A text is no YAML, or more of it than is read here; the text names no source."""
+    """A text is no YAML, or not within the limits; the message does not name the source."""
 
 
 def parse_small_yaml(text: str) -> Any:
-    """Return the mapping, list or value that a YAML text holds.
+    """Parse a YAML text; return a mapping, a list or a value.
 
-    Aliases, tags, a key given twice, and more than 64 kB or 8 levels are refused: no file of ours
-    has them, and a small text can stand for gigabytes with them.
+    Aliases, tags, duplicate keys, and more than 64 kB or 8 levels are refused, since a small text
+    can expand to gigabytes with them.
 
     Raises:
-        SmallYamlError: it holds one of these, or is no YAML.
+        SmallYamlError: the text contains one of these, or is no YAML.
     """
-    # No character has fewer bytes than one.
+    # A character has at least one byte.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
         raise SmallYamlError(f"it has more than {MOST_BYTES // 1024} kB; expected a few")
     try:
@@ -36,12 +36,12 @@ def parse_small_yaml(text: str) -> Any:
     except yaml.YAMLError as error:
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        # What conversions raise, such as of a date that no calendar has.
+        # Conversions raise these errors, for example for an impossible date.
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
 
 
 class _Loader(yaml.SafeLoader):
-    """Checks each node before what is inside it is read."""
+    """Loader that checks each node before it reads its content."""
 
     _depth = 0
 
@@ -71,13 +71,13 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_small_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a file of at most 64 kB; never wait for one.
+    """Return the text of a file of at most 64 kB; pipes are not waited for.
 
     Raises:
-        SmallYamlError: it cannot be read, is no file or no text, or is larger.
+        SmallYamlError: the path cannot be read, is no file or no text, or is larger.
     """
     try:
-        # A pipe without a writer would be waited for.
+        # Opening a pipe without a writer would block.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with os.fdopen(descriptor, "rb") as file:
             mode = os.fstat(descriptor).st_mode

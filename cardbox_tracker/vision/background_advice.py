@@ -1,30 +1,30 @@
-"""What the background node says about its input besides what it waits for."""
+"""Advice of the background node on problems of its input."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
+# The default shared-memory segment of Fast DDS has half a megabyte, including its own data.
 _LARGE_IMAGE_BYTES = 400_000
 _LOSS_TO_WARN = 0.1
-# Well above the noise of a median over the image.
+# This is well above the noise of a median over the image.
 _DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# More of the image than a person who is wholly in view covers.
+# A person who is completely in view covers less of the image.
 _COVERAGE_TO_WARN = 0.6
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What is known of the images.
+    """Observations on the images.
 
     Attributes:
-        topic: where they come from.
-        loss: share of them that never arrived.
-        image_bytes: size of one.
-        drift: how much brighter they are than the background, grey levels.
-        follows: True if the light is followed.
+        topic: topic of the images.
+        loss: share of the images that were lost.
+        image_bytes: size of an image.
+        drift: brightness of the images minus that of the background, grey levels.
+        follows: whether the changes of the light are followed.
         covered: share of the image that is foreground.
-        within_m: whoever is nearer is foreground; 0: whoever is before the background.
+        within_m: limit of the depth of foreground; 0 if the background is learned.
     """
 
     topic: str
@@ -37,7 +37,7 @@ class Findings:
 
 
 def advice(findings: Findings) -> dict[str, str]:
-    """Return what a user should do about the images, a text for each kind of trouble."""
+    """Return advice to the user, a text for each kind of problem."""
     texts = {}
     if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
         texts["loss"] = (
