@@ -174,7 +174,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
     ``torso_place`` puts ``torso_x`` and ``torso_z`` among the joints.
     """
     return (
-        # First, so that who gets a posture knows already whether it may be wrong.
+        # The state comes first, so that a receiver of a posture knows whether it may be wrong.
         Output(
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
@@ -185,7 +185,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             lambda found, _: joint_deviations(found, torso_place),
         ),
         Output("keypoints", Points, _keypoints),
-        # What is not removed stays in the air when the person has gone.
+        # Markers stay visible until they are removed.
         Output("markers", Markers, _markers, absent=Markers(())),
     )
 

@@ -111,10 +111,6 @@ def test_headings_name_their_topic(path: Path) -> None:
     assert not found, found
 
 
-def test_every_exception_still_exists() -> None:
-    assert [name for name in NOT_YET if not (ROOT / name).exists()] == []
-
-
 def test_breaches_are_found() -> None:
     source = '"""Whoever sways."""\n# One. Of a\n# two\n# three\nx = 1  # Of which\n'
     assert list(wrong_in_code(source)) == [
