@@ -1,7 +1,7 @@
 """Upper-body posture of one person from the silhouettes of one fixed camera.
 
-The folders follow the data: :mod:`.body` models the person, :mod:`.vision` processes images,
-:mod:`.estimation` tracks the posture, :mod:`.ros` has the nodes.
+The folders follow the data: :mod:`.body` is what a person is, :mod:`.vision` what the camera sees,
+:mod:`.estimation` how a posture is found, :mod:`.ros` the nodes around it.
 
 The names in ``__all__`` are the Python interface (``docs/python.md``). Each is imported when it is
 first used, so that ``import cardbox_tracker`` costs nothing.
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         InitializationResult,
     )
     from cardbox_tracker.estimation.initialization.measure import initialize_body
+    from cardbox_tracker.estimation.observation import Observation
     from cardbox_tracker.estimation.tracker import Tracker
     from cardbox_tracker.vision.background import (
         BackgroundConfig,
@@ -74,6 +75,7 @@ __all__ = [
     "InitializationError",
     "InitializationResult",
     "NotFiniteError",
+    "Observation",
     "OtherCamera",
     "RosMissingError",
     "SilhouetteExtractor",
@@ -110,6 +112,7 @@ _MODULES = {
     "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
     "estimation.initialization.measure": ("initialize_body",),
     "estimation.estimate": ("Estimate",),
+    "estimation.observation": ("Observation",),
     "estimation.tracker": ("Tracker",),
     "vision.background": (
         "BackgroundConfig",

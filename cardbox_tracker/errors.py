@@ -1,4 +1,4 @@
-"""Errors that a user can cause; their texts give the problem, the expectation and the remedy.
+"""The errors a user can cause; ``str(error)`` says what was wrong, what was expected, what to do.
 
 CardboxError
     BodyModelError       a body model file or a size
@@ -38,11 +38,11 @@ class InitializationError(CardboxError):
     """The reference silhouettes do not allow the body to be measured.
 
     Attributes:
-        words: a short instruction for the person in front of the camera.
+        words: what the person in front of the camera should do, in a few words.
     """
 
     def __init__(self, text: str, words: str = "Once more, please") -> None:
-        """Create the error; ``text`` gives the problem and the remedy to the user."""
+        """``text`` says what was wrong and what to do, to whoever runs the program."""
         super().__init__(text)
         self.words = words
 
@@ -56,10 +56,10 @@ class NotFiniteError(CardboxError):
 
 
 class RosMissingError(CardboxError):
-    """ROS 2 is required but not installed."""
+    """ROS 2 is not installed, and what was asked for needs it."""
 
     def __init__(self, error: ImportError) -> None:
-        """Create the error from the failed import."""
+        """Say what could not be imported and what to do."""
         super().__init__(
             f"ROS 2 is not installed ({error}); use 'pip install cardbox_tracker[ros]' or source "
             "a ROS 2 Jazzy installation"
@@ -71,15 +71,15 @@ _MOST_OF_A_VALUE = 60
 
 
 def cut(text: str, most: int = _MOST_CHARACTERS) -> str:
-    """Return ``text`` or its beginning, so that input from outside cannot fill the log."""
+    """Return ``text`` or its beginning: what strangers send must not fill the log."""
     return text if len(text) <= most else f"{text[:most]}..."
 
 
 def quoted(value: object) -> str:
-    """Return the ``repr`` of ``value``, or its beginning."""
+    """Return ``value`` as it would be written in Python, or the beginning of that."""
     if isinstance(value, str):
         return repr(value[:_MOST_OF_A_VALUE]) + "..." * (len(value) > _MOST_OF_A_VALUE)
     try:
         return cut(repr(value), _MOST_OF_A_VALUE)
-    except (ValueError, RecursionError):  # for example an integer of thousands of digits
+    except (ValueError, RecursionError):  # such as of a number of thousands of digits
         return f"a value of type {type(value).__name__}"

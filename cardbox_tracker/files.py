@@ -1,4 +1,4 @@
-"""Writes files atomically, so that a reader finds the complete file or none."""
+"""Write a result so that a reader finds the whole of it or none of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from cardbox_tracker.errors import CardboxError
 
-# Part of the names of temporary files, which shows their origin after a crash.
+# In the names of temporary files: whoever finds one after a crash knows what it is.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
 _MOST_LINKS = 40
@@ -26,9 +26,9 @@ _MOST_LINKS = 40
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside ``path`` with the same suffix; rename it if no error occurs.
+    """Yield a temporary path beside ``path`` with the same suffix; rename it when all went well.
 
-    If ``path`` is a link, the file that it points to is replaced. A pipe or a device, such as
+    Where ``path`` is a link, the file that it points to is replaced. A pipe or a device, such as
     ``/dev/stdout``, is not replaced but written to, at the end. Temporary files for the same
     ``path`` whose writer was killed are removed.
 
@@ -43,17 +43,17 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     with claimed_name(target, is_folder=False) as temporary:
         yield temporary
         with contextlib.suppress(OSError):
-            # The new file has the permissions of the former one.
+            # Whoever could read the former file can read the new one.
             os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
         os.replace(temporary, target)
 
 
 @contextmanager
 def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
-    """Yield a new empty file or folder beside ``target``; remove it at the end if it still exists.
+    """Yield a new empty file or folder beside ``target``; remove what is left of it at the end.
 
-    Its name is unpredictable, and no existing file is opened. It is locked while this process
-    lives, so that the next run can distinguish a leftover from the work of another process.
+    Its name is unpredictable and nothing that exists is opened. It is locked as long as this
+    process lives, so that the next run can tell a leftover from the work of another process.
 
     Raises:
         CardboxError: the folder of ``target`` cannot be written.
@@ -79,10 +79,10 @@ def claimed_name(target: Path, *, is_folder: bool) -> Iterator[Path]:
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """Return the file that ``path`` refers to, after links are resolved.
+    """Return the file that ``path`` means: where it is a link, what the link points to.
 
     Raises:
-        CardboxError: the path is a folder, or its links form a circle.
+        CardboxError: it is a folder, or its links lead in a circle.
     """
     target = Path(path)
     if target.is_dir():
@@ -96,10 +96,10 @@ def resolved(path: str | os.PathLike[str]) -> Path:
 
 
 def user_path(name: str) -> Path:
-    """Return the path that a user gave, with ``~`` expanded to a home folder.
+    """Return the path that a user wrote, where ``~`` is a home folder.
 
     Raises:
-        CardboxError: the user in ``~user`` does not exist.
+        CardboxError: it is that of a user who is not there.
     """
     try:
         return Path(name).expanduser()
@@ -108,7 +108,7 @@ def user_path(name: str) -> Path:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check before the work that :func:`atomic_path` can write ``path``.
+    """Say before the work what :func:`atomic_path` would say after it.
 
     Raises:
         CardboxError: the folder of ``path`` cannot be written, or ``path`` is no file that can.
@@ -129,10 +129,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def is_written_in_place(path: str | os.PathLike[str]) -> bool:
-    """Return whether ``path`` is written in place: a pipe, a terminal, ``/dev/null``.
+    """Return whether ``path`` is no file that can be replaced: a pipe, a terminal, ``/dev/null``.
 
     Raises:
-        CardboxError: the path is a disk or a socket.
+        CardboxError: it is a disk or a socket.
     """
     try:
         mode = os.stat(path).st_mode
@@ -145,7 +145,7 @@ def is_written_in_place(path: str | os.PathLike[str]) -> bool:
 
 
 def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
-    """Return the name in /proc of the open file that ``path`` links to, or None."""
+    """The name in /proc of the open file that ``path`` leads to, such as of /dev/stdout."""
     here = os.path.abspath(path)
     for _ in range(_MOST_LINKS):
         folder, name = os.path.split(here)
@@ -160,7 +160,7 @@ def _descriptor_behind(path: str | os.PathLike[str]) -> str | None:
 
 @contextmanager
 def _copied_to(target: Path) -> Iterator[Path]:
-    """Yield a path in a temporary folder; copy the file written there to ``target``."""
+    """Yield a path in a folder of its own; copy what was written there to ``target``."""
     with tempfile.TemporaryDirectory(prefix="cardbox-") as folder:
         temporary = Path(folder) / f"output{target.suffix}"
         temporary.touch()
@@ -176,17 +176,17 @@ def _copied_to(target: Path) -> Iterator[Path]:
 
 
 def _open(target: Path) -> int:
-    """Open a file for writing without creating or truncating it."""
+    """Open for writing without creating or emptying anything."""
     name = _descriptor_behind(target)
     own = f"/proc/{os.getpid()}/fd/"
     if name is not None and name.startswith(own):
-        # A newly opened file would be overwritten from its start, by later output too.
+        # Opened anew it would begin at the start of the file, and what is printed later, too.
         return os.dup(int(name.removeprefix(own)))
     return os.open(target, os.O_WRONLY | os.O_APPEND)
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove temporary files and folders of ``target`` whose process has ended."""
+    """Remove temporary files and folders of ``target`` whose writer is gone."""
     stem, suffix = re.escape(target.stem[:_STEM_LENGTH]), re.escape(target.suffix)
     pattern = re.compile(rf"\.{stem}{re.escape(_MARK)}[0-9a-f]{{16}}{suffix}")
     with contextlib.suppress(OSError), os.scandir(target.parent) as entries:
@@ -206,7 +206,7 @@ def _remove_leftovers(target: Path) -> None:
 def _lock(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # another process has the lock, or the file system has no locks
+    except OSError:  # somebody has it, or the file system knows no locks
         return False
     return True
 
@@ -231,10 +231,10 @@ def stamp_text(stamp_ns: int) -> str:
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a CSV file atomically.
+    """Write a CSV file, whole or not at all.
 
     Raises:
-        CardboxError: the file cannot be written.
+        CardboxError: it cannot be written.
     """
     with (
         atomic_path(path) as temporary,

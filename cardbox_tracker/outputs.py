@@ -1,9 +1,9 @@
-"""Outputs of the tracker, defined once: topics, joints, numbers.
+"""What the tracker says of an image, described once: topics, joints, figures.
 
-The nodes, the bag of results, the CSV file and the demo encode these outputs:
+The nodes, the bag of results, the CSV file and the demo encode what stands here:
 :mod:`.ros.messages.results` as messages, :mod:`.recordings.result_bag` as messages of a bag,
 :mod:`.recordings.track` as rows. A further joint goes into ``JOINT_STATE_NAMES`` and the two
-functions after it, a further topic into ``outputs``, a further number into ``FIGURES``.
+functions after it, a further topic into ``outputs``, a further number into ``METRICS``.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Metric:
     """One number of an estimate.
 
     Attributes:
@@ -174,7 +174,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
     ``torso_place`` puts ``torso_x`` and ``torso_z`` among the joints.
     """
     return (
-        # The state comes first, so that a receiver of a posture knows whether it may be wrong.
+        # First, so that who gets a posture knows already whether it may be wrong.
         Output(
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
@@ -185,7 +185,7 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             lambda found, _: joint_deviations(found, torso_place),
         ),
         Output("keypoints", Points, _keypoints),
-        # Markers stay visible until they are removed.
+        # What is not removed stays in the air when the person has gone.
         Output("markers", Markers, _markers, absent=Markers(())),
     )
 
@@ -193,9 +193,9 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
 OUTPUTS: tuple[Output, ...] = outputs()
 """All topics, with all joints."""
 
-FIGURES: tuple[Figure, ...] = (
-    Figure("cost", "px", "d", lambda estimate: estimate.cost_px),
-    Figure("iou", "", ".4f", lambda estimate: estimate.iou),
+METRICS: tuple[Metric, ...] = (
+    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
+    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
 )
 """How well the model fits."""
 

@@ -1,4 +1,4 @@
-"""Reads untrusted YAML that is small, flat and plain, in linear time."""
+"""Read YAML that anybody may have written: small, flat and plain, in time linear to its size."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ MOST_DEPTH = 8
 
 
 class SmallYamlError(CardboxError):
-    """A text is no YAML, or not within the limits; the message does not name the source."""
+    """A text is no YAML, or more of it than is read here; the text names no source."""
 
 
 def parse_small_yaml(text: str) -> Any:
-    """Parse a YAML text; return a mapping, a list or a value.
+    """Return the mapping, list or value that a YAML text holds.
 
-    Aliases, tags, duplicate keys, and more than 64 kB or 8 levels are refused, since a small text
-    can expand to gigabytes with them.
+    Aliases, tags, a key given twice, and more than 64 kB or 8 levels are refused: no file of ours
+    has them, and a small text can stand for gigabytes with them.
 
     Raises:
-        SmallYamlError: the text contains one of these, or is no YAML.
+        SmallYamlError: it holds one of these, or is no YAML.
     """
-    # A character has at least one byte.
+    # No character has fewer bytes than one.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
         raise SmallYamlError(f"it has more than {MOST_BYTES // 1024} kB; expected a few")
     try:
@@ -36,12 +36,12 @@ def parse_small_yaml(text: str) -> Any:
     except yaml.YAMLError as error:
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        # Conversions raise these errors, for example for an impossible date.
+        # What conversions raise, such as of a date that no calendar has.
         raise SmallYamlError(f"it is not valid YAML: {cut(str(error))}") from None
 
 
 class _Loader(yaml.SafeLoader):
-    """Loader that checks each node before it reads its content."""
+    """Checks each node before what is inside it is read."""
 
     _depth = 0
 
@@ -71,13 +71,13 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_small_text(path: str | os.PathLike[str]) -> str:
-    """Return the text of a file of at most 64 kB; pipes are not waited for.
+    """Return the text of a file of at most 64 kB; never wait for one.
 
     Raises:
-        SmallYamlError: the path cannot be read, is no file or no text, or is larger.
+        SmallYamlError: it cannot be read, is no file or no text, or is larger.
     """
     try:
-        # Opening a pipe without a writer would block.
+        # A pipe without a writer would be waited for.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with os.fdopen(descriptor, "rb") as file:
             mode = os.fstat(descriptor).st_mode

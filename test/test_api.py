@@ -40,6 +40,7 @@ PUBLIC = {
     "InitializationResult",
     "JOINT_NAMES",
     "KEYPOINT_NAMES",
+    "Observation",
     "OtherCamera",
     "PRESETS",
     "RosMissingError",

@@ -81,8 +81,8 @@ def background_of(options: argparse.Namespace) -> TimeSpan | Within:
     Raises:
         CardboxError: neither or both are given.
     """
-    from cardbox_tracker.recordings.cameras import STEREO
     from cardbox_tracker.recordings.depth_silhouettes import Within
+    from cardbox_tracker.recordings.recording import STEREO
 
     if (options.within is None) == (options.background is None):
         raise CardboxError(

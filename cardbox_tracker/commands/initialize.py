@@ -60,13 +60,13 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.cameras import CameraSources, open_recording
     from cardbox_tracker.recordings.initialize import (
         describe,
         initialize_from_cameras,
         initialize_from_recording,
         initialize_with_depth,
     )
+    from cardbox_tracker.recordings.recording import open_recording
 
     pitch_rad = math.radians(options.camera_pitch_deg)
     # The body model refuses an impossible distance or pitch by name, before they are used.
@@ -101,9 +101,9 @@ def run(options: argparse.Namespace) -> None:
         ) as source,
         progress_bar("initialize") as show,
     ):
-        if options.distance is not None or not isinstance(source, CameraSources):
+        if options.distance is not None:
             result = initialize_from_recording(source.first, spans, config, show)
-        elif options.depth is not None:
+        elif source.measures_depth:
             result = initialize_with_depth(source, spans, config, show)
         else:
             result = initialize_from_cameras(source, spans, config, show)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Container, Sequence
 
-from cardbox_tracker import __version__
+from cardbox_tracker import __version__, interrupts
 from cardbox_tracker.commands import (
     benchmark,
     body,
@@ -24,9 +25,7 @@ from cardbox_tracker.commands import (
     view,
 )
 from cardbox_tracker.commands.command import Command
-from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.interrupts import INTERRUPTED, were_received
 
 # The order is that of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
@@ -64,7 +63,7 @@ Times are seconds from the start of the recording.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``cardbox``; return its exit code: 0, or 1 after an error that was printed.
+    """Run ``cardbox``; return its exit code: 0, 1 after an error, 128 + N after the signal N.
 
     Raises:
         SystemExit: the arguments are wrong (code 2), or they ask for help or the version (code 0).
@@ -72,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     try:
-        with ended_by_signals():
+        with interrupts.raised():
             parser = build_parser(words)
             if name in RETIRED:
                 parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
@@ -82,17 +81,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CardboxError as error:
         print(f"cardbox {name}: {error}", file=sys.stderr)
         return 1
-    except Terminated as end:
-        print(f"cardbox {name}: terminated", file=sys.stderr)
-        return 128 + end.signal
     except KeyboardInterrupt:
         return _interrupted(name)
     except BrokenPipeError:
         # The reader has closed the pipe, as in 'cardbox urdf MODEL.yaml | head', which is no error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
-        if were_received():
-            # An interrupted call of ROS or an interrupted import may raise an error of its own.
+        if interrupts.received():
+            # An interrupted import or call of ROS raises errors of its own.
             return _interrupted(name)
         if not isinstance(error, OSError):
             raise
@@ -104,8 +100,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupted(name: str) -> int:
-    print(f"cardbox {name}: interrupted", file=sys.stderr)
-    return INTERRUPTED
+    number = interrupts.received() or signal.SIGINT
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    print(f"cardbox {name}: {word}", file=sys.stderr)
+    return 128 + number
 
 
 def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:

@@ -133,7 +133,7 @@ def track_inputs(
     """
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.cameras import open_recording
+    from cardbox_tracker.recordings.recording import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
     from cardbox_tracker.recordings.track import track_recording
 
@@ -181,11 +181,10 @@ def track_inputs(
 def _config(options: argparse.Namespace) -> TrackerConfig:
     """Return the preset with what the options change in it."""
     from cardbox_tracker.estimation.config import PRESETS
-    from cardbox_tracker.estimation.cost.depth import Depth
 
     config = replace(PRESETS[options.preset](), strategy=options.strategy)
     if options.depth is not None:
-        config = replace(config, terms=(*config.terms, Depth()))
+        config = config.with_depth()
     if options.particles is None:
         return config
     try:

@@ -1,1 +1,1 @@
-"""``cardbox demo``: the main job end to end, through real nodes, on a synthetic recording."""
+"""``cardbox demo``: the whole pipeline of nodes on a synthetic recording."""

@@ -1,4 +1,4 @@
-"""What a user does from outside the nodes: call services, watch topics, record the results."""
+"""The demo's ROS client, which calls services, subscribes to topics and records the results."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
@@ -26,10 +27,9 @@ from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Those of the bag that 'cardbox track --bag' writes; /tf is made of two of them.
+# The same topics as in the bag of 'cardbox track --bag'; /tf is derived from two of them.
 _OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
@@ -43,28 +43,28 @@ _OF_CAMERA = {
 
 
 def topics_of(cameras: Sequence[str] = ()) -> dict[str, tuple[Any, QoSProfile]]:
-    """Return type and QoS of each topic of the results, of one camera or below namespaces."""
+    """Return type and QoS of each result topic, for one camera or for camera namespaces."""
     spaces = [f"{camera}/" for camera in cameras] or [""]
     of_cameras = {f"{space}{name}": kind for space in spaces for name, kind in _OF_CAMERA.items()}
     return {**_OF_PERSON, **of_cameras}
 
 
 class Client:
-    """Records the results into a bag and keeps what the report needs.
+    """Records the results in a bag and keeps the data of the report.
 
     Attributes:
-        body_model: YAML text of the measured person, once it was published.
-        initialization_iou: mean fit of the references, once it was published.
+        body_model: YAML text of the measured person; empty before it is published.
+        initialization_iou: mean fit of the references; None before it is published.
         postures: joint positions (12,) by stamp, ns.
         places_m: ``torso_x`` and ``torso_z`` (2,) by stamp, ns.
         states: tracking state of each posture by stamp, ns.
         keypoints_m: keypoints (6, 3) by stamp, ns, metres in the optical frame.
-        silhouettes: of the first camera, (H, W), by stamp, ns.
+        silhouettes: silhouettes (H, W) of the first camera by stamp, ns.
         arrivals_s: arrival time of each joint state, monotonic seconds.
     """
 
     def __init__(self, nodes: Nodes, bag: BagWriter, cameras: Sequence[str] = ()) -> None:
-        """Subscribe to everything that nodes of one camera, or of several ones, publish."""
+        """Subscribe to the topics of nodes for one camera, or for several camera namespaces."""
         self._silhouettes = silhouettes_of(cameras or [""])
         self.body_model = ""
         self.initialization_iou: float | None = None
@@ -82,7 +82,7 @@ class Client:
         self._stamp_ns = 0
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
-        self._executor = make_executor()
+        self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         for topic, (kind, profile) in topics_of(cameras).items():
             self._node.create_subscription(
@@ -94,7 +94,7 @@ class Client:
         )
 
     def recorder(self, topic: str, kind: Any) -> Callable[[bytes], None]:
-        """Return what keeps a message of ``topic``, given as its bytes."""
+        """Return a callback that records the serialized messages of ``topic``."""
         name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
         def record(raw: bytes) -> None:
@@ -114,7 +114,7 @@ class Client:
         elif topic == "robot_description":
             self._transforms.describe(message.data)
         elif topic == "tracking_state":
-            # It has no stamp; the tracker sends it right before the joint state of its image.
+            # The state has no stamp; the tracker sends it just before the joint state.
             self._state = message.data
         elif topic == "joint_states":
             joints = results.joint_values_of(message)
@@ -135,15 +135,15 @@ class Client:
         self._player_status = message.data
 
     def _note_result(self, message: DiagnosticStatus) -> None:
-        # Where it failed, the service's answer says why.
+        # If the initialization failed, the service's response has the reason.
         if message.level == DiagnosticStatus.OK:
             self.initialization_iou = mean_iou_of(message)
 
     def wait(self, condition: Callable[[], bool], what: str, timeout_s: float = 120.0) -> None:
-        """Serve topics until ``condition`` holds.
+        """Spin until ``condition`` holds.
 
         Raises:
-            CardboxError: it did not in time, or a node died.
+            CardboxError: it does not hold in time, or a node died.
         """
         end = time.monotonic() + timeout_s
         while not condition():
@@ -151,12 +151,13 @@ class Client:
             self._nodes.check()
             if time.monotonic() > end:
                 raise CardboxError(
-                    f"waited {timeout_s:g} s for {what}; see the nodes' log files in the output"
+                    f"waited {timeout_s:g} s for {what}; see the nodes' log files in the output "
+                    "folder"
                 )
 
     def wait_for_nodes(self) -> None:
         """Wait until the nodes are connected to each other."""
-        # The person is measured by the first two cameras.
+        # The initializer, too, subscribes to the first two cameras.
         wanted = [3, 3, 2, 2][: len(self._silhouettes)]
         self.wait(
             lambda: (
@@ -167,12 +168,12 @@ class Client:
         )
 
     def wait_for_pause(self, time_s: float) -> None:
-        """Wait until the player stands still at ``time_s``, and its images have been served."""
+        """Wait until the player pauses at ``time_s`` and its images have been processed."""
         self.wait(lambda: self._player_status == f"paused at {time_s:.3f} s", f"{time_s:g} s")
         self.rest(0.5)
 
     def rest(self, duration_s: float) -> None:
-        """Serve topics for a while."""
+        """Spin for ``duration_s``."""
         end = time.monotonic() + duration_s
         while time.monotonic() < end:
             self._executor.spin_once(timeout_sec=0.05)
@@ -181,7 +182,7 @@ class Client:
         """Call a Trigger service and return its message.
 
         Raises:
-            CardboxError: the service refused, or is not there.
+            CardboxError: the service refused, or is not available.
         """
         client = self._node.create_client(Trigger, service)
         self.wait(client.service_is_ready, f"the service {service}")
@@ -193,7 +194,7 @@ class Client:
         return str(response.message)
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Destroy the node."""
         self._executor.shutdown()
         self._node.destroy_node()
         try_shutdown()

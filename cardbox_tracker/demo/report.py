@@ -1,4 +1,4 @@
-"""The demo's results: report.json, joint_states.png, overlay.mp4, and a short table."""
+"""The demo's report: report.json, joint_states.png, overlay.mp4, and a printed table."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _VIDEO_SCALE = 2
 def write_report(
     result: DemoResult, session: Path, output: Path, preset: str, seed: int
 ) -> dict[str, object]:
-    """Write everything into ``output``, print the table, return what report.json holds."""
+    """Write all files to ``output``, print the table and return the content of report.json."""
     with BagReader(session) as bag:
         first = next(iter(result.truth.cameras), None)
         height, width = next(iter(result.silhouettes.values())).shape
@@ -69,7 +69,7 @@ def write_report(
 
 
 def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int, Estimate]:
-    """Cost and IoU of what was published, by stamp, from the silhouettes on the topic."""
+    """Return the published estimates by stamp, with cost and IoU from the published silhouettes."""
     estimates = {}
     body, term = result.body, CompiledSilhouette(result.body, camera)
     for stamp in stamps:
@@ -90,7 +90,7 @@ def rate(result: DemoResult, camera: Camera, stamps: Iterable[int]) -> dict[int,
 
 
 def plot_joint_states(result: DemoResult, stamps: list[int], path: Path) -> None:
-    """Plot the 12 joints over time, estimate against truth."""
+    """Plot the estimated and the true positions of the 12 joints over time."""
     from matplotlib import pyplot as plt
 
     time_s = (np.array(stamps) - result.truth.start_ns) / 1e9
@@ -119,7 +119,7 @@ def write_overlay(
     session: Path,
     path: Path,
 ) -> None:
-    """Draw the published postures over the session's images."""
+    """Write a video of the session's images with the published postures drawn over them."""
     size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
     nothing = Estimate("not_tracked")
     with BagReader(session) as bag, video_file(path, size, 15.0) as write:
@@ -133,7 +133,7 @@ def write_overlay(
 
 
 def print_table(report: dict[str, object], output: Path) -> None:
-    """Print the main figures and where the rest is."""
+    """Print the main figures and the paths of the files."""
     rows = [
         ("images after initialization", f"{report['frames']}"),
         ("of them tracked", f"{report['frames_tracked']}"),
@@ -146,8 +146,8 @@ def print_table(report: dict[str, object], output: Path) -> None:
     ]
     print("\n".join(f"  {name:32s}{value:>10s}" for name, value in rows))
     print(
-        f"look at {output}/overlay.mp4 and {output}/joint_states.png; "
-        f"all figures are in {output}/report.json, the results' bag in {output}/bag"
+        f"see {output}/overlay.mp4 and {output}/joint_states.png; "
+        f"all figures are in {output}/report.json, the bag of results is {output}/bag"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a run of the demo found."""
+"""The result of a run of the demo."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from cardbox_tracker.evaluation.truth import GroundTruth
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the nodes published, and the truth.
+    """The published data and the ground truth.
 
     Attributes:
         body: the measured person.
-        truth: of the session.
-        start_ns: from this stamp on the person was measured and is tracked.
+        truth: ground truth of the session.
+        start_ns: stamp of the first image after the initialization.
         postures: (12,) by stamp.
         keypoints_m: (6, 3) by stamp, metres in the optical frame.
         silhouettes: (H, W) by stamp.
-        fps: joint states that arrived in a second.
+        fps: received joint states per second.
         initialization_iou: mean fit of the references, as the initializer reported it.
         places_m: ``torso_x`` and ``torso_z`` (2,) by stamp; empty if they are kept constant.
-        states: tracking state by stamp; where there is none, ``tracking``.
+        states: tracking state by stamp; a missing state means ``tracking``.
     """
 
     body: BodyModel

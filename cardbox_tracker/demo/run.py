@@ -1,4 +1,4 @@
-"""The course of the demo: synthesize, start the nodes, call the services, record, report."""
+"""The steps of the demo: synthesize, start the nodes, call the services, record, report."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _NEUTRAL_S = 0.1
 
 
 def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
-    """Run the demo and leave its results in the folder ``output``.
+    """Run the demo and write its results to the folder ``output``.
 
     Raises:
-        CardboxError: something failed; the text says what.
+        CardboxError: a step failed; the text names it.
     """
     if cameras > 1 and not PRESETS[preset]().has_several_views:
         raise CardboxError(f"--preset {preset} is for one camera; leave it out with --cameras")
@@ -42,7 +42,7 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
 
 
 def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> DemoResult:
-    """Play ``session`` to the nodes, measure and track its person, record to ``output``/bag.
+    """Play ``session`` to the nodes, which measure and track the person; record ``output``/bag.
 
     Raises:
         CardboxError: ROS is not installed, a node failed, or a service refused.
@@ -112,13 +112,13 @@ def track_through_nodes(session: Path, output: Path, preset: str, seed: int) -> 
 def _start_nodes(
     nodes: Nodes, truth: GroundTruth, session: Path, preset: str, seed: int
 ) -> list[str]:
-    """Start the nodes of one camera, or of several ones; return the topics to play."""
+    """Start the nodes for one camera or several; return the topics to play."""
 
     def parameters(**values: object) -> list[str]:
         return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
     several = [f"/{name}" for name in truth.cameras]
-    # A replay must not lose images; of a live camera, old ones are better dropped.
+    # A replay must not lose images, while live nodes drop old ones.
     deep = [
         word
         for space in several or [""]

@@ -10,7 +10,7 @@ from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.drawing.guidance import Asked, draw_guidance
 from cardbox_tracker.drawing.overlay import ImageArray
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.estimation.initialization.guidance import Step
+from cardbox_tracker.estimation.initialization.guidance import Prompt
 from cardbox_tracker.estimation.initialization.live_fit import LiveFit
 from cardbox_tracker.estimation.initialization.references import MIN_PERSON_FRACTION, lateral_m
 from cardbox_tracker.estimation.initialization.standing import at_height_of
@@ -24,7 +24,7 @@ _DARKER = 2
 
 
 class Guide:
-    """Draws steps of the guidance for one camera.
+    """Draws prompts of the guidance for one camera.
 
     Attributes:
         camera: camera at the working resolution.
@@ -37,12 +37,12 @@ class Guide:
         self._fit = LiveFit(camera, config)
 
     def draw(
-        self, step: Step, silhouette: Silhouette, image: ImageArray | None, mirror: bool
+        self, prompt: Prompt, silhouette: Silhouette, image: ImageArray | None, mirror: bool
     ) -> ImageArray:
-        """Return the picture of a step, bgr, see :func:`.guidance.draw_guidance`.
+        """Return a prompt as a picture, bgr: see :func:`.guidance.draw_guidance`.
 
         Args:
-            step: the step of the guidance.
+            prompt: what to do.
             silhouette: (H, W), 0 or 255, of the camera's size.
             image: image of the silhouette, (H, W) or (H, W, 3) bgr; None to show the silhouette.
             mirror: show a mirror image.
@@ -51,9 +51,9 @@ class Guide:
         if image is not None:
             picture = image.copy()
             picture[silhouette == 0] //= _DARKER
-        asked = self._asked(step.name, silhouette) if step.name in REFERENCE_NAMES else None
+        asked = self._asked(prompt.name, silhouette) if prompt.name in REFERENCE_NAMES else None
         return draw_guidance(
-            picture, step.words, step.mood, step.left_s, asked, scale=_SCALE, mirror=mirror
+            picture, prompt.words, prompt.mood, prompt.left_s, asked, scale=_SCALE, mirror=mirror
         )
 
     def _asked(self, name: str, silhouette: Silhouette) -> Asked:

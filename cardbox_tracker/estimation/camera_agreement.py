@@ -1,13 +1,14 @@
-"""Whether the cameras agree about where they stand, asked of the person whom they see.
+"""Detection of wrong extrinsics from the tracked person.
 
-With wrong extrinsics no posture fits all silhouettes: the person's size, place and height in one
-image contradict the other's. Now and then a frame is kept; from a window of them the pose of each
-further camera is estimated anew (:mod:`cardbox_tracker.estimation.camera_pose`), turned only. Where
-that turns it by more than a degree up, down or aside, the extrinsics are said to be wrong.
+With wrong extrinsics no posture fits all silhouettes: size, place and height of the person in one
+image contradict those in the other. A window of sampled frames gives a new estimate of the rotation
+of each further camera (:mod:`cardbox_tracker.estimation.camera_pose`). A difference of about a
+degree in pitch or yaw from the extrinsics is reported.
 
-A turn about the camera's own axis makes the model lean, and the posture no worse. That is told by
-planes through both cameras that touch the person
-(:mod:`cardbox_tracker.estimation.silhouette_tangents`). ``docs/two-cameras.md`` has the rates.
+A roll of the camera hardly changes the fit, because the model leans with it. It is estimated from
+the planes through both cameras that touch the person
+(:mod:`cardbox_tracker.estimation.silhouette_tangents`).
+``docs/two-cameras.md`` has detection rates.
 """
 
 from __future__ import annotations
@@ -28,30 +29,28 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.5
-"""Cameras that are turned by more, aside or about their own axis, are told of."""
+"""Pitch or yaw, and roll, beyond which extrinsics are reported as wrong."""
 
-# Every so many frames one is kept, so many make a window: 12 s at 15 images a second. The first one
-# is checked, then every fourth.
+# Frames between samples, samples in a window (12 s at 15 Hz), and samples between two checks.
 _EVERY, _WINDOW, _AGAIN = 12, 15, 60
-# Frames of which a short recording is judged.
+# Least number of samples at the end of a recording.
 _LEAST = 8
 _STEPS = 4
-# Windows of whose results the median is said.
+# Windows over which the median is taken.
 _REMEMBERED = 3
-# For the turn about its own axis every so many frames are used, so many of them, and it counts if
-# its standard deviation is less, degrees.
+# Roll: frames between samples, samples, and the largest accepted standard deviation in degrees.
 _TOPS_EVERY, _TOPS, _SURE_DEG = 6, 70, 0.5
 
 
 class CameraAgreement:
-    """Compares each further camera's extrinsics with what the person's outlines say.
+    """Compares the extrinsics of each further camera with an estimate from silhouettes.
 
-    Feeding it is cheap; :meth:`check`, which costs about as much as tracking 100 frames for each
-    further camera, is for whoever has the time: call it when :attr:`is_due`, in any thread.
+    :meth:`see` is cheap. :meth:`check` takes as long as tracking about 100 frames for each further
+    camera; call it when :attr:`is_due`, in any thread.
     """
 
     def __init__(self, body: BodyModel, first: Camera, views: Sequence[View]) -> None:
-        """Prepare for further cameras as ``views`` see ``body``, who stands before ``first``."""
+        """Begin with the ``views`` of further cameras on ``body``, measured by ``first``."""
         self._body, self._first, self._views = body, first, tuple(views)
         self._kept = [deque[Sighting](maxlen=_WINDOW) for _ in views]
         self._missing = [_WINDOW] * len(self._views)
@@ -63,12 +62,12 @@ class CameraAgreement:
     def see(
         self, state: FloatArray, first: Silhouette, others: Sequence[Silhouette | None]
     ) -> None:
-        """Take a frame whose posture is found.
+        """Add a tracked frame.
 
         Args:
-            state: of the first camera, (14,).
-            first: what of its silhouette is the person, (H, W), 0 or 255.
-            others: the same of the further cameras, turned upright; None of one without.
+            state: for the first camera, (14,).
+            first: the person's silhouette in the first camera, (H, W), 0 or 255.
+            others: upright silhouettes of the further cameras; None for a missing image.
         """
         self._frames += 1
         if self._frames % _TOPS_EVERY or not np.any(first):
@@ -83,15 +82,15 @@ class CameraAgreement:
 
     @property
     def is_due(self) -> bool:
-        """Whether a window of new frames is there for :meth:`check`."""
+        """Whether a further camera has a full window for :meth:`check`."""
         return any(count <= 0 for count in self._missing)
 
     def check(self, is_last: bool = False) -> None:
-        """Estimate how the cameras are turned that have a new window.
+        """Estimate the rotation of the cameras that have a full window.
 
         Args:
-            is_last: no more frames come, so that a camera without a window is judged by the frames
-                that there are, if they are not too few.
+            is_last: no more frames follow, so cameras that were never checked are checked with the
+                available frames if these suffice.
         """
         for number, view in enumerate(self._views):
             is_enough = is_last and not self._found[number] and len(self._kept[number]) >= _LEAST
@@ -105,44 +104,45 @@ class CameraAgreement:
 
     @property
     def turned_deg(self) -> list[float | None]:
-        """How far each further camera seems to be turned, up, down or aside, degrees.
+        """Pitch and yaw of each further camera against its extrinsics, as one angle, degrees.
 
-        Against its extrinsics, and the median of its latest windows; None of one not yet checked.
+        The median of the latest windows; None before the first check.
         """
         return [float(np.median(found)) if found else None for found in self._found]
 
     @property
     def rolled_deg(self) -> list[float | None]:
-        """How far each further camera seems to be turned about its own axis, degrees.
+        """Roll of each further camera against its extrinsics, degrees, with its sign.
 
-        As :attr:`turned_deg`, with its sign; None also where people have moved too little.
+        The median of the latest windows; None before the first check, or if the person moved too
+        little.
         """
         return [float(np.median(found)) if found else None for found in self._rolls]
 
     def remarks(self, names: Sequence[str]) -> list[str]:
-        """Return a text for each further camera whose extrinsics are doubtful.
+        """Return a warning for each further camera with doubtful extrinsics.
 
         Args:
-            names: of the further cameras.
+            names: names of the further cameras.
         """
         turned = [
-            f"the extrinsics of {name} seem to be wrong by {_shown(degrees)} degrees: the person "
-            "does not look from there as from the first camera. Was a camera moved? Calibrate them "
-            "anew; a person's distance that was measured wrongly looks the same"
+            f"the extrinsics of {name} seem to be wrong by {_shown(degrees)} degrees: the "
+            "silhouettes of the cameras contradict each other. Was a camera moved? Calibrate them "
+            "again. A wrong distance of the person has the same effect"
             for name, degrees in zip(names, self.turned_deg, strict=True)
             if degrees is not None and degrees > DOUBTFUL_DEG
         ]
         rolled = [
             f"{name} seems to be turned about its own axis by {_shown(abs(degrees))} degrees "
-            "against its extrinsics: heads and hands do not reach as high there as the first "
-            "camera shows them. Was a camera moved? Calibrate them anew"
+            "against its extrinsics: head and hands have other heights than in the first camera. "
+            "Was a camera moved? Calibrate them again"
             for name, degrees in zip(names, self.rolled_deg, strict=True)
             if degrees is not None and abs(degrees) > DOUBTFUL_ROLL_DEG
         ]
         return turned + rolled
 
     def _turn_of(self, view: View, sightings: Sequence[Sighting]) -> float:
-        """Return by how much a camera is turned, up, down or aside, degrees; infinite if beyond."""
+        """Return pitch and yaw of a camera as one angle, degrees; inf if no pose fits."""
         upright = self._upright(view)
         try:
             problem = PoseProblem(self._body, self._first, view.camera, upright, sightings)
@@ -154,7 +154,7 @@ class CameraAgreement:
         return float(np.degrees(np.linalg.norm(turned_by(upright, found)[:2])))
 
     def _upright(self, view: View) -> Extrinsics:
-        """Return where a camera stands, as if it were turned upright."""
+        """Return the pose of a camera without its roll."""
         axes = view.level_axes() @ self._first.reference_to_optical_rotation().T
         return Extrinsics(axes, view.camera.reference_to_optical_rotation() @ view.offset_m)
 

@@ -1,9 +1,8 @@
-"""Where a further camera stands, from a person in reference postures who then moves.
+"""Calibration of a further camera's pose by a person in reference postures who then moves.
 
-The first guess is of the reference postures alone (:mod:`.camera_guess`). With it both cameras
-track the person, and pose and postures are improved together (:mod:`.camera_pose`); that is done
-twice. The person's sizes and distance are the first camera's, so lengths are as right as the
-distance that was given for them.
+:mod:`.camera_guess` gives the initial pose from the reference postures. Then, twice, both cameras
+track the person, and :mod:`.camera_pose` refines the pose and the postures together. The person's
+sizes and distance come from the first camera, so an error of that distance scales all lengths.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -27,22 +27,22 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 
 _PASSES, _SIGHTINGS, _STEPS, _HALF_STEPS = 2, 30, 6, 4
 _LEAST_SIGHTINGS = 8
-# Each reference posture counts like so many frames, and how far people are from it: they face the
-# first camera, which no outline tells so well.
+# Weight of a reference posture in frames, and its standard deviations. The small ones use that
+# the person faces the first camera, which an outline shows less precisely.
 _STILL = 5
 _REFERENCE_STDDEV = np.array([0.1, 0.05, 0.08, 0.05, *[0.3] * 8, 0.1, 0.05])
-# Frames of which planes through both cameras are taken.
+# Frames whose tangent planes are used.
 _TANGENTS = 200
 
 Pair = tuple[Silhouette, Silhouette]
 
 
 class MovingFrame(NamedTuple):
-    """What both cameras saw at one time.
+    """The silhouettes and images of both cameras at one time.
 
     Attributes:
         silhouettes: (H, W), 0 or 255, of the first and of the further camera.
-        images: (H, W) or (H, W, 3) of the same, or None.
+        images: (H, W) or (H, W, 3) of the first and of the further camera; None if missing.
     """
 
     silhouettes: Pair
@@ -50,14 +50,14 @@ class MovingFrame(NamedTuple):
 
 
 class CalibratedCamera(NamedTuple):
-    """Where a further camera stands, and how sure that is.
+    """The pose of a further camera and its uncertainty.
 
     Attributes:
-        extrinsics: against the first camera.
-        halves_deg: by how much the poses differ that each half of the frames gives, degrees.
-        halves_m: the same of the camera's place, metres.
-        iou: mean intersection over union of model and silhouettes while both cameras tracked.
-        frames: of which the pose is.
+        extrinsics: transform from the first camera's optical frame to the further camera's.
+        halves_deg: angle between the poses estimated from each half of the frames, degrees.
+        halves_m: distance between the camera centres of these poses, metres.
+        iou: mean intersection over union of model and silhouettes while both cameras track.
+        frames: number of frames that were used.
     """
 
     extrinsics: Extrinsics
@@ -69,7 +69,7 @@ class CalibratedCamera(NamedTuple):
     def __str__(self) -> str:
         """Return the pose and its uncertainty as text."""
         return (
-            f"{self.extrinsics}; two halves of {self.frames} frames differ by "
+            f"{self.extrinsics}; the two halves of {self.frames} frames differ by "
             f"{self.halves_deg:.1f} degrees and {100 * self.halves_m:.1f} cm; mean IoU of both "
             f"cameras {self.iou:.3f}"
         )
@@ -85,20 +85,21 @@ def calibrated_camera(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> CalibratedCamera:
-    """Return where a further camera stands.
+    """Return the pose of a further camera.
 
     Args:
         body: the person, measured by the first camera.
         first: the first camera.
         other: the further camera, without its pitch.
         references: silhouettes of both cameras by the names of the reference postures.
-        moving: what follows them, from the front reference posture on.
-        side_turn: the way the person turned for ``side``.
-        seed: of the tracker.
+        moving: frames in which the person moves, starting in the front reference posture.
+        side_turn: direction in which the person turned for ``side``.
+        seed: seed of the tracker.
         progress: called with the finished fraction.
 
     Raises:
-        InitializationError: the silhouettes do not show one person, or too few frames do.
+        InitializationError: the silhouettes do not show the same person, or too few frames show
+            the person in both cameras.
     """
     states = reference_states(body, side_turn)
     still = [Sighting(states[name], *pair, _REFERENCE_STDDEV) for name, pair in references.items()]
@@ -114,9 +115,9 @@ def calibrated_camera(
                 progress((number + 0.8) / _PASSES)
             if len(tracked) < _LEAST_SIGHTINGS:
                 raise InitializationError(
-                    f"both cameras track the person in {len(tracked)} frames of {len(moving)}; "
+                    f"both cameras track the person in {len(tracked)} of {len(moving)} frames; "
                     f"expected {_LEAST_SIGHTINGS} or more: let the person move for ten seconds or "
-                    "longer after the reference postures, in sight of both cameras"
+                    "longer after the reference postures, visible to both cameras"
                 )
             sightings = [*still * _STILL, *tracked]
             pose = _improved(body, first, other, pose, sightings, _STEPS, tangents)
@@ -129,8 +130,8 @@ def calibrated_camera(
         ]
     except (CameraError, np.linalg.LinAlgError) as error:
         raise InitializationError(
-            f"the further camera's pose cannot be found from these frames: {error}; expected one "
-            "person whom both cameras see from the hips to the head"
+            f"the further camera's pose cannot be estimated from these frames: {error}; expected "
+            "one person whom both cameras see from the hips to the head"
         ) from None
     angle_rad, away_m = halves[0].difference(halves[1])
     if progress is not None:
@@ -141,11 +142,11 @@ def calibrated_camera(
 def _tracked(
     body: BodyModel, first: Camera, other: OtherCamera, moving: Sequence[MovingFrame], seed: int
 ) -> tuple[list[Sighting], float]:
-    """Return some of the frames with the postures that both cameras show, and the mean IoU."""
+    """Track with both cameras; return evenly spaced frames with states, and the mean IoU."""
     tracker = Tracker(body, first, default_preset(), np.random.default_rng(seed), others=[other])
     found, ious = [], []
     for silhouettes, images in moving:
-        estimate = tracker.track_views(silhouettes, images)
+        estimate = tracker.track(list(map(Observation, silhouettes, images)))
         if estimate.posture is None or estimate.offset_m is None or estimate.iou is None:
             continue
         state = np.concatenate([estimate.posture, estimate.offset_m])

@@ -1,9 +1,9 @@
-"""About where a further camera stands, from a person in the reference postures: the first guess.
+"""Initial pose of a further camera from a person in the reference postures.
 
-Cameras are tried all round the person, at several distances and pitches, none rolled; each is
-moved so that the top of the head is where its silhouettes have it. The best are improved by
-:mod:`cardbox_tracker.estimation.camera_pose`. Front and back look alike in ``front`` and ``arms``;
-``side`` tells them apart.
+A grid of camera poses without roll covers all azimuths around the person at several distances and
+pitches; each is translated so that the top of the head projects to the top of the silhouette.
+:mod:`cardbox_tracker.estimation.camera_pose` refines the best poses. Front and back views look
+alike in ``front`` and ``arms``; ``side`` separates them.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ _WIDTH = 80
 _YAWS_RAD = np.radians(np.arange(-180.0, 180.0, 7.5))
 _PITCHES_RAD = np.radians([-20.0, -10.0, 0.0, 10.0, 20.0, 30.0])
 _DISTANCES_M = np.geomspace(1.0, 5.0, 12)
-# Guesses that are improved, and how far apart they are at least, rad and metres.
+# Number of refined guesses, and their least difference in rad and metres.
 _BEST, _APART_RAD, _APART_M = 4, 0.3, 0.5
 _STEPS = 8
-# Below it, intersection over union, a silhouette shows another posture or something else.
+# A silhouette with less intersection over union shows another posture or no person.
 _LEAST_IOU = 0.5
 
 
 def reference_states(body: BodyModel, side_turn: str) -> dict[str, FloatArray]:
-    """Return the states (14,) of the reference postures where ``body`` was measured."""
+    """Return the states (14,) of the reference postures at the measured place of ``body``."""
     states = {}
     for name in ("front", "side", "arms"):
         states[name] = np.append(reference_posture(name, side_turn), [0.0, 0.0])
@@ -56,17 +56,17 @@ def guessed_extrinsics(
     references: Mapping[str, tuple[Silhouette, Silhouette]],
     side_turn: str = "left",
 ) -> Extrinsics:
-    """Return about where a further camera stands.
+    """Return the initial pose of a further camera.
 
     Args:
         body: the person, measured by the first camera.
         first: the first camera.
         other: the further camera, without its pitch.
         references: silhouettes (H, W), 0 or 255, of both cameras by the names of the postures.
-        side_turn: the way the person turned for ``side``.
+        side_turn: direction in which the person turned for ``side``.
 
     Raises:
-        InitializationError: the body is nowhere like the further camera's silhouettes.
+        InitializationError: no pose fits the further camera's silhouettes.
     """
     first = first.with_pitch(body.camera_pose.pitch_rad)
     states = reference_states(body, side_turn)
@@ -99,7 +99,7 @@ def _best_guesses(
     states: Mapping[str, FloatArray],
     seen: Mapping[str, Silhouette],
 ) -> list[Extrinsics]:
-    """Return the best guesses that are apart from each other."""
+    """Return the best guesses that differ from each other."""
     camera = other.with_pitch(0.0).scaled(_WIDTH, round(_WIDTH * other.height / other.width))
     size = camera.width, camera.height
     small = {
@@ -129,7 +129,7 @@ def _best_guesses(
 def _guesses(
     body: BodyModel, first: Camera, camera: Camera, front: NDArray[np.bool_]
 ) -> Iterator[Extrinsics]:
-    """Yield cameras of every direction that see the top of the head where ``front`` has it."""
+    """Yield poses of all directions that project the head's top to the top of ``front``."""
     rows = np.flatnonzero(front.any(axis=1))
     if not rows.size:
         return
@@ -144,7 +144,7 @@ def _guesses(
     down = first.reference_to_optical_rotation() @ np.array([0.0, 0.0, -1.0])
     for yaw in _YAWS_RAD.tolist():
         for pitch in _PITCHES_RAD.tolist():
-            # Level axes of the first camera, turned about the vertical, then pitched.
+            # The first camera's levelled axes are rotated about the vertical, then pitched.
             ahead = np.cross(np.array([1.0, 0.0, 0.0]), down)
             aside = np.cross(down, ahead)
             z = cos(yaw) * ahead + sin(yaw) * aside

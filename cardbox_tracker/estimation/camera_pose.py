@@ -1,13 +1,13 @@
-"""Where a further camera stands, from the person whom both cameras see: a bundle adjustment.
+"""Bundle adjustment of a further camera's pose and the postures of a person seen by two cameras.
 
-Unknown are the pose of the further camera, the same in all frames, and the state of the person in
-each, which begins at what was tracked. The outline of the body is to agree with the silhouettes of
-both cameras (:mod:`cardbox_tracker.estimation.cost.outline_distances`). A step solves the normal
-equations: Gauss-Newton with the states eliminated by the Schur complement (Triggs et al., "Bundle
-Adjustment -- A Modern Synthesis", 2000), and with weights as of Geman and McClure, so that hair and
-clothes, which the model lacks, weigh little.
+The unknowns are the pose of the further camera, equal in all frames, and the person's state in each
+frame, which starts at the tracked state. The residuals are the distances between the outlines of
+body and silhouettes in both cameras (:mod:`cardbox_tracker.estimation.cost.outline_distances`).
+A Gauss-Newton step solves the normal equations, from which the Schur complement eliminates the
+states (Triggs et al., "Bundle Adjustment -- A Modern Synthesis", 2000). Geman-McClure weights limit
+the influence of hair and clothes, which the model lacks.
 
-A change of the pose is six numbers: a rotation vector about the camera's own axes, rad, and a
+A change of the pose is six numbers: a rotation vector about the camera's axes, rad, and a
 translation along them, metres.
 """
 
@@ -38,32 +38,32 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 
 N_POSE = 6
 ROTATION = (0, 1, 2)
-"""Of a change, what turns the camera where it stands."""
+"""Indices of a change that rotate the camera."""
 
 WITHOUT_ROLL = (0, 1, 3, 4, 5)
-"""All but the turn about the camera's own axis, of which outlines say next to nothing."""
+"""All indices of a change but the roll, which outlines hardly constrain."""
 
 # Standard deviation of a distance, px.
 _POINT_PX = 4.0
-# How far a state may be from the tracked one: standard deviations.
+# Standard deviations of the tracked state.
 STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
-# Steps of the central differences, as of STATE_STEP.
+# Steps of the central differences by the pose.
 _POSE_STEP = np.array([0.015, 0.015, 0.015, 0.03, 0.03, 0.03])
-# Derivatives over whole pixels are too steep, so a plain step is too short.
+# Differences over whole pixels overestimate derivatives, so plain steps would be too short.
 _RELAXATION = 1.6
 _MOST_STATE_CHANGE, _MOST_POSE_CHANGE = 0.25, 0.1
-# Of a state's step, what is tried.
-_SHARES = (1.0, 0.5, 0.2, 0.0)
+# Step lengths of the line search for a state.
+_STEP_LENGTHS = (1.0, 0.5, 0.2, 0.0)
 
 
 class Sighting(NamedTuple):
-    """One person at one time.
+    """The person at one time.
 
     Attributes:
-        state: of the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
+        state: for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
         first: silhouette of the first camera, (H, W), 0 or 255.
         other: silhouette of the further camera.
-        stddev: how far the state may be from the true one, (14,).
+        stddev: standard deviations of the state, (14,).
     """
 
     state: FloatArray
@@ -72,14 +72,14 @@ class Sighting(NamedTuple):
     stddev: FloatArray = STATE_STDDEV
 
 
-class Step(NamedTuple):
-    """What one step found.
+class PoseUpdate(NamedTuple):
+    """The result of one Gauss-Newton step.
 
     Attributes:
-        extrinsics: the better ones.
-        change: by which they differ from those before, (6,).
+        extrinsics: updated pose.
+        change: from the previous pose, (6,).
         covariance: of the change, from the scatter of the sightings, (6, 6).
-        cost: mean weighted squares of the distances of a sighting, before.
+        cost: mean of the sightings' weighted squared distances before the step.
     """
 
     extrinsics: Extrinsics
@@ -89,9 +89,9 @@ class Step(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """What a sighting says: ``matrix`` (6, 6) times the change of the pose is -``right`` (6,).
+    """Reduced normal equations of a sighting: ``matrix`` (6, 6) @ change = -``right`` (6,).
 
-    The state then changes by -(``alone`` + ``by_pose`` times the change).
+    The change of the state (14,) is -(``alone`` + ``by_pose`` @ change).
     """
 
     matrix: FloatArray
@@ -102,10 +102,10 @@ class _Equations(NamedTuple):
 
 
 class PoseProblem:
-    """The sightings of one further camera, and the states that fit them so far.
+    """The bundle adjustment of one further camera.
 
     Attributes:
-        states: one (14,) for each sighting.
+        states: current estimate (14,) for each sighting.
     """
 
     def __init__(
@@ -120,15 +120,15 @@ class PoseProblem:
         """Begin at the states of ``sightings``.
 
         Args:
-            body: the person before the first camera, whose distance is trusted.
+            body: the person as measured by the first camera; the distance is kept.
             first: the first camera.
             other: the further camera, without its pitch.
-            extrinsics: about where the further camera stands.
-            sightings: of both cameras; those in which one of them shows nobody are left out.
-            tangents: of both cameras, at any times; with them a roll can be found, too.
+            extrinsics: initial pose of the further camera.
+            sightings: of both cameras; those with an empty silhouette are ignored.
+            tangents: tangent planes of both cameras, which also constrain the roll.
 
         Raises:
-            CameraError: the person's place is not in front of the further camera.
+            CameraError: the person is not in front of the further camera.
         """
         self._body, self._tangents = body, tangents
         self._first = comparing(first.with_pitch(body.camera_pose.pitch_rad))
@@ -150,16 +150,16 @@ class PoseProblem:
                 self._seen.append(pair)
         self._tracked = [state.copy() for state in self.states]
 
-    def step(self, extrinsics: Extrinsics, free: Sequence[int] | None = None) -> Step:
-        """Improve pose and states once.
+    def step(self, extrinsics: Extrinsics, free: Sequence[int] | None = None) -> PoseUpdate:
+        """Update pose and states by one Gauss-Newton step.
 
         Args:
-            extrinsics: the pose so far.
-            free: which numbers of the change are not 0; by default all, without tangents all but
-                the roll.
+            extrinsics: current pose.
+            free: indices of the change that are estimated; by default all, or all but the roll if
+                there are no tangents.
 
         Raises:
-            CameraError: the person's place is not in front of the further camera.
+            CameraError: the person is not in front of the further camera.
         """
         if free is None:
             free = WITHOUT_ROLL if self._tangents is None else range(N_POSE)
@@ -169,34 +169,35 @@ class PoseProblem:
             step[i] = _POSE_STEP[i]
             poses[i] = moved_by(extrinsics, step), moved_by(extrinsics, -step)
         beside = {i: (self._drawer(more), self._drawer(less)) for i, (more, less) in poses.items()}
-        said = [self._equations(number, here, beside) for number in range(len(self.states))]
+        equations = [self._equations(number, here, beside) for number in range(len(self.states))]
         index = np.array(list(free))
         square = np.ix_(index, index)
-        matrix = np.sum([one.matrix for one in said], axis=0)[square]
-        right = np.sum([one.right for one in said], axis=0)[index]
+        matrix = np.sum([one.matrix for one in equations], axis=0)[square]
+        right = np.sum([one.right for one in equations], axis=0)[index]
         if self._tangents is not None:
             steps = [(*poses[i], 2.0 * float(_POSE_STEP[i])) for i in free]
             more, more_right = self._tangents.equations(extrinsics, steps)
             matrix = matrix + more
-            # Their derivatives are right as they are.
+            # The derivatives of the tangents need no relaxation.
             right = right + more_right / _RELAXATION
         inverse = np.linalg.inv(matrix)
         change = np.zeros(N_POSE)
         change[index] = -_RELAXATION * inverse @ right
         change *= min(1.0, _MOST_POSE_CHANGE / max(float(np.abs(change).max()), 1e-9))
-        left = np.array([(one.right + one.matrix @ change)[index] for one in said])
+        left = np.array([(one.right + one.matrix @ change)[index] for one in equations])
         covariance = np.zeros((N_POSE, N_POSE))
         covariance[square] = inverse @ (left.T @ left) @ inverse
         better = moved_by(extrinsics, change)
         there = self._drawer(better)
-        for number, one in enumerate(said):
+        for number, one in enumerate(equations):
             moved = np.clip(
                 one.alone + one.by_pose @ change, -_MOST_STATE_CHANGE, _MOST_STATE_CHANGE
             )
-            tried = [self.states[number] - share * moved for share in _SHARES]
+            tried = [self.states[number] - length * moved for length in _STEP_LENGTHS]
             costs = [self._robust_cost(number, state, there) for state in tried]
             self.states[number] = tried[int(np.argmin(costs))]
-        return Step(better, change, covariance, float(np.mean([one.cost for one in said])))
+        cost = float(np.mean([one.cost for one in equations]))
+        return PoseUpdate(better, change, covariance, cost)
 
     def _equations(
         self, number: int, here: _Drawer, beside: dict[int, tuple[_Drawer, _Drawer]]
@@ -222,8 +223,8 @@ class PoseProblem:
         matrix[own, own] += 1.0 / self._stddevs[number] ** 2
         right[own] += (state - tracked) / self._stddevs[number] ** 2
         across = matrix[:N_STATE, N_STATE:]
-        said = np.column_stack([across, right[:N_STATE]])
-        solved = np.asarray(np.linalg.solve(matrix[:N_STATE, :N_STATE], said), np.float64)
+        columns = np.column_stack([across, right[:N_STATE]])
+        solved = np.asarray(np.linalg.solve(matrix[:N_STATE, :N_STATE], columns), np.float64)
         by_pose: FloatArray = solved[:, :-1]
         alone: FloatArray = solved[:, -1]
         return _Equations(
@@ -260,7 +261,7 @@ class PoseProblem:
 
 
 class _Drawer:
-    """Places the body before the further camera, whose image is not turned upright."""
+    """Places the body in the frame of the further camera, including the camera's roll."""
 
     def __init__(self, cost: WholeBodyCost, view: View, axes: FloatArray) -> None:
         self._cost, self._view = cost, view
@@ -275,7 +276,7 @@ class _Drawer:
 
 
 def moved_by(extrinsics: Extrinsics, change: FloatArray) -> Extrinsics:
-    """Return the pose changed by a rotation vector and a translation of its own axes, (6,)."""
+    """Return the pose after a change (6,): rotation vector and translation in the camera's axes."""
     turn = np.asarray(cv2.Rodrigues(np.asarray(change[:3], np.float64))[0], np.float64)
     return Extrinsics(
         turn @ extrinsics.rotation,
@@ -285,6 +286,6 @@ def moved_by(extrinsics: Extrinsics, change: FloatArray) -> Extrinsics:
 
 
 def turned_by(before: Extrinsics, after: Extrinsics) -> FloatArray:
-    """Return the rotation vector (3,), rad, about the camera's axes from one pose to another."""
+    """Return the rotation vector (3,), rad, in the camera's axes from one pose to another."""
     vector = np.asarray(cv2.Rodrigues(after.rotation @ before.rotation.T)[0], np.float64)
     return vector.ravel()

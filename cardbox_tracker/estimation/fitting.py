@@ -1,11 +1,10 @@
-"""When a body with unknown values is fitted: at first sight of somebody, and again.
+"""Decides when the unknown values of a body are fitted.
 
-Fitting takes about as long as a hundred frames, so it happens once a person: on the first
-silhouette that shows a whole upper body, after the image was empty, for somebody else may have
-come, where the torso has other colours than it had, and where the model fits clearly worse than it
-did. What fails is tried again after a pause, which doubles. Who bows or turns away fits worse, too,
-and then a fit is wrong: where the new body usually fits clearly worse than the one before did, that
-one is taken again.
+A fit takes as long as about a hundred frames. It is made on the first silhouette with a whole upper
+body, and again when another person may have come: after the image was empty, when the colours of
+the torso have changed, or when the model fits clearly worse than before. A failed fit is repeated
+after a pause, which doubles each time. A fit to a person who bows or turns away can be wrong, so
+the previous body is restored if the new one fits clearly worse.
 """
 
 from __future__ import annotations
@@ -22,47 +21,45 @@ from cardbox_tracker.estimation.initialization.first_sight import fit_first_sigh
 from cardbox_tracker.estimation.initialization.part_colors import torso_colors
 from cardbox_tracker.vision.camera import Camera
 
-# Frames without anybody after which somebody else may come.
+# Empty frames after which another person is expected.
 _ABSENT_FRAMES = 5
-# Frames after a fit over which it is seen how well the model usually fits, as IoU; how much worse
-# is clearly worse, and for how many frames.
+# Frames over which the usual IoU is averaged; loss of IoU, and number of frames with it, that
+# count as clearly worse.
 _USUAL_FRAMES, _WORSE, _WORSE_FRAMES = 10, 0.08, 5
-# The torso's colours are compared every so many frames; somebody else wears others: Bhattacharyya
-# distances are below 0.1 in 95 % of the frames of one person and above it between 95 % of the pairs
-# of different ones (five people, ``shared/data/real_signs``), and so often in a row. The brightness
-# counts, for dark and light shirts differ in nothing else; a lamp costs a fit that does no harm.
+# Frames between two comparisons of the torso's colours, Bhattacharyya distance of other clothes,
+# and number of such comparisons in a row that count as another person.
 _COMPARE_EVERY, _OTHER_CLOTHES, _OTHER_TIMES = 4, 0.2, 2
-# Frames from one attempt to the next, at first and at most; and those after which a fit has proved
-# itself, so that the next pause is short again.
+# Shortest and longest pause between attempts in frames, and frames of tracking after which the
+# pause is the shortest again.
 _SHORTEST_PAUSE, _LONGEST_PAUSE, _PROVED_FRAMES = 15, 1000, 40
 
 
 class Fitting:
-    """Decides from frame to frame whether to fit, for one tracker."""
+    """Decides at each frame of one tracker whether the body is fitted."""
 
     def __init__(
         self, body: BodyModel, camera: Camera, config: TrackerConfig, rng: np.random.Generator
     ) -> None:
-        """Keep the guesses to begin with.
+        """Store the initial body.
 
         Args:
-            body: with ``unknown`` values.
+            body: body model with ``unknown`` values.
             camera: working camera.
             config: settings of the tracker.
-            rng: source of the fits' noise.
+            rng: random numbers of the fits.
         """
         self._guess, self._camera, self._config, self._rng = body, camera, config, rng
         self._expect()
 
     def _expect(self) -> None:
-        """Expect somebody who was not seen yet."""
+        """Expect a new person."""
         self._is_due, self._pause, self._wait, self._absent = True, _SHORTEST_PAUSE, 0, 0
         self._ious: list[float] = []
         self._fitted: BodyModel | None = None
         self._last: tuple[BodyModel, float] | None = None
 
     def before(self, silhouette: Silhouette, image: Image | None) -> BodyModel | None:
-        """Return a body to use from this frame on, or None to go on.
+        """Return the body from this frame on, or None if it does not change.
 
         Args:
             silhouette: (H, W), 0 or 255.
@@ -81,7 +78,7 @@ class Fitting:
             fit = fit_first_sight(self._guess, self._camera, seen, image, self._config, self._rng)
         except InitializationError:
             return None
-        # Of the same person, whom it fitted; None of a person who is new.
+        # The previous body of the same person; None for a new person.
         self._last = (self._fitted, self._usual) if self._fitted and self._ious else None
         self._fitted = fit.body
         self._is_due, self._worse, self._ious = False, 0, []
@@ -91,7 +88,7 @@ class Fitting:
         return fit.body
 
     def _last_that_fitted(self) -> BodyModel | None:
-        """Return the body before the last fit if that was one for the worse, and go on with it."""
+        """Return and restore the body before the last fit if that one fits clearly worse."""
         if self._last is None or (len(self._ious) < _USUAL_FRAMES and not self._is_due):
             return None
         body, usual = self._last
@@ -104,16 +101,16 @@ class Fitting:
 
     @property
     def _usual(self) -> float:
-        """How well the fitted body usually fits, as IoU."""
+        """Mean IoU of the first frames after the fit."""
         return float(np.mean(self._ious)) if self._ious else 1.0
 
     def after(self, is_somebody: bool, iou: float | None) -> None:
-        """Take note of how well the frame was tracked.
+        """Update with the result of the frame.
 
         Args:
-            is_somebody: whether anybody was in it.
-            iou: of model and silhouette, before what was learned has corrected the result; None if
-                the person was lost.
+            is_somebody: whether a person was in the image.
+            iou: of model and silhouette before the learned correction; None if the person was
+                lost.
         """
         self._absent = 0 if is_somebody else self._absent + 1
         if self._absent == _ABSENT_FRAMES:
@@ -131,13 +128,13 @@ class Fitting:
     def compare(
         self, silhouette: Silhouette, image: Image | None, body: BodyModel, posture: FloatArray
     ) -> None:
-        """Look whether it is still the same person, by the colours of the torso.
+        """Compare the torso's colours with those at the fit to detect another person.
 
         Args:
             silhouette: (H, W), 0 or 255.
             image: of the same frame.
-            body: the person, where they are.
-            posture: theirs, (12,).
+            body: the person at the current place.
+            posture: the person's posture, (12,).
         """
         if self._is_due or self._clothes is None or image is None:
             return

@@ -1,4 +1,4 @@
-"""Postures that an estimate stands for: from particles, or from mean and deviations alone."""
+"""Samples of the posterior of an estimate, from particles or from mean and deviations."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from cardbox_tracker.estimation.filtering.particles import Particles
 def normal_postures(
     posture: FloatArray, stddev: FloatArray, count: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return postures (count, 12): each joint normal by itself, kept in its limits.
+    """Return postures (count, 12) with independent normal joints, clipped to their limits.
 
-    What the joints have to do with each other, and that a posture in depth may be mirrored, is not
-    in means and deviations; :func:`likely_postures` knows it.
+    Mean and deviations have neither correlations nor the mirror ambiguity in depth;
+    :func:`likely_postures` has both.
 
     Args:
         posture: mean, (12,), rad and metres.
         stddev: standard deviations, (12,).
-        count: how many.
-        rng: source of the noise.
+        count: number of samples.
+        rng: random numbers.
     """
     noise = rng.standard_normal((count, len(posture)))
     drawn: FloatArray = np.clip(
@@ -38,23 +38,23 @@ def likely_postures(
     count: int,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Return postures (count, 12), equally likely, that an estimate stands for.
+    """Return equally weighted samples (count, 12) of the posterior of an estimate.
 
-    They come from the particles; without any of whole states, from :func:`normal_postures`.
+    They are drawn from the particles, or by :func:`normal_postures` without particles.
 
     Args:
         posture: of the estimate, (12,).
-        stddev: its standard deviations, (12,).
-        offset_m: its ``torso_x`` and ``torso_z``, (2,), which particles need.
+        stddev: standard deviations of the estimate, (12,).
+        offset_m: ``torso_x`` and ``torso_z`` of the estimate, (2,), needed with particles.
         particles: of the same image.
-        count: how many.
-        rng: source of the draws.
+        count: number of samples.
+        rng: random numbers.
 
     Raises:
         ValueError: the estimate has no posture.
     """
     if posture is None or stddev is None:
-        raise ValueError("an estimate without a posture stands for none")
+        raise ValueError("the estimate has no posture to sample from")
     if particles is None or offset_m is None:
         return normal_postures(posture, stddev, count, rng)
     return particles.postures(np.concatenate([posture, offset_m]), count, rng)

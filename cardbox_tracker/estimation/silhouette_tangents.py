@@ -1,10 +1,9 @@
-"""What two silhouettes say of where two cameras stand, whatever the person looks like.
+"""Epipolar tangency constraints on the relative pose of two cameras.
 
-The plane through both cameras that touches a person from above touches both silhouettes, so seen
-about the line between the cameras, both reach equally high (the epipolar tangency constraint of
-Cipolla, Astrom and Giblin, "Motion from the frontier of curved surfaces", 1995). Hair and clothes,
-which the model lacks, are there in both images and do no harm: at the true pose of recorded
-sessions the heights differ by 0.1 to 0.4 px.
+A plane through both camera centres that touches a person from above touches both silhouettes
+(Cipolla, Astrom and Giblin, "Motion from the frontier of curved surfaces", 1995). So both
+silhouettes have the same highest angle about the baseline. The constraint needs no body model,
+hence hair and clothes cause no error.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
-# What touches so near to the image's border may go on beyond it.
+# A point this close to the image border may belong to a part that is cut off.
 _BORDER_PX = 4.0
-# Standard deviation of a height, and where it weighs a quarter, px. Nearly an equation: with 0.5
-# the outline of the model, which is biased, still turns a camera by two degrees.
+# Standard deviation of a height, and the height with a quarter of the weight, px. The small
+# deviation lets the tangents outweigh the outlines, which are biased.
 _HEIGHT_PX, _HALF_PX = 0.1, 4.0
-# Frames are not independent: so many count, however many there are.
+# Largest effective number of frames, since neighbouring frames are correlated.
 _COUNTED = 150
-# Of the roll: steps, what is tried for the slopes, where a height weighs a quarter and what it is
-# off at least, and what there has to be.
+# Roll: Gauss-Newton steps, step of the differences, height with a quarter of the weight, least
+# noise; fewest heights and largest condition number.
 _ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
 _FEWEST, _LARGEST_CONDITION = 8, 1e6
 
@@ -38,7 +37,7 @@ _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
 
 class TopTangents:
-    """The silhouettes of two cameras, as far as the planes through both can touch them."""
+    """The convex hulls of two cameras' silhouettes, which determine their tangent planes."""
 
     def __init__(
         self,
@@ -47,13 +46,13 @@ class TopTangents:
         pairs: Iterable[tuple[Silhouette, Silhouette]] = (),
         most: int | None = None,
     ) -> None:
-        """Take what both cameras saw at some times.
+        """Add the silhouettes of some frames.
 
         Args:
-            first: the first camera, pitched as it stands.
+            first: the first camera, including its pitch.
             other: the further camera.
-            pairs: silhouettes (H, W), 0 or 255, of both.
-            most: so many of the latest ones count; None: all.
+            pairs: silhouettes (H, W), 0 or 255, of both cameras.
+            most: number of latest frames that are kept; None keeps all.
         """
         self._first, self._other = first, other
         self._up = first.reference_to_optical_rotation() @ np.array([0.0, 0.0, 1.0])
@@ -62,21 +61,21 @@ class TopTangents:
             self.add(one, two)
 
     def add(self, one: Silhouette, two: Silhouette) -> None:
-        """Take what both cameras saw at another time, unless one of them saw nobody."""
+        """Add the silhouettes of a frame unless one of them is empty."""
         hulls = _hull(one, self._first), _hull(two, self._other)
         if all(len(rays) for rays, _ in hulls):
             self._hulls.append(hulls)
 
     def copy(self) -> TopTangents:
-        """Return what there is now, for another thread."""
+        """Return a copy for use in another thread."""
         now = TopTangents(self._first, self._other)
         now._hulls.extend(list(self._hulls))
         return now
 
     def heights(self, extrinsics: Extrinsics) -> FloatArray:
-        """Return how much higher the first camera's silhouettes reach, px of the other, (n,).
+        """Return the height of the first camera's tangent above the other camera's, (n,), px.
 
-        NaN where one is cut off by its image's border.
+        It is measured in pixels of the other camera; NaN if a silhouette is cut off at the border.
         """
         along = extrinsics.translation_m / np.linalg.norm(extrinsics.translation_m)
         up = extrinsics.rotation @ self._up
@@ -99,12 +98,12 @@ class TopTangents:
     def equations(
         self, extrinsics: Extrinsics, beside: list[tuple[Extrinsics, Extrinsics, float]]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return what the heights say of a change of the pose: ``matrix`` times it is -``right``.
+        """Return the normal equations, ``matrix`` @ change = -``right``, of a change of the pose.
 
         Args:
             extrinsics: the pose.
-            beside: of each number of the change the poses with more and with less of it, and by
-                how much they differ.
+            beside: for each number of the change the pose with a larger and with a smaller value,
+                and the difference of the values.
         """
         now = self.heights(extrinsics)
         slopes = np.array(
@@ -118,18 +117,18 @@ class TopTangents:
 
 
 def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:
-    """Return by how much the other camera is turned about its own axis, and how surely.
+    """Return the roll of the other camera against ``extrinsics``, and its standard deviation.
 
-    A turn about its axis moves heights beside the middle of the image by other amounts than heights
-    at the middle; one up or down moves all alike. Weighted least squares of both, so the person
-    has to move: heads and raised hands at several places.
+    Pitch changes all heights equally, while the effect of roll depends on the column; both are
+    estimated by weighted least squares. So the highest points (head, raised hands) must lie at
+    different columns.
 
     Args:
-        tangents: of several times.
-        extrinsics: the pose it is said to have.
+        tangents: of several frames.
+        extrinsics: assumed pose.
 
     Returns:
-        The angle that the pose lacks, and its standard deviation, rad; infinite if nothing says it.
+        Roll and its standard deviation, rad; the deviation is inf if the roll is undetermined.
     """
     turn = np.zeros(2)
     for _ in range(_ROLL_STEPS):
@@ -153,14 +152,14 @@ def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float
 
 
 def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
-    """Return the pose turned up or down, and about its own axis, by (2,), rad."""
+    """Return the pose after a pitch and a roll, (2,), rad."""
     vector = np.array([turn[0], 0.0, turn[1]])
     matrix = np.asarray(cv2.Rodrigues(vector)[0], np.float64)
     return Extrinsics(matrix @ extrinsics.rotation, matrix @ extrinsics.translation_m)
 
 
 def _hull(mask: Silhouette, camera: Camera) -> _Hull:
-    """Return the convex hull: unit rays (n, 3), and whether each is well inside the image, (n,)."""
+    """Return the convex hull as unit rays (n, 3), and whether each is inside the image, (n,)."""
     if not np.any(mask):
         return np.empty((0, 3)), np.empty(0, np.bool_)
     points = cv2.findNonZero(np.asarray(mask, np.uint8))
@@ -172,7 +171,7 @@ def _hull(mask: Silhouette, camera: Camera) -> _Hull:
 
 
 def _highest(hull: _Hull, axes: FloatArray) -> tuple[FloatArray, bool]:
-    """Return the ray that reaches highest about a line, by ``axes`` (2, 3) across it: up, ahead."""
+    """Return the ray with the largest angle in the plane of ``axes`` (2, 3): up, ahead."""
     rays, inside = hull
     up, ahead = axes @ rays.T
     number = int(np.argmax(np.arctan2(up, ahead)))

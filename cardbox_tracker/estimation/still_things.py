@@ -1,6 +1,6 @@
-"""What things look like that came to a rest before the background, such as an open door.
+"""Appearance of objects at rest in front of the background, such as an open door.
 
-A hand before such a thing is inside its region of the silhouette, but looks different from it.
+A hand in front of such an object lies in the object's region, but differs from it in colour.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from cardbox_tracker.compiling import njit
 
 ImageArray = NDArray[np.uint8]
 
-# A pixel that changes by more grey levels, in any channel, shows something else.
+# Change of a channel, in grey levels, beyond which a pixel shows something else.
 _CHANGE = 18
-# Images in which a pixel has to stay the same before it is known, and after which it is forgotten
-# while something is before it: at 15 Hz half a second and ten.
+# Images until a constant pixel is known (0.5 s at 15 Hz), and until a covered one is forgotten
+# (10 s at 15 Hz).
 _KNOWN, _LONGEST = 8, 150
 
 BACKGROUND, PERSON, THING = 0, 1, 2
-"""What a pixel shows, as far as the silhouette says."""
+"""Class of a pixel by the silhouette."""
 UNKNOWN, SAME, CHANGED = 0, 1, 2
-"""What the image says of a pixel of a thing."""
+"""Result of the comparison of a pixel with the object at rest."""
 
 
 class StillThings:
-    """The pixels of things that are not the person and stay where they are."""
+    """The pixels of objects at rest that are not the person."""
 
     def __init__(self) -> None:
-        """Start with nothing known."""
+        """Begin without known objects."""
         self._looks: ImageArray | None = None
         self._counts = np.zeros((0, 0), np.int16)
 
     def forget(self) -> None:
-        """Forget all of them."""
+        """Forget all objects."""
         self._looks = None
 
     def compare(self, image: ImageArray) -> NDArray[np.uint8]:
@@ -47,7 +47,7 @@ class StillThings:
         return found
 
     def learn(self, image: ImageArray, shows: NDArray[np.uint8]) -> None:
-        """Take an image in which each pixel ``shows`` background, person or a thing, (H, W)."""
+        """Update from an image, of which ``shows`` (H, W) has the class of each pixel."""
         planes = _planes(image)
         if self._looks is None or self._looks.shape != planes.shape:
             self._looks = np.zeros_like(planes)
@@ -56,15 +56,15 @@ class StillThings:
 
 
 def _planes(image: ImageArray) -> ImageArray:
-    """Return an image (H, W) or (H, W, 3) as (H, W, channels); what is read-only as a copy."""
-    # Compiled code has another version for memory that may not be written to.
+    """Return an image (H, W) or (H, W, 3) as (H, W, channels), copied if it is read-only."""
+    # numba would compile another version for read-only arrays.
     pixels = np.require(image, requirements=("C", "W"))
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _change(image: Any, looks: Any, v: Any, u: Any) -> Any:
-    """The largest difference of a pixel's channels."""
+    """Return the largest difference over the channels of a pixel."""
     largest: Any = 0
     for k in range(looks.shape[2]):
         largest = max(largest, abs(np.int32(image[v, u, k]) - np.int32(looks[v, u, k])))
@@ -92,12 +92,12 @@ def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
                 continue
             if count > 0 and _change(image, looks, v, u) <= _CHANGE:
                 counts[v, u] = min(count + 1, _LONGEST)
-                # Follows the light.
+                # Slow changes of the light are followed.
                 for k in range(looks.shape[2]):
                     now, before = image[v, u, k], looks[v, u, k]
                     looks[v, u, k] = before + np.uint8(now > before) - np.uint8(now < before)
             elif count > _KNOWN:
-                # Something is before it.
+                # The object is covered.
                 counts[v, u] = count - 1
             else:
                 counts[v, u] = 1

@@ -20,7 +20,7 @@ _NOTHING = MarkerShape("", 0, 0.0, _NO_POINTS, (0.0, 0.0, 0.0, 0.0))
 def write_markers(
     writer: BagWriter, topic: str, stamp_ns: int, frame_id: str, markers: Markers
 ) -> None:
-    """Write markers; those without a shape remove what was shown before."""
+    """Write markers; without shapes, a message that removes all earlier ones."""
     header = writer.header(stamp_ns, frame_id)
     messages = [_marker(writer, header, shape, _ADD) for shape in markers.shapes]
     if not messages:
@@ -30,7 +30,7 @@ def write_markers(
 
 
 def _marker(writer: BagWriter, header: Any, shape: MarkerShape, action: int) -> Any:
-    """Every field has to be given: these classes have no defaults."""
+    """Return a marker message; all fields are given because the classes have no defaults."""
     make = writer.type
     point, color = make("geometry_msgs/msg/Point"), make("std_msgs/msg/ColorRGBA")
     still = make("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)

@@ -34,7 +34,7 @@ _FILE_ENDINGS = (".mcap", ".db3", ".bag")
 
 
 class BagMessage(NamedTuple):
-    """One message: its topic, the time it was recorded, its type, and its CDR bytes."""
+    """One message: its topic, recording time, type, and CDR bytes."""
 
     topic: str
     time_ns: int
@@ -44,12 +44,12 @@ class BagMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class BagImage:
-    """One image of a recording, decoded when asked for.
+    """One image of a recording, decoded by its properties.
 
     Attributes:
-        stamp_ns: the stamp in its header.
-        frame_id: the frame in its header.
-        time_ns: when it was recorded.
+        stamp_ns: stamp of the header.
+        frame_id: frame of the header.
+        time_ns: recording time.
     """
 
     stamp_ns: int
@@ -64,24 +64,23 @@ class BagImage:
 
     @property
     def color(self) -> NDArray[np.uint8]:
-        """Colours (H, W, 3) uint8, bgr."""
+        """BGR colours (H, W, 3) uint8."""
         return self._decode(False)
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:
-        """Colours (H, W, 3), bgr, if the camera has them, else brightness (H, W), uint8."""
+        """BGR colours (H, W, 3) of a colour camera, else brightness (H, W), uint8."""
         return self._decode(None)
 
 
 class BagReader:
     """Context of an open recording.
 
-    Raises, in all its methods:
-        BagError: the recording cannot be read, or lacks the topic asked for.
+    All methods raise BagError if the recording cannot be read or lacks the requested topic.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Name the recording; it is opened on entry.
+        """Store the path; the recording is opened on entry.
 
         Args:
             path: folder of a rosbag2 recording, or its .mcap or .db3 file.
@@ -95,7 +94,7 @@ class BagReader:
         if not path.exists():
             raise BagError(f"there is no recording {path}; give a rosbag2 folder or file")
         if not path.is_dir() and not path.is_file():
-            raise BagError(f"{path} is no recording but a pipe or a device; give a folder or file")
+            raise BagError(f"{path} is a pipe or a device; give a rosbag2 folder or file")
         if path.is_dir() and not (path / "metadata.yaml").exists():
             files = [f for f in sorted(path.iterdir()) if f.suffix in _FILE_ENDINGS]
             if (path / "bag" / "metadata.yaml").exists():
@@ -114,7 +113,7 @@ class BagReader:
             self._reader = AnyReader([path], default_typestore=store)
             self._reader.open()
         except Exception as error:
-            # rosbags passes on whatever its parsers raise at damaged files.
+            # rosbags does not catch the errors of its parsers, which can be of any type.
             self._reader = None
             raise BagError(
                 f"cannot read the recording {self.path}: {_reason(error)}; give a rosbag2 "
@@ -151,7 +150,7 @@ class BagReader:
     @property
     def duration_s(self) -> float:
         """Seconds from the first to the last message."""
-        # rosbags counts to one nanosecond after the last message.
+        # The duration of rosbags includes one nanosecond after the last message.
         return float(self._open.duration - 1) / 1e9
 
     @property
@@ -160,13 +159,13 @@ class BagReader:
         return {c.topic: c.msgtype for c in self._open.connections}
 
     def count(self, topics: Sequence[str] | None = None) -> int:
-        """Messages on ``topics``, or on all."""
+        """Return the number of messages on ``topics``, or on all topics."""
         return sum(
             c.msgcount for c in self._open.connections if topics is None or c.topic in topics
         )
 
     def image_topic(self, camera: str | None = None) -> str:
-        """Return the one topic of images: of a camera's namespace, or of the recording."""
+        """Return the only image topic in the namespace ``camera``, or in the recording."""
         return self._only(IMAGE_TYPES, "image", camera)
 
     def camera_info_topic(self, camera: str | None = None) -> str:
@@ -184,15 +183,15 @@ class BagReader:
             name for name, kind in self.topics.items() if kind in types and name.startswith(folder)
         )
         if len(found) > 1 and camera is not None:
-            # Depth and the other pictures of one camera may be beside them.
+            # Depth and further images of the same camera can have topics in this namespace.
             found = [name for name in found if name in _image_names(folder)][:1] or found
         if len(found) != 1:
             where = f" below {folder}" if folder else ""
             advice = "" if folder or not found else "; choose one with --cameras NAMESPACE"
             if any(name.endswith("/tracking_state") for name in self.topics):
                 advice = (
-                    " camera's: this seems to be a bag of results; give the recording that it was "
-                    "made from"
+                    " camera. This seems to be a bag of results; give the recording from which it "
+                    "was made"
                 )
             raise BagError(
                 f"{self.path} has {len(found)} {what} topics{where}; expected one{advice}. It has "
@@ -201,10 +200,10 @@ class BagReader:
         return found[0]
 
     def messages(self, topics: Sequence[str] | None = None) -> Iterator[BagMessage]:
-        """Yield the messages of ``topics``, or of all, in the order of their time.
+        """Yield the messages of ``topics``, or of all topics, in the order of recording.
 
         Raises:
-            BagError: the recording lacks one of the topics, or turns out to be damaged.
+            BagError: the recording lacks one of the topics, or is damaged.
         """
         missing = sorted(set(topics or ()) - set(self.topics))
         if missing:
@@ -216,7 +215,7 @@ class BagReader:
             for connection, time_ns, raw in self._open.messages(chosen):
                 yield BagMessage(connection.topic, time_ns, connection.msgtype, bytes(raw))
         except Exception as error:
-            # As on opening; a consumer's errors do not arise here.
+            # The parsers of rosbags can raise any type of error.
             raise self._damaged(error) from None
 
     def deserialize(self, message: BagMessage) -> Any:
@@ -224,7 +223,7 @@ class BagReader:
         try:
             return self._open.deserialize(message.raw, message.msgtype)
         except Exception as error:
-            # As on opening.
+            # The parsers of rosbags can raise any type of error.
             raise self._damaged(error) from None
 
     def _damaged(self, error: Exception) -> BagError:
@@ -243,15 +242,15 @@ class BagReader:
                 frame_id, decode = str(image.header.frame_id), _decoder(image)
                 found = BagImage(stamp_ns_of(image), frame_id, message.time_ns, decode)
             except (AttributeError, TypeError, ValueError) as error:
-                # Recordings bring definitions of their types along.
+                # The message type is defined by the recording and may lack fields.
                 raise self._damaged(error) from None
             yield found
 
     def camera_info(self, camera: str | None = None) -> Any:
-        """Return the recording's first CameraInfo, of a camera's namespace or the only one.
+        """Return the first CameraInfo in the namespace ``camera``, or in the recording.
 
         Raises:
-            BagError: there is none.
+            BagError: the recording has no CameraInfo.
         """
         topic = self.camera_info_topic(camera)
         for message in self.messages([topic]):
@@ -259,11 +258,11 @@ class BagReader:
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return what the recording's first CameraInfo says, as :meth:`camera_info` finds it.
+        """Return the calibration in the message of :meth:`camera_info`.
 
         Raises:
-            BagError: there is none.
-            CameraError: the camera was not calibrated; the text names both topics.
+            BagError: the recording has no CameraInfo.
+            CameraError: the camera is not calibrated; the text names both topics.
         """
         topics = self.image_topic(camera), self.camera_info_topic(camera)
         info = self.camera_info(camera)
@@ -274,7 +273,7 @@ class BagReader:
 
 
 def _image_names(folder: str) -> tuple[str, ...]:
-    """Topics of images in a camera's namespace, the best first."""
+    """Return the usual image topics of a camera's namespace, the preferred one first."""
     raw = ("image_raw", "image_raw/compressed", "image_rect", "image_rect_color", "image")
     return tuple(folder + name for name in raw)
 
@@ -284,7 +283,7 @@ def _reason(error: Exception) -> str:
 
 
 def stamp_ns_of(message: Any) -> int:
-    """Return the stamp in the header of a message, ns."""
+    """Return the stamp of a message's header, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 

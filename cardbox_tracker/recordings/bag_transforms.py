@@ -11,13 +11,13 @@ TOPIC = "/tf"
 
 
 class BagTransforms:
-    """Writes ``/tf`` beside the joint states of a recording, from the URDF that is in it.
+    """Writes ``/tf`` for the joint states of a recording, from its URDF.
 
-    A recording has no robot_state_publisher; with ``/tf`` a viewer moves the URDF all the same.
+    A viewer needs ``/tf`` to move the URDF, and a recording has no robot_state_publisher.
     """
 
     def __init__(self, writer: BagWriter) -> None:
-        """Write with ``writer``; nothing before :meth:`describe`."""
+        """Use ``writer``; nothing is written before :meth:`describe`."""
         self._writer = writer
         self._links: LinkTransforms | None = None
 

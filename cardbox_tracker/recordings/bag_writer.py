@@ -1,4 +1,4 @@
-"""Write rosbag2 recordings (mcap or sqlite3) without a ROS installation, whole or not at all."""
+"""Write rosbag2 recordings (mcap or sqlite3) atomically, without a ROS installation."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _LATCHED = Qos(
 
 
 class BagWriter:
-    """Context of a new recording: a folder that appears, complete, when the context ends."""
+    """Context of a new recording, whose folder appears when the context ends without an error."""
 
     def __init__(
         self,
@@ -54,17 +54,17 @@ class BagWriter:
         compress: bool = False,
         latched: Sequence[str] = (),
     ) -> None:
-        """Name the folder.
+        """Check the folder's name.
 
         Args:
             path: folder to make.
             storage: ``mcap`` or ``sqlite3``.
-            overwrite: replace a recording of that name; nothing else is ever replaced.
+            overwrite: replace an existing recording of that name, but nothing else.
             compress: compress the chunks of an mcap file with zstd, which all its readers support.
-            latched: topics whose last message a late subscriber needs; 'ros2 bag play' knows then.
+            latched: topics that 'ros2 bag play' offers as transient local.
 
         Raises:
-            BagError: the storage is unknown, or something is in the way.
+            BagError: the storage is unknown, or ``path`` exists and may not be replaced.
         """
         self.path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if storage not in STORAGES:
@@ -72,8 +72,10 @@ class BagWriter:
         is_free = not self.path.exists() or (self.path.is_dir() and not any(self.path.iterdir()))
         is_recording = (self.path / "metadata.yaml").exists()
         if not is_free and not (overwrite and is_recording):
-            what = "a recording already" if is_recording else "no recording"
-            raise BagError(f"{self.path} exists and is {what}; choose another name or remove it")
+            what = "is a recording" if is_recording else "is not a recording"
+            raise BagError(
+                f"{self.path} exists and {what}; choose another name, or remove it first"
+            )
         self._storage = STORAGES[storage]
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._compress = compress and storage == "mcap"
@@ -102,7 +104,7 @@ class BagWriter:
 
     @property
     def folder(self) -> Path:
-        """Where the recording grows; a file put here appears in the recording's folder."""
+        """Temporary folder of the recording; a file put here appears in the final folder."""
         return self._folder / self.path.name
 
     def __exit__(
@@ -116,7 +118,7 @@ class BagWriter:
             self._writer.close()
             if kind is None:
                 if self.path.exists():
-                    # It is removed with what else is temporary.
+                    # The temporary folder is removed with the replaced recording in it.
                     os.replace(self.path, self._folder / "replaced recording")
                 os.replace(self.folder, self.path)
 

@@ -1,4 +1,4 @@
-"""``cardbox calibrate-extrinsics``: where the cameras of a recording stand."""
+"""``cardbox calibrate-extrinsics``: the extrinsics of a recording's cameras, from a person."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from cardbox_tracker.estimation.initialization.config import InitializationConfi
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.pairing import MOST_CAMERAS, side_by_side
 
-# Stamps that are further apart are not of one time.
+# Images whose stamps differ by more are not paired.
 _TOLERANCE_NS = 50_000_000
 
 
 class CalibratedCameras(NamedTuple):
-    """What a recording says of its cameras.
+    """The calibration of a recording's cameras.
 
     Attributes:
-        body: the person, as the first camera measured them.
-        cameras: working cameras by their names, the first camera first.
-        found: of each further camera, by its name.
+        body: the person, measured by the first camera.
+        cameras: working cameras by name, the first camera first.
+        found: calibration of each further camera by name.
     """
 
     body: BodyModel
@@ -50,19 +50,19 @@ def calibrate_recording(
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
 ) -> CalibratedCameras:
-    """Find where the further cameras of a recording stand against the first one.
+    """Estimate the poses of further cameras in the optical frame of the first one.
 
     Args:
         path: a recording as :class:`BagReader` takes it.
-        cameras: namespaces, the first camera first: the person faced it.
-        background: when nobody is in any image.
-        references: when the person holds ``front``, ``side`` and ``arms``.
-        motion: when the person moves, beginning as in ``front``.
-        config: how the first camera measures the person.
+        cameras: namespaces; the person faces the first camera in the reference postures.
+        background: span without a person in any image.
+        references: spans of the postures ``front``, ``side`` and ``arms``.
+        motion: span in which the person moves; it begins in the posture ``front``.
+        config: settings of the measurement by the first camera.
         progress: called with the finished fraction.
 
     Raises:
-        CardboxError: the recording or a span cannot be used, or no pose fits.
+        CardboxError: the recording or a span cannot be used, or no camera pose fits.
     """
     names = [camera.strip("/") for camera in cameras]
     if not 2 <= len(set(names)) == len(names) <= MOST_CAMERAS:
@@ -107,7 +107,7 @@ def _part(progress: Callable[[float], None], done: float, parts: int, fraction: 
 
 
 def _moving(first: SilhouetteSource, other: SilhouetteSource, span: TimeSpan) -> list[MovingFrame]:
-    def stamp_ns(frame: Frame) -> int:
+    def stamp_ns(frame: RecordedFrame) -> int:
         return frame.stamp_ns
 
     moving = []

@@ -1,6 +1,6 @@
-"""The bag that ``cardbox track --bag`` writes: what the tracker node would have published.
+"""The bag of ``cardbox track --bag``, with the topics that the tracker node publishes.
 
-``cardbox demo`` records the same topics of the nodes, see :func:`result_writer`.
+``cardbox demo`` records the same topics from the nodes with :func:`result_writer`.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from cardbox_tracker.outputs import (
 from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 _LATCHED = ("/body_model", "/robot_description")
 
 
 def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
-    """Return the writer of a bag of results, whose topics have full names.
+    """Return the writer of a bag of results.
 
     With ``overwrite`` a recording of that name is replaced.
 
     Raises:
-        BagError: something is in the way.
+        BagError: ``path`` exists and may not be replaced.
     """
     return BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
 
 
 class ResultBag:
-    """Context that collects estimates in a bag; without a path it does nothing."""
+    """Context that writes estimates to a bag, or does nothing if it has no path."""
 
     def __init__(self, path: Path | None, frame_id: str, overwrite: bool = False) -> None:
-        """Set up; the file is opened on entry and appears, whole, on exit.
+        """Prepare the bag, which is opened on entry and appears on exit.
 
         With ``overwrite`` a recording of that name is replaced.
         """
@@ -69,11 +69,11 @@ class ResultBag:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close the bag; after an error nothing is left of it."""
+        """Close the bag, or remove it after an error."""
         if self._writer is not None:
             self._writer.__exit__(kind, error, trace)
 
-    def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def add(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Write the outputs of one image."""
         if self._writer is None or self._transforms is None:
             return
@@ -83,7 +83,7 @@ class ResultBag:
         self,
         bag: BagWriter,
         transforms: BagTransforms,
-        frame: Frame,
+        frame: RecordedFrame,
         estimate: Estimate,
         tracker: Tracker,
     ) -> None:
@@ -107,7 +107,7 @@ class ResultBag:
 
 
 def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value: Value) -> None:
-    """Write an output under the header of its image, as the node has it."""
+    """Write an output with the header of its image, like the node."""
     match value:
         case JointValues(names, values):
             bag.write_joint_state(topic, stamp_ns, frame_id, names, values)

@@ -1,4 +1,4 @@
-"""Read a bag of results: of ``cardbox track --bag``, or recorded from running nodes."""
+"""Read a bag of results from ``cardbox track --bag`` or from running nodes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,15 @@ _STATE, _JOINTS, _STDDEV = "/tracking_state", "/joint_states", "/joint_states_st
 
 
 class Result(NamedTuple):
-    """What the tracker said of one image; body, posture and deviations (12,) where it did."""
+    """The tracker's result for one image.
+
+    Attributes:
+        stamp_ns: stamp of the image.
+        state: tracking state.
+        body: the measured person; None before it was published.
+        posture: d1..d12, (12,), rad and metres; None if there is no estimate.
+        stddev: standard deviations (12,); None if they are not known.
+    """
 
     stamp_ns: int
     state: str
@@ -30,7 +38,7 @@ class Result(NamedTuple):
 
 
 def has_results(bag: BagReader) -> bool:
-    """Return whether a recording has results of the tracker, not only images."""
+    """Return whether a recording has results of the tracker."""
     return any(topic.endswith(MODEL) for topic in bag.topics)
 
 
@@ -55,7 +63,7 @@ def joints_of(message: Any) -> JointValues:
 
 
 def read_results(bag: BagReader) -> Iterator[Result]:
-    """Yield what the tracker said of each image, in order.
+    """Yield the result of each image in order.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
@@ -68,15 +76,15 @@ def read_results(bag: BagReader) -> Iterator[Result]:
         try:
             found = reader.take(message.topic, message.time_ns, content)
         except (AttributeError, TypeError, ValueError) as error:
-            # Recordings bring definitions of their types along.
+            # The message type is defined by the recording and may lack fields.
             where = f"{message.topic} of {bag.path}"
-            raise BagError(f"{where} is not what it should be: {error}; record it again") from None
+            raise BagError(f"{where} has a damaged message: {error}; record it again") from None
         if found is not None:
             yield found
 
 
 class _Results:
-    """Puts together what belongs to one image: its joints, then under their stamp deviations."""
+    """Joins the messages of one image: its joint states and the deviations with their stamp."""
 
     def __init__(self, space: str) -> None:
         self._space = space

@@ -1,4 +1,4 @@
-"""``cardbox rula``: the scores of a recording while it is tracked, from the particles."""
+"""``cardbox rula``: RULA scores of a recording, from samples of each image's posterior."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from cardbox_tracker.ergonomics.distribution import SAMPLES, score_distribution
 from cardbox_tracker.ergonomics.recording import RulaRow
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
-# Apart from the tracker's random numbers, which must not depend on whether scores are asked for.
+# A separate random stream leaves the tracker's random numbers unchanged.
 _STREAM = 0x52756C61
 
 
 class RulaObserver:
-    """Scores each image; an observer of :func:`.track.track_recording`.
+    """Observer of :func:`.track.track_recording` that scores each image.
 
     Attributes:
-        rows: what was found, in the order of the images.
+        rows: one row an image, in order.
     """
 
     def __init__(self, config: RulaConfig, seed: int) -> None:
-        """Begin; the same images and ``seed`` give the same rows."""
+        """Seed the random numbers; the same images and ``seed`` give the same rows."""
         self._config = config
         self._rng = np.random.default_rng([seed, _STREAM])
         self.rows: list[RulaRow] = []
 
-    def __call__(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
-        """Score one image."""
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        """Append the row of one image."""
         scores = None
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)

@@ -1,1 +1,1 @@
-"""Moves a robot arm as the measured person moves theirs, within its limits; no ROS."""
+"""Transfer of a person's arm movements to a robot arm, within its limits; no ROS."""

@@ -1,4 +1,4 @@
-"""Settings of the retargeting."""
+"""Settings of retargeting."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cardbox_tracker.settings import check, setting
 
 @dataclass(frozen=True)
 class RetargetConfig:
-    """How a robot follows a person, and when it must not.
+    """Settings of how a robot follows a person, and of when it stands still.
 
     Raises:
         ValueError: a value is out of its range; the text names it.

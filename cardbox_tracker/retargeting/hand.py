@@ -1,8 +1,8 @@
-"""The robot's hand goes where the person's is, seen from the shoulder: inverse kinematics.
+"""Retargeting of the hand's position by inverse kinematics.
 
-The position of the hand in the person's torso, from the shoulder and as a share of the arm's
-length, is that of the robot's hand from its shoulder, as a share of its own. Joint limits are
-constraints of the quadratic programs that the library pink solves; it and pinocchio are optional.
+The vector from shoulder to hand, divided by the arm's length, is the same for the robot as for the
+person (in the torso frame). The library pink solves the inverse kinematics as quadratic programs
+with the joint limits as constraints; pink and pinocchio are optional dependencies.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from cardbox_tracker.retargeting.robot import Robot
 
 _ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
 _STEPS, _CLOSE_M = 12, 1e-3
-# What the hand leaves free is drawn to the middle; strong enough to keep elbows from wandering.
+# Redundant joints are pulled to the middle of their range, so that the elbow does not drift.
 _REST_COST = 1e-2
 _LM_DAMPING, _DAMPING = 1e-3, 1e-6
 
 
 def hand_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
-    """Return the hand from the shoulder, (3,), in the torso's frame, as a share of the arm."""
+    """Return the vector (3,) from shoulder to hand in the torso frame, in arm lengths."""
     sign = 1.0 if side == "left" else -1.0
     upper, fore = arm_directions(posture[LEFT_ARM if side == "left" else RIGHT_ARM], sign)
     parts = body_parts(body.sizes)
@@ -38,25 +38,26 @@ def hand_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
 
 
 class HandFollower:
-    """A :class:`~.retargeter.Method`: the hand of the robot follows that of the person.
+    """A :class:`~.retargeter.Method` by which the robot's hand follows the person's hand.
 
     Attributes:
         sources: the four joints of the person's arm.
-        joints: those between the robot's root and its hand.
-        reach_m: from its shoulder, which is its second joint, to its hand, when stretched.
+        joints: the robot's joints between its root and its hand.
+        reach_m: length of the robot's stretched arm from its second joint, the shoulder, to the
+            hand.
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, hand_link: str = "") -> None:
         """Prepare.
 
         Args:
-            robot: the arm.
-            config: which arm of the person, how the robot is mounted, how far it reaches.
-            hand_link: the link that is its hand; empty: the one with the most joints before it.
+            robot: the robot arm.
+            config: side of the person, mounting and reach of the robot.
+            hand_link: link of the robot's hand; if empty, the link with the longest joint chain.
 
         Raises:
-            CardboxError: the libraries are not installed, or the robot has no such link or fewer
-                than two joints before it.
+            CardboxError: the libraries are not installed, the robot has no such link, or the
+                link's chain has fewer than two joints.
         """
         pin, self._pink = _libraries()
         self.sources = tuple(f"{config.side}_{name}" for name in _ARM_JOINTS)
@@ -65,13 +66,13 @@ class HandFollower:
         self.joints = robot.chain(hand_link)
         if len(self.joints) < 2:
             raise CardboxError(
-                f"{hand_link} of the robot has {len(self.joints)} joints before it; a hand needs 2 "
-                "or more, an arm 6"
+                f"{hand_link} of the robot has {len(self.joints)} joints before it; expected at "
+                "least 2, and 6 for every position and direction"
             )
         whole = _model(pin, robot.urdf)
         fixed = [whole.getJointId(n) for n in whole.names[1:] if n not in self.joints]
         model = pin.buildReducedModel(whole, fixed, pin.neutral(whole))
-        # From the names of the library's vector to ours and back.
+        # Index of each of our joints in the library's configuration vector.
         order = [model.joints[model.getJointId(name)].idx_q for name in self.joints]
         self._order = np.array(order)
         self._configuration = self._pink.Configuration(
@@ -113,13 +114,13 @@ class HandFollower:
                     safety_break=False,
                 )
             except self._pink.exceptions.PinkError:
-                return np.full(len(self.joints), np.nan)  # no solution: the robot stands still
+                return np.full(len(self.joints), np.nan)
             self._configuration.integrate_inplace(velocity, 1.0)
         found: FloatArray = self._configuration.q[self._order]
         return found
 
     def hand_m(self, positions: FloatArray) -> FloatArray:
-        """Return where the robot's hand is, (3,), metres in its root, at joint positions (n,)."""
+        """Return the robot's hand (3,), metres in its root frame, at joint positions (n,)."""
         self._configuration.update(self._spread(positions))
         return np.array(self._frame(self._hand).translation)
 
@@ -130,7 +131,7 @@ class HandFollower:
 
 
 def _length(model: Any, joints: tuple[str, ...], hand_link: str) -> float:
-    """Return the way along the joints from the robot's shoulder to its hand."""
+    """Return the length of the joint chain from the robot's shoulder to its hand, metres."""
     steps = [model.jointPlacements[model.getJointId(name)].translation for name in joints]
     steps.append(model.frames[model.getFrameId(hand_link)].placement.translation)
     return float(sum(np.linalg.norm(step) for step in steps))

@@ -1,4 +1,4 @@
-"""The last step before a robot: whatever is wanted, limits and speeds hold, or it stands still."""
+"""Limits of position and speed, applied to every command of a robot."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Limits(NamedTuple):
 
 
 class SafeMotion:
-    """Joint positions (n,) that never leave their limits and never move too fast.
+    """Joint positions (n,) that stay within limits of position and speed.
 
     Attributes:
-        positions: of now.
+        positions: current joint positions, rad or m.
     """
 
     def __init__(self, limits: Limits, start: FloatArray | None = None) -> None:
-        """Stand at ``start``, by default 0, or the limit nearest to it.
+        """Begin at ``start``; the default is 0 or the limit nearest to 0.
 
         Raises:
             CardboxError: ``start`` is not within the limits.
@@ -35,16 +35,16 @@ class SafeMotion:
         lower, upper = limits.lower, limits.upper
         if start is None:
             start = np.clip(np.zeros(len(lower)), lower, upper)
-        if not ((start >= lower) & (start <= upper)).all():  # so written, nan is refused too
+        if not ((start >= lower) & (start <= upper)).all():  # also true if start has nan
             raise CardboxError(
-                f"the robot cannot start at {start}: it is beyond its joints' limits"
+                f"the robot cannot start at {start}; expected {lower} to {upper}, its joint limits"
             )
         self.positions: FloatArray = start
 
     def move(self, target: FloatArray, duration_s: float) -> FloatArray:
-        """Go towards ``target`` (n,) for ``duration_s``; return the positions (n,) then.
+        """Move towards ``target`` (n,) for ``duration_s`` and return the new positions (n,).
 
-        A target or a time that is not finite, or a time that runs backwards, moves nothing.
+        Nothing moves if the target or the duration is not finite, or the duration not positive.
         """
         if not (np.isfinite(target).all() and np.isfinite(duration_s) and duration_s > 0.0):
             return self.positions

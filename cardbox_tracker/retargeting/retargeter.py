@@ -1,4 +1,4 @@
-"""From one posture after the other to the joints of a robot, with a dead-man."""
+"""Robot commands from a sequence of postures, with a dead-man's switch."""
 
 from __future__ import annotations
 
@@ -18,30 +18,31 @@ MOVING = "moving"
 
 
 class Method(Protocol):
-    """How a posture becomes joints of a robot."""
+    """A mapping from postures to joint positions of a robot."""
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Names of our joints that count."""
+        """Names of the person's joints on which the target depends."""
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the robot's joints that move."""
+        """Names of the robot's joints that are moved."""
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
-        """Return where the robot's joints (n,) should be for a posture (12,).
+        """Return target positions (n,) of the robot's joints for a posture (12,).
 
-        ``now`` is where they are. Nothing has to be within any limit; nan: there is no solution.
+        ``now`` (n,) are the current positions. The target may be beyond the joint limits; it is
+        nan if there is no solution.
         """
 
 
 class Command(NamedTuple):
-    """What the robot is told at one image.
+    """Command for the robot at one image.
 
     Attributes:
         positions: of ``Retargeter.joints``, (n,), rad or m.
-        status: ``moving``, or ``frozen:`` and why.
-        duration_s: how long it may take to get there.
+        status: ``moving``, or ``frozen:`` with the reason.
+        duration_s: time in which the robot reaches the positions.
     """
 
     positions: FloatArray
@@ -50,15 +51,15 @@ class Command(NamedTuple):
 
     @property
     def is_moving(self) -> bool:
-        """False while the robot has to stand still."""
+        """False while the robot must stand still."""
         return self.status == MOVING
 
 
 class Retargeter:
-    """Tells a robot where to go, image by image; limits and speeds hold whatever is measured."""
+    """Makes one robot command an image, always within the limits of position and speed."""
 
     def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
-        """Begin at the position 0 of each joint, or its limit nearest to 0.
+        """Begin at 0, or at the limit nearest to 0, for each joint.
 
         Raises:
             CardboxError: the robot lacks a joint of ``method``.
@@ -83,13 +84,13 @@ class Retargeter:
         posture: FloatArray | None = None,
         stddev: FloatArray | None = None,
     ) -> Command:
-        """Return the command of an image.
+        """Return the command for an image.
 
         Args:
-            stamp_ns: of the image.
-            state: of the tracker; in any but ``tracking`` the robot stands still.
+            stamp_ns: stamp of the image.
+            state: tracking state; the robot moves only in the state ``tracking``.
             body: the person.
-            posture: d1..d12, (12,).
+            posture: d1..d12, (12,), rad and metres.
             stddev: their standard deviations, (12,).
         """
         before_ns, self._before_ns = self._before_ns, stamp_ns

@@ -1,4 +1,4 @@
-"""A robot's joints and their limits, from its URDF."""
+"""A robot's joints and their limits from its URDF."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LARGEST_BYTES = 20_000_000
 
 @dataclass(frozen=True)
 class Joint:
-    """One movable joint: limits in rad or m, the speed of its URDF in rad/s or m/s, or inf."""
+    """One movable joint with limits in rad or m; ``speed`` in rad/s or m/s is inf if not given."""
 
     name: str
     lower: float
@@ -33,9 +33,9 @@ class Robot:
     """A robot.
 
     Attributes:
-        urdf: its description, in which joints without end are limited to half a turn either way.
-        joints: the movable joints by name, in the order of the description.
-        parents: of each link but the root, its joint's name and the link before.
+        urdf: description, in which continuous joints are limited to half a turn either way.
+        joints: movable joints by name, in the order of the description.
+        parents: for each link but the root, the names of its joint and its parent link.
     """
 
     urdf: str
@@ -44,17 +44,17 @@ class Robot:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """All links, the root first."""
+        """All links; the root is the first one."""
         roots = {parent for _, parent in self.parents.values()} - self.parents.keys()
         return (*sorted(roots), *self.parents)
 
     @property
     def last_link(self) -> str:
-        """The link with the most movable joints before it."""
+        """The link with the longest chain of movable joints."""
         return max(reversed(self.links), key=lambda link: len(self.chain(link)))
 
     def chain(self, link: str) -> tuple[str, ...]:
-        """Return the movable joints between the root and ``link``, from the root on.
+        """Return the movable joints from the root to ``link``.
 
         Raises:
             CardboxError: there is no such link.
@@ -71,10 +71,10 @@ class Robot:
         return tuple(reversed(found))
 
     def limits_of(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return lowest and highest positions and speeds (n,) of joints.
+        """Return lower limits, upper limits and highest speeds, each (n,), of joints.
 
         Raises:
-            CardboxError: there is no such joint, or it cannot move.
+            CardboxError: there is no movable joint of that name.
         """
         unknown = [name for name in names if name not in self.joints]
         if unknown:
@@ -92,7 +92,7 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     """Read a URDF file.
 
     Raises:
-        CardboxError: it cannot be read, or is no URDF of a robot that moves.
+        CardboxError: the file cannot be read, or is not a URDF with movable joints.
     """
     try:
         if Path(path).stat().st_size > _LARGEST_BYTES:
@@ -103,12 +103,12 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
             f"cannot read the robot {path}: {error.strerror}; expected a URDF file"
         ) from None
     except UnicodeDecodeError:
-        raise CardboxError(f"{path} is no text; expected the URDF of a robot") from None
+        raise CardboxError(f"{path} is not a text file; expected the URDF of a robot") from None
     return parse_robot(text, str(path))
 
 
 def parse_robot(text: str, source: str = "the description") -> Robot:
-    """Read a URDF; ``source`` names it in errors.
+    """Parse a URDF; ``source`` names it in errors.
 
     Raises:
         CardboxError: see :func:`load_robot`.
@@ -116,17 +116,17 @@ def parse_robot(text: str, source: str = "the description") -> Robot:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise CardboxError(f"{source} defines entities, which no URDF needs; remove them")
     if "xmlns:xacro" in text:
-        raise CardboxError(f"{source} is xacro; make a URDF of it first: xacro FILE > robot.urdf")
+        raise CardboxError(f"{source} is xacro; convert it first: xacro FILE > robot.urdf")
     try:
         root = Xml.fromstring(text)
     except Xml.ParseError as error:
-        raise CardboxError(f"{source} is no URDF: {error}; expected the URDF of a robot") from None
+        raise CardboxError(f"{source} is not XML: {error}; expected the URDF of a robot") from None
     try:
         return _robot(root)
     except (AttributeError, KeyError, ValueError) as error:
         raise CardboxError(
-            f"{source} is no URDF of a robot that moves: {error}; every joint needs name, type, "
-            "parent and child, and a revolute or prismatic one finite limits"
+            f"{source} is not a URDF with movable joints: {error}; every joint needs name, type, "
+            "parent and child, and a revolute or prismatic joint finite limits"
         ) from None
 
 
@@ -137,7 +137,7 @@ def _robot(root: Xml.Element) -> Robot:
         name, kind = element.attrib["name"], element.attrib["type"]
         parent, child = (_attribute(element, which, "link") for which in ("parent", "child"))
         if child in parents or name in joints:
-            raise ValueError(f"{child} has two joints before it, or {name} is there twice")
+            raise ValueError(f"the link {child} has two parents, or two joints are named {name}")
         parents[child] = name, parent
         if kind in _MOVABLE and element.find("mimic") is None:
             joints[name] = _joint(element, name, kind)
@@ -145,7 +145,7 @@ def _robot(root: Xml.Element) -> Robot:
         seen, at = {link}, parents[link][1]
         while at in parents:
             if at in seen:
-                raise ValueError(f"the links go in a circle at {at}")
+                raise ValueError(f"the link {at} is its own ancestor")
             seen.add(at)
             at = parents[at][1]
     if not joints:
@@ -167,12 +167,12 @@ def _joint(element: Xml.Element, name: str, kind: str) -> Joint:
             raise ValueError(f"the joint {name} has no limit")
         limit = Xml.SubElement(element, "limit", effort="0", velocity="0")
     if kind == "continuous":
-        # Half a turn either way: what follows an arm needs no more, and a joint then is one number.
+        # Half a turn suffices for an arm, and pinocchio has one number for a limited joint.
         element.set("type", "revolute")
         limit.set("lower", repr(-math.pi))
         limit.set("upper", repr(math.pi))
     lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
     speed = float(limit.get("velocity", 0.0))
     if not (math.isfinite(lower) and math.isfinite(upper) and lower <= upper and speed >= 0.0):
-        raise ValueError(f"the joint {name} may be at {lower} to {upper}, at a speed of {speed}")
+        raise ValueError(f"the joint {name} has limits {lower} to {upper} and the speed {speed}")
     return Joint(name, lower, upper, speed or math.inf)

@@ -1,4 +1,4 @@
-"""A retargeter from what a user names: a robot, and a joint map or a hand."""
+"""Construction of a retargeter from a robot's URDF and a joint map or hand link."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def make_retargeter(
     hand_link: str,
     config: RetargetConfig,
 ) -> tuple[Robot, Retargeter]:
-    """Return the robot and what moves it.
+    """Return a robot and its retargeter.
 
     Args:
-        robot_file: its URDF.
-        joint_map: file of the joint map; without it, inverse kinematics of the hand.
-        hand_link: the robot's hand; empty: the link with the most joints before it.
+        robot_file: URDF of the robot.
+        joint_map: file of a joint map; if None, the hand is followed by inverse kinematics.
+        hand_link: link of the robot's hand; if empty, the link with the longest joint chain.
         config: settings.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The cameras of a synthetic session: one, or several around the person."""
+"""The cameras of a synthetic session, placed around the person."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ IMAGE_TOPIC = "/camera/image_raw"
 CAMERA_INFO_TOPIC = "/camera/camera_info"
 FRAME_ID = "camera_optical_frame"
 
-# How far round to the person's left the cameras stand, degrees; all at the same distance.
+# Azimuths of the cameras towards the person's left, degrees; all have the same distance.
 _ROUND_DEG = (0.0, 65.0, -55.0, 110.0)
 
 
@@ -29,9 +29,9 @@ class SyntheticCamera:
 
     Attributes:
         name: namespace of its topics.
-        camera: pitched as it stands.
-        extrinsics: against the first camera.
-        view: how a further camera sees the person; None of the first one.
+        camera: intrinsics and pitch.
+        extrinsics: transform from the optical frame of the first camera to this one's.
+        view: transform of body states to a further camera; None for the first camera.
     """
 
     name: str
@@ -41,23 +41,23 @@ class SyntheticCamera:
 
     @property
     def image_topic(self) -> str:
-        """Where its images are."""
+        """Topic of the images."""
         return f"/{self.name}/image_raw"
 
     @property
     def info_topic(self) -> str:
-        """Where its CameraInfo is."""
+        """Topic of the CameraInfo."""
         return f"/{self.name}/camera_info"
 
     @property
     def frame_id(self) -> str:
-        """Its optical frame."""
+        """Name of the optical frame."""
         return f"{self.name}_optical_frame"
 
     def seen(
         self, body: BodyModel, posture: NDArray[np.float64]
     ) -> tuple[BodyModel, NDArray[np.float64]]:
-        """Return the person in ``posture`` (12,) as they stand before this camera."""
+        """Return body and posture (12,) in this camera's reference frame."""
         if self.view is None:
             return body, posture
         there = self.view.states(np.append(posture, [0.0, 0.0]))
@@ -69,7 +69,7 @@ class SyntheticCamera:
         return moved, there[:12]
 
     def truth(self) -> dict[str, Any]:
-        """Return what ``ground_truth.json`` says of it."""
+        """Return the camera's entry of ``ground_truth.json``."""
         rows = np.column_stack([self.extrinsics.rotation, self.extrinsics.translation_m])
         return {
             "name": self.name,
@@ -86,15 +86,15 @@ class SyntheticCamera:
 
 
 def synthetic_cameras(body: BodyModel, first: Camera, count: int) -> list[SyntheticCamera]:
-    """Return ``count`` cameras alike; the person, placed as ``body``, faces the first.
+    """Return ``count`` cameras like ``first``; the person, placed as in ``body``, faces the first.
 
-    The further ones look at the person from where they stand, at the height of the first one.
+    All have the height of the first camera and look at the person.
 
     Raises:
-        CardboxError: there are none or too many.
+        CardboxError: ``count`` is out of range.
     """
     if not 1 <= count <= MOST_CAMERAS:
-        raise CardboxError(f"{count} cameras; expected 1 to {MOST_CAMERAS}")
+        raise CardboxError(f"{count} cameras were requested; expected 1 to {MOST_CAMERAS}")
     alone = Extrinsics(np.eye(3), np.zeros(3))
     if count == 1:
         return [SyntheticCamera("camera", first, alone)]

@@ -1,7 +1,7 @@
-"""What a synthetic person does: a timeline of postures.
+"""The timeline of a synthetic person's postures.
 
 A session starts with the empty scene; the person walks in, holds the three reference postures and
-does the motions. All movements are minimum-jerk, so speed is continuous.
+performs the motions. All movements are minimum-jerk, so speed is continuous.
 """
 
 from __future__ import annotations
@@ -23,7 +23,14 @@ _ENTER_FROM_M = 1.6
 
 @dataclass(frozen=True)
 class Segment:
-    """Part of the timeline; ``pose`` takes seconds from its start, None is the empty scene."""
+    """Part of the timeline.
+
+    Attributes:
+        name: of the motion or reference posture.
+        start_s: from the session's start.
+        end_s: from the session's start.
+        pose: posture (12,) at a time in seconds from ``start_s``; None in the empty scene.
+    """
 
     name: str
     start_s: float
@@ -46,7 +53,7 @@ def _envelope(t: float, duration_s: float, ramp_s: float) -> float:
 
 
 def _ramp(angle_rad: float) -> float:
-    """max(0, angle), rounded at 0 so that an arm's speed does not jump."""
+    """Return max(0, angle), smoothed at 0 so that the speed of an arm is continuous."""
     rounding_rad = np.radians(5.0)
     return float((angle_rad + np.hypot(angle_rad, rounding_rad) - rounding_rad) / 2.0)
 
@@ -70,7 +77,7 @@ def bend(t: float) -> FloatArray:
     posture = reference_posture("front")
     roll = np.radians(22.0) * np.sin(2.0 * np.pi * 2.0 * t / BEND_S) * _envelope(t, BEND_S, 1.0)
     posture[1] = roll
-    # The arms keep hanging: the one on the bent side moves away from the body.
+    # The arms hang vertically, so the arm on the bent side moves away from the torso.
     posture[4] += _ramp(-roll)
     posture[8] += _ramp(roll)
     return posture
@@ -81,7 +88,7 @@ def bow(t: float) -> FloatArray:
     posture = reference_posture("front")
     pitch = np.radians(35.0) * _envelope(t, BOW_S, 2.5)
     posture[2] = pitch
-    # The arms keep hanging down while the torso leans.
+    # The arms stay almost vertical while the torso leans.
     posture[5] = posture[9] = 0.6 * pitch
     return posture
 
@@ -91,7 +98,7 @@ MOTIONS: dict[str, tuple[float, Callable[[float], FloatArray]]] = {
     "bend": (BEND_S, bend),
     "bow": (BOW_S, bow),
 }
-"""Duration in seconds and posture at a time, by name."""
+"""Duration in seconds, and posture as a function of time, by name."""
 
 
 def timeline(motion: str, side_turn: str = "left") -> list[Segment]:
@@ -99,7 +106,7 @@ def timeline(motion: str, side_turn: str = "left") -> list[Segment]:
 
     Args:
         motion: a name of ``MOTIONS``, or ``all`` for each of them in turn.
-        side_turn: the way the person turns for the side reference.
+        side_turn: direction in which the person turns for the side reference.
 
     Raises:
         CardboxError: the motion is unknown.

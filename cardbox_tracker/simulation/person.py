@@ -1,10 +1,10 @@
-"""A person with volume: rounded parts around the skeleton, no cardbox.
+"""A synthetic person with rounded body parts.
 
-Each part is a stack of elliptical rings; between two neighbouring rings it is their convex hull.
-The rings follow the sizes of a :class:`BodyModel` roughly: limbs taper, the torso narrows at waist
-and shoulders, and there are a neck, open hands and legs. As in people, the shoulder joints rise
-with the arms. The cardbox model therefore never matches perfectly, while the skeleton is known
-exactly: :func:`person_frames`.
+Each part is a stack of elliptical rings; the part is the convex hull of each two neighbouring
+rings. The rings roughly follow the sizes of a :class:`BodyModel`: limbs taper, the torso narrows at
+waist and shoulders, and there are a neck, open hands and legs. The shoulder joints rise with the
+arms. So the cardbox model never matches exactly, while :func:`person_frames` gives the true
+skeleton.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ _RING_POINTS = 16
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)
 
 FINGER_REACH = 0.247
-"""How far open fingers reach beyond the knuckles, of elbow to knuckles: mean of rendered bodies.
-0.28 after de Leva, "Adjustments to Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996."""
+"""Length of open fingers beyond the knuckles, divided by the distance from elbow to knuckles:
+mean of rendered bodies. The value of de Leva, "Adjustments to Zatsiorsky-Seluyanov's Segment
+Inertia Parameters", 1996, is 0.28."""
 
 _FOREARM = [
     *((-0.1, 0.6), (0.0, 1.05), (0.25, 1.15), (0.62, 0.85), (0.72, 0.75)),
     *((0.8, 0.95), (0.92, 1.0), (1.0, 0.9)),
     *((1.0 + 0.5 * FINGER_REACH, 0.6), (1.0 + FINGER_REACH, 0.25)),
 ]
-"""Profile of forearm, palm and fingers: place along it, factor on its radius. The keypoint of the
-hand is at 1, where the fingers begin and a fist would end."""
+"""Profile of forearm, palm and fingers: position along the axis, factor of the radius. The
+keypoint of the hand is at 1, where the fingers begin."""
 
-# The clavicle is 0.43 of the breadth long. Beyond an elevation of the arm of 30 degrees it rises by
-# 0.18 of what the arm does (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder
-# Joint", 1944, rounded).
+# Shoulder rhythm: beyond the setting angle, the clavicle rises by a fraction of the arm's elevation
+# (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder Joint", 1944, rounded).
 _CLAVICLE_OF_BREADTH, _CLAVICLE_RISE, _SETTING_RAD = 0.43, 0.18, np.radians(30.0)
 
 SKIN, SHIRT, TROUSERS = 125, 70, 45
@@ -46,7 +46,7 @@ SKIN, SHIRT, TROUSERS = 125, 70, 45
 
 
 class VolumePart(NamedTuple):
-    """Rings (n, 16, 3) in the reference frame, metres, and a brightness."""
+    """Rings (n, 16, 3) in the reference frame, metres, and a brightness in grey levels."""
 
     rings: FloatArray
     brightness: int
@@ -73,7 +73,7 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
 
 
 def person_frames(body: BodyModel, postures: FloatArray) -> BodyFrames:
-    """Return where the parts of a person are, whose shoulders rise with the arms.
+    """Return the frames of a person whose shoulders rise with the arms.
 
     Args:
         body: the person.
@@ -102,11 +102,11 @@ def person_keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
 
 
 def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
-    """Return how much higher along the torso a shoulder joint is, (...), metres.
+    """Return the lift (...) of a shoulder joint along the torso's axis, metres.
 
     Args:
         breadth_m: distance of the shoulder joints while the arms hang.
-        elevation_rad: angle (...) of the upper arm to the torso's axis, 0 where it hangs.
+        elevation_rad: angle (...) between the upper arm and the downward axis of the torso.
     """
     rise_rad = _CLAVICLE_RISE * np.maximum(0.0, np.asarray(elevation_rad) - _SETTING_RAD)
     lift: FloatArray = _CLAVICLE_OF_BREADTH * breadth_m * np.sin(rise_rad)
@@ -177,7 +177,7 @@ def _head(body: BodyModel, frames: BodyFrames) -> VolumePart:
 
 
 def _legs(body: BodyModel, frames: BodyFrames) -> list[VolumePart]:
-    """Two straight legs below the hips, which only turn with the hips."""
+    """Return two vertical legs below the hips; they follow only the yaw of the hips."""
     parts = body_parts(body.sizes)
     aside = parts.waist.bottom_width_m / 4
     radius = 0.98 * aside
@@ -202,7 +202,7 @@ def _tube(
     radius_m: float,
     brightness: int,
 ) -> VolumePart:
-    """Round part from ``start`` to ``end``; ``profile`` has (place along it, factor on radius)."""
+    """Return a round part; ``profile`` has (fraction of the length, factor of the radius)."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     z = axis / length
@@ -217,7 +217,7 @@ def _tube(
 def _rings(
     profile: list[tuple[float, float, float]], rotation: FloatArray, origin: FloatArray
 ) -> FloatArray:
-    """Rings (n, 16, 3) from (height along Z, half extent along Y, half extent along X)."""
+    """Return rings (n, 16, 3) from (height along Z, half extent along Y, half extent along X)."""
     height, half_y, half_x = np.array(profile).T[..., None]
     rings = np.empty((len(height), _RING_POINTS, 3))
     rings[..., 0] = half_x * np.cos(_ANGLES)

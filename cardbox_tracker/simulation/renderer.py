@@ -1,4 +1,4 @@
-"""Images of a synthetic person in front of a wall, with the noise of a camera."""
+"""Images of a synthetic person in front of a wall, with sensor noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cardbox_tracker.vision.rasterisation import in_front
 
 ImageArray = NDArray[np.uint8]
 
-# fillConvexPoly paints every pixel that an edge touches: at 4 an outline is 0.1 px too wide.
+# fillConvexPoly paints every pixel that an edge touches, which widens outlines by up to a subpixel.
 _SUPERSAMPLING = 4
 _SHIFT = 4
 
@@ -30,7 +30,7 @@ class Scene:
         texture: standard deviation of the wall's blotches, grey levels.
         noise: standard deviation of the sensor's noise, grey levels.
         flicker: standard deviation of the whole scene's brightness, as a fraction.
-        shadow: how much darker the wall is in the middle of the person's soft shadow, fraction.
+        shadow: darkening of the wall in the middle of the person's soft shadow, as a fraction.
     """
 
     wall: float = 180.0
@@ -41,10 +41,10 @@ class Scene:
 
 
 class Renderer:
-    """Draws one scene; all its randomness comes from the generator it is given."""
+    """Renders one scene; all random numbers come from the given generator."""
 
     def __init__(self, camera: Camera, scene: Scene, rng: np.random.Generator) -> None:
-        """Paint the wall."""
+        """Generate the wall."""
         self.camera = camera
         self._scene = scene
         self._rng = rng
@@ -72,7 +72,7 @@ class Renderer:
         return np.clip(np.rint(clean * gain + noise), 0, 255).astype(np.uint8), mask
 
     def _shade(self, cover: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Depth of the person's shadow on the wall, (H, W) in [0, 1]: light from above left."""
+        """Return the strength (H, W) of the shadow in [0, 1]; the light comes from above left."""
         height, width = cover.shape
         move = np.array([(1.0, 0.0, 0.05 * width), (0.0, 1.0, 0.04 * height)])
         cast = cv2.warpAffine(cover, move, (width, height))
@@ -81,23 +81,23 @@ class Renderer:
     def _draw(
         self, body: BodyModel, posture: NDArray[np.float64]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Brightness times cover, and cover in [0, 1], of the person alone, each (H, W)."""
+        """Return brightness times coverage, and coverage in [0, 1], of the person, each (H, W)."""
         camera = self.camera.scaled(
             _SUPERSAMPLING * self.camera.width, _SUPERSAMPLING * self.camera.height
         )
         shade = np.zeros((camera.height, camera.width), np.uint8)
         cover = np.zeros_like(shade)
-        # From far to near, so that a near arm covers the torso, and the torso a far arm.
+        # Painter's algorithm: near parts cover far ones.
         parts = sorted(person_parts(body, posture), key=lambda part: part.rings[..., 0].mean())
         for part in parts:
             points = camera.reference_to_optical(part.rings)
-            # Nobody synthetic comes so near; hulls of rings are left out instead of being cut.
+            # Parts behind the camera are skipped; clipping is not needed for synthetic people.
             if not in_front(points).all():
                 continue
             pixels = np.asarray(np.rint(camera.project(points) * (1 << _SHIFT)), dtype=np.int32)
             for i, pair in enumerate(pairwise(pixels)):
                 hull = cv2.convexHull(np.concatenate(pair))
-                # Slightly brighter towards the top, so that a part is not one flat grey.
+                # The brightness varies along a part, so that it is not uniform.
                 level = part.brightness + 6 * (i % 3)
                 cv2.fillConvexPoly(shade, hull, level, cv2.LINE_8, _SHIFT)
                 cv2.fillConvexPoly(cover, hull, 255, cv2.LINE_8, _SHIFT)

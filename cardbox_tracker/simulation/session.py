@@ -1,7 +1,7 @@
-"""Record a synthetic session: a rosbag with ground truth, as a camera driver would record it.
+"""Synthetic sessions: rosbag2 recordings of rendered images with ground truth.
 
-The folder is a rosbag2 recording; beside its metadata lie ``ground_truth.json`` and ``masks.npz``.
-Same seed, same images, byte for byte.
+The folder of the recording also has ``ground_truth.json`` and ``masks.npz``. The same seed gives
+the same images byte for byte.
 """
 
 from __future__ import annotations
@@ -67,18 +67,18 @@ def synthesize_session(
     Args:
         output: folder of the recording; it appears when it is complete.
         motion: ``wave``, ``bend``, ``bow`` or ``all``.
-        seed: of noise and sway.
-        fps: images a second.
+        seed: seed of noise and sway.
+        fps: images per second.
         width: image width, px.
         height: image height, px.
-        body: the person; a default one without it. Their camera pitch is the camera's.
+        body: the person, and the pitch of the camera; None for the default person.
         storage: ``mcap`` or ``sqlite3``.
         compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
-        encoding: ``mono8``, ``rgb8`` or ``bgr8`` of raw images.
+        encoding: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``.
         scene: wall and sensor.
-        cameras: how many see the person, 1 to 4. Several are ``cam0``, ``cam1``, ... below
-            namespaces of these names; ``extrinsics.yaml`` in the folder says where they stand.
-        overwrite: replace a recording of that name.
+        cameras: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
+            ``extrinsics.yaml`` in the folder has their poses.
+        overwrite: replace an existing recording of that name.
         progress: called with the finished fraction.
 
     Raises:
@@ -114,7 +114,7 @@ def synthesize_session(
             }
             posture = None
             if segment.pose is not None:
-                # People sway a little: a slow random walk that is pulled back to its centre.
+                # The person sways: a slow random walk that is pulled back to its centre.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
                 posture[0] += body.placement.lateral_m + sway

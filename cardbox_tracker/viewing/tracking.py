@@ -9,7 +9,7 @@ from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_deviations, joint_values
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.viewing.feed import Feed
 
 _SCALE = 2
@@ -28,7 +28,7 @@ class ShownTracking:
         self._described: object = None
         self.count = 0
 
-    def __call__(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Show one image."""
         feed, stamp_ns = self._feed, frame.stamp_ns
         if tracker.body is not self._described:

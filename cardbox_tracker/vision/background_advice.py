@@ -1,30 +1,30 @@
-"""Advice of the background node on problems of its input."""
+"""Advice about the camera's images: losses, brightness and distance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# The default shared-memory segment of Fast DDS has half a megabyte, including its own data.
+# The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
 _LOSS_TO_WARN = 0.1
-# This is well above the noise of a median over the image.
+# Well above the noise of a median over the image.
 _DRIFT_TO_WARN_GREY_LEVELS = 12.0
-# A person who is completely in view covers less of the image.
+# A person who is wholly in view covers less of the image.
 _COVERAGE_TO_WARN = 0.6
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Observations on the images.
+    """Measurements of the images.
 
     Attributes:
-        topic: topic of the images.
-        loss: share of the images that were lost.
-        image_bytes: size of an image.
-        drift: brightness of the images minus that of the background, grey levels.
-        follows: whether the changes of the light are followed.
+        topic: the images' topic.
+        loss: share of them that never arrived.
+        image_bytes: size of one.
+        drift: how much brighter they are than the background, grey levels.
+        follows: True if the light is followed.
         covered: share of the image that is foreground.
-        within_m: limit of the depth of foreground; 0 if the background is learned.
+        within_m: pixels nearer than this are foreground, m; 0: the learned background decides.
     """
 
     topic: str
@@ -37,7 +37,7 @@ class Findings:
 
 
 def advice(findings: Findings) -> dict[str, str]:
-    """Return advice to the user, a text for each kind of problem."""
+    """Return what a user should do about the images, a text for each kind of trouble."""
     texts = {}
     if findings.loss > _LOSS_TO_WARN and findings.image_bytes > _LARGE_IMAGE_BYTES:
         texts["loss"] = (

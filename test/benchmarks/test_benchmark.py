@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.benchmarks import core as benchmark_core
-from cardbox_tracker.benchmarks import report as benchmark_report
-from cardbox_tracker.benchmarks import run as benchmark
-from cardbox_tracker.benchmarks.scene import make_scene
+from benchmarks import core as benchmark_core
+from benchmarks import report as benchmark_report
+from benchmarks import run as benchmark
+from benchmarks.scene import make_scene
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.evaluation.paper.results import read_json
+from cardbox_tracker.evaluation.results import read_json
 from tools.readme_figures import BENCHMARKS
 
 ROOT = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
 SHARED = {
-    *("output_paths", "signals", "__init__", "arguments", "command", "main"),
+    *("output_paths", "__init__", "arguments", "checkout", "command", "main"),
     "settings_arguments",
 }
 

@@ -58,9 +58,7 @@ def test_evaluate_does_not_replace_a_report_but_resumes_without_one(
     tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[Path] = []
-    monkeypatch.setattr(
-        "cardbox_tracker.evaluation.paper.evaluate.evaluate", lambda *given: done.append(given[0])
-    )
+    monkeypatch.setattr("experiments.evaluate.evaluate", lambda *given: done.append(given[0]))
     (tmp_path / "parts").mkdir()
     assert cardbox("evaluate", "--output", tmp_path).code == 0
     (tmp_path / "report.md").write_text("days of work")

@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_bag import ResultBag
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.vision.camera import Camera
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -31,7 +31,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
     with ResultBag(path, "camera") as bag:
         for i, estimate in enumerate((seen, seen, Estimate(LOST), seen, seen)):
-            bag.add(Frame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+            bag.add(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
     return path
 
 
@@ -66,8 +66,8 @@ def test_the_robot_follows_and_stands_still(
     ("words", "expected"),
     [
         (("--robot", "FOLDER/missing.urdf"), "missing.urdf: No such file or directory"),
-        (("--robot", str(MAP)), "is no URDF"),
-        (("--map", str(ROBOT)), "is no joint map"),
+        (("--robot", str(MAP)), "expected the URDF"),
+        (("--map", str(ROBOT)), "config/example_joint_map.yaml"),
         (("--map", str(MAP), "--hand", "hand_link"), "either a joint map or a hand"),
         (("--max-speed", "100"), "--max-speed is 100; expected 0.01 to 20"),
         (("--side", "both"), "--side: invalid choice: 'both'"),

@@ -14,7 +14,7 @@ from cardbox_tracker.drawing.overlay import TEXT_BGR
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.guidance import (
     HOLD_STILL,
-    Step,
+    Prompt,
     measuring,
     short_words,
 )
@@ -143,7 +143,7 @@ def test_the_outline_stands_where_the_person_does() -> None:
     guide = Guide(CAMERA, InitializationConfig(2.0))
     middles = []
     for aside_m in (-0.3, 0.3):
-        image = guide.draw(Step("front", "x"), person("front", aside_m), None, False)[304:]
+        image = guide.draw(Prompt("front", "x"), person("front", aside_m), None, False)[304:]
         outline = sum(coloured(image, colour) for colour in FIT_BGR.values())
         middles.append(np.nonzero(outline)[1].mean() / 2)
     # 0.3 m at 2 m are 330 * 0.15 = 49.5 px.

@@ -420,16 +420,18 @@ class _Infected:
 
     made = 0
 
-    def __init__(self, config: Any, silhouette: Any, rng: Any, part: str = "posture") -> None:
+    def __init__(
+        self, config: Any, silhouette: Any, rng: Any, views: Any, part: str = "posture"
+    ) -> None:
         type(self).made += 1
-        self._inner = FILTERS[config.filter](config, silhouette, rng)
+        self._inner = FILTERS[config.filter](config, silhouette, rng, views)
         self._frames, self._part = 0, part
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._inner, name)
 
-    def follow(self, terms: Any) -> Any:
-        fit = self._inner.follow(terms)
+    def follow(self, frames: Any, terms: Any) -> Any:
+        fit = self._inner.follow(frames, terms)
         self._frames += 1
         ruined = np.array(getattr(fit, self._part), dtype=float)
         ruined.flat[0] = np.nan

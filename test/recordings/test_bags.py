@@ -230,7 +230,7 @@ def test_a_bag_of_results_is_known_for_one(tmp_path: Path) -> None:
             bag.write_image(name, START_NS, "optical", image(0), "mono8")
         bag.write_string("/tracking_state", START_NS, "tracking")
     text = refusal(tmp_path / "bag")
-    assert "bag of results" in text and "give the recording" in text
+    assert "a bag of results" in text and "give the recording" in text
     assert "--cameras" not in text
 
 
@@ -331,7 +331,7 @@ def test_a_recording_appears_only_when_it_is_whole(tmp_path: Path) -> None:
 
 def test_a_recording_is_replaced_only_when_asked_to(tmp_path: Path) -> None:
     record(tmp_path / "bag")
-    with pytest.raises(BagError, match="already"):
+    with pytest.raises(BagError, match="is a recording"):
         BagWriter(tmp_path / "bag")
     with BagWriter(tmp_path / "bag", overwrite=True) as bag:
         bag.write_string("/text", START_NS, "x")
@@ -347,7 +347,7 @@ def test_what_is_no_recording_is_never_replaced(tmp_path: Path, is_file: bool) -
     else:
         target.mkdir()
         (target / "chapter.txt").write_text("one")
-    with pytest.raises(BagError, match="no recording"):
+    with pytest.raises(BagError, match="not a recording"):
         BagWriter(target)
 
 

@@ -154,14 +154,14 @@ def test_a_robot_is_read() -> None:
     ("old", "new", "expected"),
     [
         ("<robot", "<robot xmlns:xacro='x'", "xacro FILE > robot.urdf"),
-        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "entities"),
-        ("</robot>", "", "URDF"),
-        ('upper="0.4"', 'upper="inf"', "slides .*0.1 to inf"),
-        ('upper="0.4"', 'upper="0"', "slides .*0.1 to 0.0"),
-        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "'?x'?"),
-        ('<parent link="b"/>', "", "slides .*parent"),
-        ('<child link="c"/>', '<child link="b"/>', "two joints"),
-        ('<parent link="a"/>', '<parent link="c"/>', "circle"),
+        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
+        ("</robot>", "", "expected the URDF"),
+        ('upper="0.4"', 'upper="inf"', "slides.* 0.1 to inf"),
+        ('upper="0.4"', 'upper="0"', "slides.* 0.1 to 0.0"),
+        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
+        ('<parent link="b"/>', "", "slides has no parent"),
+        ('<child link="c"/>', '<child link="b"/>', "b has two parents"),
+        ('<parent link="a"/>', '<parent link="c"/>', "its own ancestor"),
     ],
 )
 def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
@@ -181,14 +181,14 @@ def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("joints: []", "empty"),
+        ("joints: []", "empty list"),
         ("arms: 1", "'joints'"),
-        ("joints: [{from: left_elbow_flexion}]", "'from' and 'to'"),
-        ("joints: [{from: knee, to: a}]", "'knee' .*torso_y"),
-        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite"),
+        ("joints: [{from: left_elbow_flexion}]", "needs 'from' and 'to'"),
+        ("joints: [{from: knee, to: a}]", "'knee'.* torso_y"),
+        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite number"),
         (
             "joints: [{from: left_elbow_flexion, to: a}, {from: torso_yaw, to: a}]",
-            "twice",
+            "two rows",
         ),
     ],
 )

@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import ResultBag
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.session import synthesize_session
 from cardbox_tracker.vision.camera import Camera
@@ -39,8 +39,8 @@ def results(tmp_path: Path) -> Path:
             posture = wave(i / 5.0)
             points = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
             estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
-            bag.add(Frame(i * 10**8, i / 10, grey, grey), estimate, tracker)
-        bag.add(Frame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
+            bag.add(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+        bag.add(RecordedFrame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
     return tmp_path / "results"
 
 

@@ -1,1 +1,1 @@
-"""Measure a person from three reference silhouettes, and lead them through the postures."""
+"""Measurement of a person from three reference silhouettes, and guidance through the postures."""

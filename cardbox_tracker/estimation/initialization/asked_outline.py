@@ -1,9 +1,8 @@
-"""Whether a silhouette looks like the posture that was asked for, before anybody is measured.
+"""Check of a captured silhouette against the requested reference posture.
 
-It is compared with the outlines of people of mean proportions and several statures, who stand where
-the silhouette's head is, in each reference posture. That tells a wrong posture at the moment of the
-capture, while the person still stands there; what is finer is left to :mod:`.reference_checks`,
-which knows all three references.
+The silhouette is compared with rendered outlines of people of mean proportions and several statures
+in each reference posture, aligned at the head. So a wrong posture is reported at its capture, while
+the person still stands there. :mod:`.reference_checks` makes finer checks of all three references.
 """
 
 from __future__ import annotations
@@ -26,23 +25,22 @@ from cardbox_tracker.vision.rasterisation import render
 
 Silhouette = NDArray[np.uint8]
 
-# Nine synthetic people, 1.40 to 1.94 m, have 0.63 to 0.89 with the posture that they hold, and 0.60
-# at most with another one.
 LEAST_IOU, CLEARLY = 0.60, 0.10
+"""Least IoU with the requested posture, and IoU by which another posture must be better."""
 
 STATURES_M = (1.3, 1.45, 1.6, 1.75, 1.9)
-"""Of the people whose outlines are compared."""
+"""Statures of the rendered people."""
 
 
 def outline_ious(
     silhouette: Silhouette, camera: Camera, config: InitializationConfig
 ) -> dict[str, float]:
-    """Return the overlap (IoU) with each reference posture, by name, of the best stature.
+    """Return the IoU of the best stature with each reference posture, by name.
 
     Args:
         silhouette: (H, W), 0 or 255, of the camera's size.
         camera: working camera.
-        config: distance, pitch and the turn of the side reference.
+        config: distance, pitch and direction of the side reference.
     """
     view = camera.with_pitch(config.camera_pitch_rad)
     seen = filled(silhouette) > 0
@@ -76,15 +74,15 @@ def check_asked(
 
     Args:
         name: ``front``, ``side`` or ``arms``.
-        silhouette: usable (H, W), 0 or 255, of the camera's size.
+        silhouette: (H, W), 0 or 255, of the camera's size, accepted by ``check_reference``.
         camera: working camera.
-        config: see :func:`outline_ious`; without ``check_postures`` nothing is said.
+        config: see :func:`outline_ious`; nothing is checked without ``check_postures``.
 
     Returns:
-        A warning for the person if it looks like none of them, else nothing.
+        A warning if no posture fits the silhouette, else an empty text.
 
     Raises:
-        InitializationError: the text names the posture that it looks like.
+        InitializationError: another posture fits better; the text names it.
     """
     if not config.check_postures:
         return ""
@@ -92,15 +90,15 @@ def check_asked(
     likest = max(ious, key=lambda other: ious[other])
     if ious[likest] >= LEAST_IOU and ious[likest] - ious[name] >= CLEARLY:
         raise InitializationError(
-            f"reference '{name}': it looks like '{likest}' (outline's IoU "
+            f"reference '{name}': the silhouette looks like '{likest}' (IoU of the outline "
             f"{rounded_down(ious[name])} with '{name}', {rounded_down(ious[likest])} with "
             f"'{likest}'); {POSTURE_TEXT[name]}",
             "Not this posture",
         )
     if ious[name] < LEAST_IOU:
         return (
-            f"; warning: it looks little like '{name}' (outline's IoU {rounded_down(ious[name])}, "
-            f"expected {LEAST_IOU:.2f} or more): check the silhouette and the distance "
-            f"({config.distance_m:g} m), and {POSTURE_TEXT[name]}"
+            f"; warning: the silhouette does not look like '{name}' (IoU of the outline "
+            f"{rounded_down(ious[name])}, expected {LEAST_IOU:.2f} or more): check the silhouette "
+            f"and the distance ({config.distance_m:g} m), and {POSTURE_TEXT[name]}"
         )
     return ""

@@ -1,4 +1,4 @@
-"""Settings and result of the initialization, and which fit is good enough."""
+"""Settings and result of the initialization, and the check of the result's fit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cardbox_tracker.estimation.initialization.wording import rounded_down
 from cardbox_tracker.settings import check, setting
 
 MAX_PITCH_RAD = float(np.radians(80.0))
-"""A camera that looks further up or down does not see an upright person's outline."""
+"""Limit of the camera's pitch, beyond which an upright person's outline is not visible."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,7 @@ class InitializationConfig:
         "a measurement is refused if the mean fit (IoU) of the references is below this",
         limits=(0.0, 1.0),
     )
-    # Clean silhouettes of people who hold the postures fit with 0.79 and more, those with a fifth
-    # of the person missing with 0.57 and more; 'front' and 'side' swapped fit with 0.55 to 0.88,
-    # so that this does not replace the check of the postures.
+    # Wrong postures can have a larger IoU, so this does not replace the check of the postures.
     least_iou: float = setting(
         0.55,
         "a measurement is refused if the fit (IoU) of any reference is below this",
@@ -79,14 +77,14 @@ class InitializationConfig:
 
 @dataclass(frozen=True)
 class InitializationResult:
-    """What the initialization found.
+    """Result of the initialization.
 
     Attributes:
         body: the measured person.
-        iou: fit of each reference, by name.
-        rounds: rounds that were needed, by subset, both passes together.
-        costs_px: cost and prior of the best hypothesis before the first and after each round, one
-            tuple a pass, by subset.
+        iou: fit of each reference by name.
+        rounds: number of rounds of both passes by subset.
+        costs_px: cost plus prior of the best hypothesis before the first and after each round, by
+            subset, with one tuple for each pass.
     """
 
     body: BodyModel
@@ -101,19 +99,19 @@ class InitializationResult:
 
 
 GOOD_IOU = 0.8
-"""Clean silhouettes of people who hold the postures fit about as well or better."""
+"""Usual least IoU of clean silhouettes in the right postures."""
 
 
 def fit_text(result: InitializationResult) -> str:
-    """Return how well the references fit, with a warning where it is not well, for a person."""
+    """Return the fit of the references as text, with a warning if it is poor."""
     text = f"fit (IoU) {_fits(result)}, mean {rounded_down(result.mean_iou)}"
     doubtful = [name for name in REFERENCE_NAMES if result.iou[name] < GOOD_IOU]
     if not doubtful:
         return text
     names = " and ".join(f"'{name}'" for name in doubtful)
     return (
-        f"{text}; warning: {names} below {GOOD_IOU:.2f}, sizes may be wrong: look at the "
-        f"silhouettes, and capture {names} again"
+        f"{text}; warning: {names} below {GOOD_IOU:.2f}, sizes may be wrong: check the "
+        f"silhouettes and capture {names} again"
     )
 
 
@@ -122,16 +120,16 @@ def _fits(result: InitializationResult) -> str:
 
 
 def check_fit(result: InitializationResult, config: InitializationConfig) -> None:
-    """Refuse references that the model fits poorly, all together or one of them.
+    """Refuse a result whose mean IoU, or whose IoU of a single reference, is too low.
 
     Raises:
-        InitializationError: the text has every fit, and names the references that fit too poorly.
+        InitializationError: the text has each fit and names the references with a poor fit.
     """
     fits = _fits(result)
     advice = (
         f"check person_distance_m ({config.distance_m:g} m), the camera's pitch "
-        f"({np.degrees(config.camera_pitch_rad):g} degrees), the side the person turned to "
-        f"({config.side_turn}), and look at the silhouettes"
+        f"({np.degrees(config.camera_pitch_rad):g} degrees), the side to which the person turned "
+        f"({config.side_turn}), and the silhouettes"
     )
     if result.mean_iou < config.min_iou:
         raise InitializationError(
@@ -143,5 +141,5 @@ def check_fit(result: InitializationResult, config: InitializationConfig) -> Non
         names = " and ".join(f"'{name}'" for name in poor)
         raise InitializationError(
             f"the model fits {names} poorly (IoU {fits}; expected {config.least_iou:.2f} or more "
-            f"of each); capture {names} again in the posture asked for, or {advice}"
+            f"for each); capture {names} again in the requested posture, or {advice}"
         )

@@ -1,15 +1,15 @@
-"""Fit a body from proportions to the first silhouette of a person, whatever they do in it.
+"""Fit of a body from proportions to the first silhouette of a person in any posture.
 
-A body that was not measured (:mod:`cardbox_tracker.body.proportions`) lacks how high the hips are,
-how broad the person and their clothes are, and maybe the distance. All of that is searched together
-with the posture, in turns:
+A body that was not measured (:mod:`cardbox_tracker.body.proportions`) has unknown values: the
+height of the hips, the breadths of the person with clothes, and possibly the distance. They are
+estimated by an alternating search:
 
-1. The whole-body filter looks for postures of the body as it is so far.
-2. Bodies around it are rated in the best of these postures, with a prior that keeps them near the
-   proportions of people; the best body stays.
+1. The whole-body filter searches for postures of the current body.
+2. Random bodies around the current one are rated in the best of these postures, with a prior
+   that keeps them near the proportions of people; the best body is kept.
 
-Lengths along the bones are not searched: one outline in an unknown posture does not show them.
-Where there is an image, colours are learned, too (:mod:`.part_colors`): skin from the face.
+Lengths along the bones are not searched, because one outline in an unknown posture does not
+determine them. With an image, colours are learned, too (:mod:`.part_colors`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.estimation.filtering.pose_filter import Sight
+from cardbox_tracker.estimation.filtering.pose_filter import Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.initialization.outline import filled
 from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
@@ -40,26 +40,25 @@ from cardbox_tracker.estimation.initialization.wording import rounded_down
 from cardbox_tracker.vision.camera import Camera
 
 MIN_IOU = 0.6
-"""A silhouette that the fitted body explains less well than this shows no person to fit."""
+"""Least IoU of the fitted body; below it the silhouette is not a person."""
 
-# Distances tried where none is given: people whom this camera sees from the hips up.
+# Distances that are tried if none is given.
 _DISTANCES_M = 0.9 * 1.2 ** np.arange(9)
 _BREADTHS = [SIZE_INDEX[name] for name in BREADTHS]
 _ROUNDS, _BODIES, _POSTURES = 6, 60, 12
-# Standard deviations of the prior, the distance's and the breadths' as logarithms; breadths as
-# among people of one stature and in clothes. The noise of a round is this fraction of them, and
-# shrinks.
+# Standard deviations of the prior: of the logarithmic distance, the hip height, and the
+# logarithmic breadths. The noise of a round is a fraction of them that shrinks.
 _DISTANCE_SD, _HEIGHT_SD_M, _BREADTH_SD = 0.25, 0.10, 0.20
 _NOISE, _SHRINK = 0.5, 0.75
-# Cost of one standard deviation, as a share of the silhouette's pixels, as in the initialization.
+# Cost of one standard deviation as a share of the silhouette's pixels.
 _PRIOR = 0.003
 
 
 def upper_body(silhouette: Silhouette) -> Silhouette | None:
-    """Return the person of a silhouette (H, W): its largest region.
+    """Return the person of a silhouette (H, W), which is its largest region.
 
     Returns:
-        None if that is nobody, or their head is above the image.
+        None if the region is too small or too large, or the head is cut off.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
@@ -70,11 +69,11 @@ def upper_body(silhouette: Silhouette) -> Silhouette | None:
 
 @dataclass(frozen=True)
 class FirstSight:
-    """A body as it was fitted, and how well.
+    """Result of a fit.
 
     Attributes:
-        body: nothing in it is unknown any more.
-        iou: of the fitted body and the silhouette.
+        body: fitted body without unknown values.
+        iou: IoU of the fitted body and the silhouette.
     """
 
     body: BodyModel
@@ -89,18 +88,18 @@ def fit_first_sight(
     config: TrackerConfig,
     rng: np.random.Generator,
 ) -> FirstSight:
-    """Find what is unknown of a body in one silhouette.
+    """Estimate the unknown values of a body from one silhouette.
 
     Args:
-        body: with ``unknown`` values.
+        body: body model with ``unknown`` values.
         camera: working camera.
         silhouette: (H, W), 0 or 255, as :func:`upper_body` returns it.
-        image: (H, W, 3) bgr or (H, W) of the same frame, from which colours are learned.
-        config: settings of the tracker; of these ``whole_body``.
-        rng: source of the noise.
+        image: (H, W, 3) bgr or (H, W) of the same frame, for the colours; None to skip them.
+        config: settings of the tracker, of which ``whole_body`` is used.
+        rng: random numbers.
 
     Raises:
-        InitializationError: nothing fits it.
+        InitializationError: no body fits the silhouette.
     """
     camera = camera.with_pitch(body.camera_pose.pitch_rad)
     found, posture, iou = _Search(body, camera, silhouette, config, rng).run()
@@ -117,7 +116,7 @@ def fit_first_sight(
 
 
 class _Search:
-    """Bodies and postures in turns, against one silhouette."""
+    """Alternating search of body and posture for one silhouette."""
 
     def __init__(
         self,
@@ -130,7 +129,7 @@ class _Search:
         self._prior, self._camera, self._seen, self._config = body, camera, seen, config
         self._rng = rng
         unknown = body.unknown
-        # Unknown values in their standard deviations: distance, height of the hips, breadths.
+        # Standard deviations of distance, hip height and breadths; 0 for known values.
         self._spread = np.array(
             [
                 _DISTANCE_SD if "distance_m" in unknown else 0.0,
@@ -140,7 +139,7 @@ class _Search:
         )
 
     def run(self) -> tuple[BodyModel, FloatArray, float]:
-        """Return the fitted body, the posture (12,) it has, and its IoU."""
+        """Return the fitted body, its posture (12,), and its IoU."""
         self._base = self._prior
         if "distance_m" in self._prior.unknown:
             placed = [self._standing(distance_m) for distance_m in _DISTANCES_M]
@@ -170,7 +169,7 @@ class _Search:
         return body, postures[0, :12], iou
 
     def _standing(self, distance_m: float) -> BodyModel:
-        """The body at a distance, as high and as far aside as the silhouette's head."""
+        """Return the body at a distance, aligned with the silhouette's head."""
         body = self._prior.with_values(
             distance_m=distance_m, lateral_m=lateral_m(self._seen, self._camera, distance_m)
         )
@@ -179,7 +178,7 @@ class _Search:
         return at_height_of(self._seen, body, self._camera)
 
     def _body(self, steps: FloatArray) -> BodyModel:
-        """The body that is so many standard deviations off the one to begin with."""
+        """Return the initial body changed by ``steps`` standard deviations."""
         values = steps * self._spread
         sizes = self._base.sizes.copy()
         sizes[_BREADTHS] *= np.exp(values[2:])
@@ -202,11 +201,12 @@ class _Search:
         return cost
 
     def _postures(self, body: BodyModel) -> tuple[FloatArray, FloatArray]:
-        """The best states (n, 14) of a body, best first, and their ratings (n,)."""
+        """Return the best states (n, 14) of a body, best first, and their costs (n,)."""
         silhouette = CompiledSilhouette(body, self._camera)
         search = WholeBodyFilter(self._config, silhouette, self._rng)
-        if search.look(silhouette.frame(self._seen)) is not Sight.PERSON:
+        frames = [silhouette.frame(self._seen)]
+        if search.look(frames) is not Presence.PERSON:
             return np.zeros((1, 14)), np.array([np.inf])
-        search.follow(())
+        search.follow(frames, [()])
         order = np.argsort(search.ratings, kind="stable")[:_POSTURES]
         return search.states[order], search.ratings[order]

@@ -1,7 +1,6 @@
-"""Lead a person through the reference postures: say what to do, count down, capture, repeat.
+"""Guides a person through the reference postures: instruct, count down, capture, repeat.
 
-Knows nothing of ROS, so that it can be tested without: it speaks, waits and captures through the
-functions it is given.
+The module is free of ROS; it shows, waits and captures by functions that the caller supplies.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import NamedTuple
 from cardbox_tracker.errors import InitializationError
 
 ASK, GOOD, BAD = "ask", "good", "bad"
-"""Whether a step asks for something, or says that it went well or did not."""
+"""Moods of a prompt: an instruction, a success or a failure."""
 
 HOLD_STILL = "Hold still"
 FINISHED, FAILED, CANCELLED = "Thank you. Done.", "That did not work. Sorry.", "Stopped."
@@ -23,12 +22,12 @@ _TURN = {
 }
 _HOLD_S = 1.0
 _READ_S = 2.0
-# From here on the count is said aloud: who stands sideways does not see it.
-_SAID_COUNT = 3
+# The last seconds are counted aloud for a person who stands sideways and cannot see them.
+_SPOKEN_COUNT = 3
 
 
 def instruction(name: str, side_turn: str) -> str:
-    """Return what a person has to do for the reference ``front``, ``side`` or ``arms``."""
+    """Return the instruction for the reference ``front``, ``side`` or ``arms``."""
     return {
         "front": "face the camera, arms hanging a little away from the body",
         "side": f"{_TURN[side_turn]}, arms hanging a little away from the body",
@@ -37,7 +36,7 @@ def instruction(name: str, side_turn: str) -> str:
 
 
 def short_words(name: str, side_turn: str) -> str:
-    """Return the same in words that are read at two metres and heard in passing."""
+    """Return a short instruction that can be read at two metres or spoken."""
     return {
         "front": "Face the camera, arms a little out",
         "side": f"Now turn {side_turn}, arms as before",
@@ -45,14 +44,14 @@ def short_words(name: str, side_turn: str) -> str:
     }[name]
 
 
-class Step(NamedTuple):
-    """A moment of the guidance.
+class Prompt(NamedTuple):
+    """An instruction or a message of the guidance.
 
     Attributes:
-        name: the reference, or ``measuring``.
-        words: what to do, or what happened, for the person: a few words.
-        left_s: seconds of the count-down that are left; None while nothing is counted.
-        detail: the same for whoever runs the program; the words if there is no more to say.
+        name: name of the reference, or ``measuring``.
+        words: short text for the person.
+        left_s: remaining seconds of the count-down; None if there is no count-down.
+        detail: text for the operator; ``words`` if empty.
         mood: ``ask``, ``good`` or ``bad``.
     """
 
@@ -64,65 +63,65 @@ class Step(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The step as a line for whoever runs the program."""
+        """Line of text for the operator."""
         count = "" if self.left_s is None else f": {self.left_s}"
         return f"{self.name}: {self.detail or self.words}{count}"
 
 
-def said(before: Step | None, step: Step) -> str:
-    """Return what is said aloud of ``step`` after the step ``before``; may be empty."""
-    if before is None or before.words != step.words or before.name != step.name:
-        return step.words
-    if step.left_s is not None and step.left_s != before.left_s and step.left_s <= _SAID_COUNT:
-        return str(step.left_s)
+def spoken(before: Prompt | None, now: Prompt) -> str:
+    """Return the text to be spoken when ``now`` follows ``before``; it may be empty."""
+    if before is None or before.words != now.words or before.name != now.name:
+        return now.words
+    if now.left_s is not None and now.left_s != before.left_s and now.left_s <= _SPOKEN_COUNT:
+        return str(now.left_s)
     return ""
 
 
-def measuring(fraction: float) -> Step:
-    """Return the step of the measurement after the last capture, done to ``fraction``."""
-    return Step("measuring", "Good. Measuring, you may relax", detail=f"{100 * fraction:.0f} %")
+def measuring(fraction: float) -> Prompt:
+    """Return the prompt during the measurement, of which ``fraction`` is done."""
+    return Prompt("measuring", "Good. Measuring, you may relax", detail=f"{100 * fraction:.0f} %")
 
 
 class Guidance:
-    """Guides through the postures that are missing."""
+    """Guides a person through the missing references."""
 
     def __init__(
         self,
-        show: Callable[[Step], None],
+        show: Callable[[Prompt], None],
         capture: Callable[[str], str],
         wait: Callable[[float], None],
     ) -> None:
-        """Keep the three functions.
+        """Store the functions of the caller.
 
         Args:
-            show: shows a step to the person.
-            capture: captures the reference of that name; raises InitializationError.
-            wait: waits that many seconds; raises whatever ends the guidance.
+            show: shows a prompt to the person.
+            capture: captures the named reference and returns a text; raises InitializationError.
+            wait: waits for a number of seconds; an exception of it ends the guidance.
         """
         self._show, self._capture, self._wait = show, capture, wait
 
     def run(self, missing: Sequence[str], side_turn: str, count_down_s: int, attempts: int) -> None:
-        """Capture every reference in ``missing``.
+        """Capture each reference in ``missing``.
 
         Raises:
-            InitializationError: a posture could not be captured in ``attempts`` tries.
+            InitializationError: a reference could not be captured in ``attempts`` attempts.
         """
         for name in missing:
             words, detail = short_words(name, side_turn), instruction(name, side_turn)
             for attempt in range(1, attempts + 1):
                 for left in range(count_down_s, 0, -1):
-                    self._show(Step(name, words, left, detail))
+                    self._show(Prompt(name, words, left, detail))
                     self._wait(1.0)
-                self._show(Step(name, HOLD_STILL, detail="hold still"))
+                self._show(Prompt(name, HOLD_STILL, detail="hold still"))
                 self._wait(_HOLD_S)
                 try:
                     done = self._capture(name)
-                    self._show(Step(name, "Good.", detail=done, mood=GOOD))
+                    self._show(Prompt(name, "Good.", detail=done, mood=GOOD))
                     self._wait(_HOLD_S)
                     break
                 except InitializationError as error:
                     failed = f"not captured: {error}"
-                    self._show(Step(name, error.words, detail=failed, mood=BAD))
+                    self._show(Prompt(name, error.words, detail=failed, mood=BAD))
                     if attempt == attempts:
                         raise
                     self._wait(_READ_S)

@@ -1,8 +1,8 @@
-"""How well somebody fits into the posture that is asked for, while they move into it.
+"""Live fit of a person to the requested reference posture.
 
-As in :mod:`.asked_outline`, which decides at the capture, the silhouette is compared with outlines
-of people of several statures in each reference posture. Here they are drawn once and then only
-moved to where the head is, on a coarse grid, so that an image costs next to nothing.
+Like :mod:`.asked_outline` at the capture, the silhouette is compared with outlines of people of
+several statures in each reference posture. The outlines are drawn once on a coarse grid and only
+translated to the head, so that the comparison is fast enough for each live image.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
 FITS, NEARLY, FAR = "fits", "nearly", "far"
-"""A capture would be accepted without a warning; soon; another posture, or nobody."""
+"""A capture would be accepted without a warning, or almost; or another posture is shown."""
 
 _WIDTH_PX = 80
 _SOME_IOU = 0.40
@@ -38,9 +38,12 @@ _LEAST_PX = 20
 
 
 class _Outline(NamedTuple):
-    """Somebody in a posture, drawn on the grid down to the hips.
+    """A rendered person in a posture on the grid, above the hips.
 
-    ``column`` is where in ``mask`` the middle of head and chest is; the first row is the crown's.
+    Attributes:
+        name: reference posture.
+        mask: (h, w); the first row has the top of the head.
+        column: middle of head and chest in ``mask``.
     """
 
     name: str
@@ -52,11 +55,11 @@ class LiveFit:
     """Compares silhouettes of one camera with the reference postures."""
 
     def __init__(self, camera: Camera, config: InitializationConfig) -> None:
-        """Draw the outlines of people as far away as ``config`` says, before ``camera``."""
+        """Draw the outlines of people at the distance of ``config``."""
         self.camera, self.config = camera, config
         self._cell = max(1, camera.width // _WIDTH_PX)
         grid = camera.scaled(camera.width // self._cell, camera.height // self._cell)
-        # Larger than the image, so that nobody is cut off.
+        # The canvas is larger than the image, so that no outline is cut off.
         wide = replace(
             grid.with_pitch(config.camera_pitch_rad),
             width=3 * grid.width,
@@ -71,16 +74,16 @@ class LiveFit:
         ]
 
     def __call__(self, name: str, silhouette: Silhouette) -> str:
-        """Return ``fits``, ``nearly`` or ``far`` of a silhouette (H, W) and a reference's name."""
+        """Return ``fits``, ``nearly`` or ``far`` for a reference's name and a silhouette (H, W)."""
         ious = self.ious(silhouette)
         if ious[name] < _SOME_IOU or max(ious.values()) - ious[name] >= CLEARLY:
             return FAR
         return FITS if ious[name] >= LEAST_IOU else NEARLY
 
     def ious(self, silhouette: Silhouette) -> dict[str, float]:
-        """Return the overlap (IoU) with each reference posture, by name, of the best stature."""
+        """Return the IoU of the best stature with each reference posture, by name."""
         half = self._cell // 2
-        # Filled as it is: on the grid, what is narrow tears.
+        # Holes are filled at full resolution, because narrow parts break on the grid.
         seen = filled(silhouette)[half :: self._cell, half :: self._cell] > 0
         ious = dict.fromkeys(REFERENCE_NAMES, 0.0)
         if np.count_nonzero(seen) < _LEAST_PX:
@@ -109,13 +112,13 @@ def _outline(name: str, stature_m: float, camera: Camera, config: Initialization
 
 
 def _middle_column(mask: NDArray[np.bool_]) -> int:
-    """Return the column of the middle of head and chest."""
+    """Return the middle column of head and chest."""
     plain = Camera(mask.shape[1], mask.shape[0], 1.0, 1.0, 0.0, 0.0)
     return round(lateral_m(mask.astype(np.uint8), plain, 1.0))
 
 
 def _iou(seen: NDArray[np.bool_], drawn: NDArray[np.bool_], shift: int) -> float:
-    """Return the IoU of ``seen`` and of ``drawn``, moved to the right by ``shift``."""
+    """Return the IoU of ``seen`` and ``drawn`` translated to the right by ``shift``."""
     rows = min(len(seen), len(drawn))
     first, last = max(0, -shift), min(drawn.shape[1], seen.shape[1] - shift)
     there = seen[:rows]

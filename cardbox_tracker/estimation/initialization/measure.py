@@ -1,20 +1,20 @@
 """Measure the 18 body sizes from three silhouettes (paper, "Offline Model Initialization").
 
-In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset are drawn around the
-best one so far, A + N(0, sigma_alpha^2 E), and the one of lowest cost is kept, until the accuracy
-is reached. Beyond the paper:
+In three steps, O1 (front), O2 (side) and O3 (arms), M hypotheses of a subset of the sizes are drawn
+around the best one, A + N(0, sigma_alpha^2 E), and the hypothesis with the lowest cost is kept,
+until the accuracy is reached. Extensions to the paper:
 
-- References that show another posture than was asked for are refused by name.
-- Breadth of the shoulders, upper arm, forearm and the height of the shoulder joints are measured
-  before the search (:mod:`.skeleton`) and not searched: an outline does not show where they end.
-- In ``arms`` the shoulder joints are as much higher as the girdle lifts them.
-- sigma_alpha starts at the paper's 5 cm and shrinks whenever a round finds nothing better; the
+- References in a wrong posture are refused by name.
+- Shoulder breadth, upper arm, forearm and the height of the shoulder joints are measured before
+  the search (:mod:`.skeleton`), because an outline does not determine them.
+- In ``arms``, the shoulder joints are higher by the lift of the girdle.
+- sigma_alpha starts at the paper's 5 cm and shrinks after each round without improvement; the
   accuracy is reached when it falls below ``accuracy_m``.
-- Nobody holds a reference posture to the degree, so its angles are estimated beside the sizes, with
-  a standard deviation of a few degrees around what was asked for; so is the place.
-- A weak prior keeps sizes that an outline hardly shows, such as where the chin ends, near the
+- Angles and place of the reference posture are estimated together with the sizes, with a prior
+  standard deviation of a few degrees around the requested angles.
+- A weak prior keeps sizes that an outline hardly shows, such as the height of the chin, near the
   proportions of a person of that stature.
-- The three steps are passed twice, since each starts from what the others found.
+- The three steps are repeated once, since each depends on the results of the others.
 """
 
 from __future__ import annotations
@@ -63,26 +63,26 @@ from cardbox_tracker.estimation.initialization.stature import SHOULDER_TO_HIP, s
 from cardbox_tracker.vision.camera import Camera
 
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
-"""Subset and the reference that shows it, in the order of the paper."""
+"""Subset of the sizes and its reference, in the order of the paper."""
 
-# Among people of one stature, lengths along the bones scatter by about 6 %, breadths and depths by
-# about 20 % (ANSUR II, 2012, rounded), and small offsets by 1.5 cm or more.
+# Standard deviations among people of one stature: of lengths along bones, of breadths and depths
+# (ANSUR II, 2012, rounded), and the least one.
 _LENGTH_SCATTER, _BREADTH_SCATTER, _LEAST_SCATTER_M = 0.06, 0.20, 0.015
 _ALONG_BONES = np.array(
     [name.endswith(("length", "height", "drop", "breadth")) for name in SIZE_NAMES]
 )
-# The bones of the arms, which are measured before the search.
+# Sizes that are measured before the search.
 _BONES = [
     SIZE_INDEX[name]
     for name in ("shoulder_breadth", "shoulder_drop", "upper_arm_length", "forearm_length")
 ]
 _BREADTH, _DROP, _UPPER_ARM, _FOREARM = _BONES
 _TORSO_TOP = [SIZE_INDEX["waist_height"], SIZE_INDEX["torso_height"]]
-# Which angles a person misses when asked for a reference posture, and by how much.
+# Standard deviation of the angles of a reference posture.
 _LOOSE_ANGLE_RAD = np.radians(5.0)
-# How far the place of a reference posture is searched from one round to the next.
+# Noise of the place of a reference posture in each round.
 _PLACE_NOISE_M = 0.02
-# The noise of the sizes after a round that found nothing better, as a fraction of that before.
+# Factor of the noise after a round without improvement.
 _SHRINK = 0.7
 
 
@@ -93,19 +93,19 @@ def initialize_body(
     progress: Callable[[float], None] | None = None,
     images: Mapping[str, Sequence[Image]] | None = None,
 ) -> InitializationResult:
-    """Measure a person, and learn what they look like.
+    """Measure a person and learn the person's colours.
 
     Args:
         references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
-        camera: working camera, of the silhouettes' size.
-        config: settings.
+        camera: working camera of the silhouettes' size.
+        config: settings; None for the defaults.
         progress: called with the finished fraction.
-        images: some of each of the references ``front`` and ``arms``, (H, W, 3) bgr or (H, W), of
-            the camera's size; without them the body has no appearance.
+        images: images (H, W, 3) bgr or (H, W) of the references ``front`` and ``arms``, of the
+            camera's size; without them the body has no appearance.
 
     Raises:
-        InitializationError: the references are unusable, show other postures than they should, or
-            the model does not fit them; the text names which and what to do.
+        InitializationError: the references are unusable, show other postures, or the model does
+            not fit them; the text names the reference and the remedy.
     """
     config = config or InitializationConfig()
     check_references(references)
@@ -138,7 +138,7 @@ class _Search:
         skeleton = measure_skeleton(references, camera, config.distance_m)
         if skeleton is None:
             raise InitializationError(
-                f"reference 'arms': no arms are seen; capture it again: {POSTURE_TEXT['arms']}"
+                f"reference 'arms': no arms are visible; capture it again: {POSTURE_TEXT['arms']}"
             )
         stature = stature_m(references["front"], skeleton, camera, config.distance_m)
         self._shoulder_height_m = skeleton.shoulder_height_m
@@ -174,7 +174,7 @@ class _Search:
         self._history: dict[str, list[tuple[float, ...]]] = {subset: [] for subset in SUBSETS}
 
     def step(self, subset: str, name: str) -> None:
-        """Estimate one subset of the sizes, and the posture of the reference that shows it."""
+        """Estimate one subset of the sizes and the posture of the reference ``name``."""
         config = self._config
         size_mask = np.zeros(N_SIZES)
         size_mask[SUBSETS[subset]] = 1.0
@@ -196,7 +196,7 @@ class _Search:
             )
             hypotheses = self._with_shoulders_in_place(hypotheses)
             postures = posture + noise[:, N_SIZES:] * posture_noise
-            # No joint limits here: whoever turns for the side reference moves the feet, too.
+            # Joint limits do not apply, because the feet turn for the side reference, too.
             costs = self._rate(name, hypotheses, postures)
             winner = int(np.argmin(costs))
             if costs[winner] < best:
@@ -210,7 +210,7 @@ class _Search:
         self._sizes, self._postures[name] = sizes, posture
 
     def _with_shoulders_in_place(self, sizes: FloatArray) -> FloatArray:
-        """Sizes (N, 18) whose shoulder joints are as high as measured, whatever the torso's top."""
+        """Return sizes (N, 18) with ``shoulder_drop`` set to the measured shoulder height."""
         placed = sizes.copy()
         drop_m = self._hip_height_m + sizes[:, _TORSO_TOP].sum(axis=1) - self._shoulder_height_m
         placed[:, _DROP] = np.clip(drop_m, *SIZE_LIMITS[_DROP])
@@ -226,7 +226,7 @@ class _Search:
         return rated
 
     def result(self) -> InitializationResult:
-        """Return the sizes rounded to a tenth of a millimetre, and the fit."""
+        """Return the sizes, rounded to 0.1 mm, and the fit."""
         start = self._start
         body = start.with_values(
             sizes=np.round(self._sizes, 4),
@@ -242,7 +242,7 @@ class _Search:
 
 
 def _sizes_in(name: str, sizes: FloatArray) -> FloatArray:
-    """Sizes (N, 18) as a reference shows them: in ``arms`` the girdle lifts the shoulder joints."""
+    """Return sizes (N, 18) in a reference; in ``arms`` the girdle lifts the shoulder joints."""
     if name != "arms":
         return sizes
     lifted = sizes.copy()
@@ -252,7 +252,7 @@ def _sizes_in(name: str, sizes: FloatArray) -> FloatArray:
 
 
 def _loose_joints(name: str) -> FloatArray:
-    """1 for each joint (12,) that the reference shows and a person misses, else 0."""
+    """Return 1 for each joint (12,) that is estimated in the reference, else 0."""
     loose = np.zeros(N_JOINTS)
     if name == "side":
         loose[2] = 1.0  # leaning

@@ -1,8 +1,8 @@
-"""Lengths and directions in the outlines of a person: arms, span, widths.
+"""Measurement of arms, span and widths in a person's outline.
 
-All lengths are metres in Y and Z of the upright plane through the person, of the reference frame.
-Silhouettes are (H, W), 0 or 255, of one person as :func:`filled` returns them; cameras are working
-cameras, pitched as they are.
+All lengths are metres along Y and Z of the reference frame, in the upright plane through the
+person. Silhouettes are (H, W), 0 or 255, as :func:`filled` returns them; cameras are working
+cameras including the pitch.
 """
 
 from __future__ import annotations
@@ -20,31 +20,30 @@ FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]
 
 _HEAD_ABOVE = 0.07
-"""Rows higher than this above the arms' axis show the head, of the span."""
+"""Height above the arms' axis, in spans, above which rows show the head."""
 _EVEN = 0.015
-"""Arms are as long as each other if the middle of the span is no further from the head's, of the
-span."""
+"""Largest distance in spans between the middles of span and head if the arms are equally long."""
 _GAP = 20
-"""Parts of a person join over gaps of one in so many of the image's height: about an arm."""
+"""Image heights per gap over which parts of a person are joined."""
 _FEWEST_COLUMNS = 20
-"""Silhouettes narrower than this, px, have no arms."""
+"""Least width of a silhouette with arms, px."""
 _TRUNK = 2.2
-"""Beyond so many times the thickness of the arm there is the trunk."""
+"""Height of a column, in arm thicknesses, at which the trunk begins."""
 _HAND, _ARMPIT = 0.30, 0.97
-"""Between these fractions of the way from fingertips to armpit, the outline is that of the arm."""
+"""Range of the arm without hand, in fractions of the distance from fingertips to armpit."""
 _HANGING = (0.02, 0.27)
-"""Between these distances below the axis of the level arms, of the span, a hanging arm is a run of
-its own: between armpit and wrist."""
+"""Range between armpit and wrist of hanging arms, in spans below the axis of the level arms."""
 
 
 @dataclass(frozen=True)
 class LevelArm:
-    """One arm of ``arms``, in the upright plane.
+    """One arm in the reference ``arms``, in the upright plane.
 
     Attributes:
         tip_m: Y of the fingertips.
-        armpit_m: Y where the trunk begins.
-        slope, height_m: of the axis, Z = slope Y + height.
+        armpit_m: Y of the trunk's edge.
+        slope: of the axis, Z = slope Y + height.
+        height_m: of the axis at Y = 0.
         thickness_m: median height of the arm's outline between elbow and wrist.
     """
 
@@ -56,7 +55,7 @@ class LevelArm:
 
     @property
     def reach_m(self) -> float:
-        """Armpit to fingertips."""
+        """Distance from armpit to fingertips."""
         return abs(self.tip_m - self.armpit_m)
 
     def axis_m(self, y_m: float) -> float:
@@ -67,7 +66,7 @@ class LevelArm:
 def plane_points_m(
     camera: Camera, columns: NDArray[Any], rows: NDArray[Any], distance_m: float
 ) -> FloatArray:
-    """Return the points (n, 2), Y and Z, of the upright plane that show in pixels.
+    """Return the points (n, 2), Y and Z, of the upright plane at pixels.
 
     Args:
         camera: working camera.
@@ -89,20 +88,20 @@ def plane_points_m(
 
 
 def filled(silhouette: Silhouette) -> Silhouette:
-    """Return the person of a silhouette (H, W): the largest region, and what is torn off it.
+    """Return the person of a silhouette (H, W): the largest region after gaps are closed.
 
-    Regions count as one where the gaps between them are narrower than about an arm. Holes smaller
+    Regions belong together if the gap between them is narrower than about an arm. Holes smaller
     than the square of that gap are filled.
     """
     seen = (silhouette > 0).astype(np.uint8)
-    gap = max(3, silhouette.shape[0] // _GAP | 1)  # odd, so that closing takes nothing away
+    gap = max(3, silhouette.shape[0] // _GAP | 1)  # odd, so that closing removes no pixel
     joined = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
     if len(statistics) < 2:
         return np.zeros_like(silhouette)
     person = seen * (labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
-    # A hole counts as one even where its rim is broken by a pixel or two. What is larger is the
-    # gap between trunk and arm, where a hand touches the hips.
+    # The rim of a hole may be broken by a pixel or two. Larger holes are gaps between trunk and
+    # arm, if a hand touches the hips.
     rim = cv2.morphologyEx(person, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(1 - rim, connectivity=4)
     small = np.nonzero(statistics[:, cv2.CC_STAT_AREA] < gap * gap)[0]
@@ -114,16 +113,16 @@ def filled(silhouette: Silhouette) -> Silhouette:
 def level_arm(
     silhouette: Silhouette, camera: Camera, distance_m: float, side: int
 ) -> LevelArm | None:
-    """Follow one arm of ``arms`` from the fingertips to the trunk.
+    """Trace one arm of the reference ``arms`` from the fingertips to the trunk.
 
     Args:
         silhouette: (H, W) of ``arms``.
         camera: working camera.
         distance_m: level distance to the person.
-        side: 1 for the arm at the image's right, -1 for the other.
+        side: 1 for the arm at the image's right, -1 for the other arm.
 
     Returns:
-        None if nothing like an arm is there.
+        None if there is no arm.
     """
     used = np.nonzero(silhouette.any(axis=0))[0]
     if len(used) < _FEWEST_COLUMNS:
@@ -133,7 +132,7 @@ def level_arm(
     n = len(order)
     top = np.argmax(silhouette[:, order] > 0, axis=0)
     below = np.arange(silhouette.shape[0])[:, None] >= top
-    # The uppermost run of each column; whatever is under the arm, such as a skirt, is not the arm.
+    # The uppermost run of each column is the arm; lower runs are, for example, a skirt.
     gap = below & (silhouette[:, order] == 0)
     end = np.where(gap.any(axis=0), np.argmax(gap, axis=0), silhouette.shape[0])
     thickness = (end - top).astype(np.float64)
@@ -157,10 +156,10 @@ def level_arm(
 def span_m(
     arms: Silhouette, camera: Camera, distance_m: float, left: LevelArm, right: LevelArm
 ) -> float:
-    """Return the way from fingertip to fingertip.
+    """Return the distance from fingertip to fingertip.
 
-    Where the span's middle is not below the head, part of one arm was not cut out; the longer one
-    then tells the span.
+    If the middle of the span is not below the head, a part of one arm is missing in the silhouette,
+    and the span is twice the reach of the longer arm.
 
     Args:
         arms: silhouette (H, W).
@@ -184,7 +183,7 @@ def span_m(
 
 
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Slope and offset of a line; points that are far off count little (Cauchy weights)."""
+    """Return slope and offset of a line fitted with Cauchy weights."""
     weights = np.ones(len(x))
     slope = offset = 0.0
     for _ in range(8):
@@ -195,19 +194,19 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 
 
 def _runs(row: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First columns, and columns after the last, of the runs of foreground of a row."""
+    """Return the first columns of a row's foreground runs, and the columns after their ends."""
     steps = np.diff(np.concatenate([[0], (row > 0).astype(np.int8), [0]]))
     return np.nonzero(steps == 1)[0], np.nonzero(steps == -1)[0]
 
 
 def row_heights_m(silhouette: Silhouette, camera: Camera, distance_m: float) -> FloatArray:
-    """Return the height (H,) of every row, in the column of the principal point."""
+    """Return the height (H,) of each row at the column of the principal point."""
     rows = np.arange(silhouette.shape[0], dtype=np.float64)
     return plane_points_m(camera, np.full(len(rows), camera.cx), rows, distance_m)[:, 1]
 
 
 def width_m(front: Silhouette, camera: Camera, distance_m: float, height_m: float) -> float:
-    """Return the width from edge to edge at a height; NaN if nothing is there."""
+    """Return the width from edge to edge at a height; NaN if the row is empty."""
     row = int(np.argmin(np.abs(row_heights_m(front, camera, distance_m) - height_m)))
     columns = np.nonzero(front[row])[0]
     if len(columns) < 2:
@@ -220,7 +219,7 @@ def width_m(front: Silhouette, camera: Camera, distance_m: float, height_m: floa
 def trunk_width_m(
     silhouette: Silhouette, camera: Camera, distance_m: float, height_m: float, centre_m: float
 ) -> float:
-    """Return the width of the run at a height that has ``centre_m`` in it; NaN if there is none."""
+    """Return the width of the run that contains ``centre_m`` at a height; NaN without a run."""
     row = int(np.argmin(np.abs(row_heights_m(silhouette, camera, distance_m) - height_m)))
     starts, stops = _runs(silhouette[row])
     rows = np.full(len(starts), float(row))
@@ -239,19 +238,19 @@ def axes_distance_m(
     span_m: float,
     arm: LevelArm,
 ) -> float:
-    """Return how far apart the axes of hanging arms are at the height of the shoulder joints.
+    """Return the distance between the axes of hanging arms at the height of the shoulder joints.
 
     Args:
         front: silhouette (H, W).
         camera: working camera.
         distance_m: level distance to the person.
         axis_m: height of the axes of the level arms of ``arms``.
-        joint_m: height of the joints.
-        span_m: fingertip to fingertip.
-        arm: one of the level arms, for its thickness.
+        joint_m: height of the shoulder joints.
+        span_m: distance from fingertip to fingertip.
+        arm: one of the level arms, of which the thickness is used.
 
     Returns:
-        NaN if the arms are no runs of their own in enough rows.
+        NaN if the arms are separate from the trunk in too few rows.
     """
     heights = row_heights_m(front, camera, distance_m)
     thickness_px = arm.thickness_m * camera.fx / distance_m
@@ -262,7 +261,7 @@ def axes_distance_m(
         middle, kept, last = [], [], None
         for row in rows:
             starts, stops = _runs(front[row])
-            # Between armpit and wrist a hanging arm is a run of its own.
+            # Between armpit and wrist, a hanging arm is separate from the trunk.
             if len(starts) < 2:
                 continue
             width = stops[side] - starts[side]

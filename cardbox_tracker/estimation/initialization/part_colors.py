@@ -1,15 +1,14 @@
-"""Learn the colours of a person's parts from the images of the references ``front`` and ``arms``.
+"""Learns the colours of a person's parts from the images of the references ``front`` and ``arms``.
 
-1. The posture really held is searched near the reference by the outline alone.
-2. The parts it places are drawn well inside of themselves and of the outline; what lies there is
-   that part beyond doubt. The forearm and the hand are found from the outline's tip inwards, since
-   a measured length that is off by some centimetres would put the wrist into the hand. Both are
-   taken from ``arms`` only: in ``front`` hands hang before the trousers, or beside them.
-3. Colours are counted, smoothed over neighbouring ones, and mixed with a little of every colour.
-4. Half of the hand's histogram is that of the face: outlines often lose hands, faces never, and
-   both are skin.
-5. A part with too few pixels looks like the one most like it: legs like the torso, a hand like the
-   face, a forearm like the torso (sleeves).
+1. The actual posture is searched near the reference by the outline.
+2. Each part is drawn smaller than it is and inside of the outline, so that its pixels are certain.
+   Forearm and hand are measured from the outline's tip, because an error of the measured length
+   would move the wrist into the hand. Both are learned from ``arms`` only, because in ``front``
+   the hands hang beside or in front of the trousers.
+3. Histograms are smoothed over neighbouring colours and mixed with a uniform distribution.
+4. Half of the hand's histogram is the face's, because hands are often missing in the outline.
+5. A part with too few pixels gets the colours of a similar part: legs and forearms (sleeves) those
+   of the torso, hands those of the face.
 """
 
 from __future__ import annotations
@@ -45,20 +44,20 @@ from cardbox_tracker.vision.camera import Camera
 LEARNED_FROM = ("front", "arms")
 """References whose images are needed."""
 
-# A label beside those of the parts: the skin of the face, which tells much of the hands'.
+# Additional label for the skin of the face, and its share in the histogram of the hand.
 _FACE = len(PARTS)
 _FACE_SHARE = 0.5
-# Depth of the nearest points that are drawn.
+# Least depth of drawn points.
 _NEAREST_M = 0.1
-# Fewer pixels than this teach nothing of a part.
+# Least number of pixels from which a part is learned.
 _MIN_PX = 40
-# Search of the posture: rounds, postures a round, what the noise shrinks by, and its start.
+# Search of the posture: rounds, postures in a round, factor of the noise, and initial noise.
 _ROUNDS, _POSTURES, _SHRINK = 8, 300, 0.7
 _PLACE_M, _ROLL_RAD, _ABDUCTION_RAD = 0.03, np.radians(4.0), np.radians(10.0)
 
 
 def can_learn(images: Mapping[str, Sequence[Image]], references: Mapping[str, Silhouette]) -> bool:
-    """Return whether there are images of what is learned from, all of one kind and size."""
+    """Return whether there are images of all ``LEARNED_FROM``, of one kind and size."""
     needed = [image for name in LEARNED_FROM for image in images.get(name, ())]
     size = references[LEARNED_FROM[0]].shape
     one_kind = len({image.shape for image in needed}) == 1 and needed[0].shape[:2] == size
@@ -72,14 +71,14 @@ def learn_appearance(
     camera: Camera,
     seed: int = 0,
 ) -> Appearance:
-    """Learn what the parts look like.
+    """Learn the colours of the parts.
 
     Args:
-        images: some of each of ``LEARNED_FROM``, (H, W, 3) bgr or (H, W), all of one kind.
-        references: the reference silhouettes (H, W) of both.
+        images: images (H, W, 3) bgr or (H, W) of each of ``LEARNED_FROM``, all of one kind.
+        references: silhouettes (H, W) of ``LEARNED_FROM``.
         body: the measured person.
-        camera: working camera, pitched as the body model says.
-        seed: of the search for the posture that was really held.
+        camera: working camera with the pitch of the body model.
+        seed: seed of the search for the actual posture.
     """
     return Appearance.of(*learn_histograms(images, references, body, camera, seed))
 
@@ -91,9 +90,9 @@ def learn_histograms(
     camera: Camera,
     seed: int = 0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return histograms (5, bins) and brightness (channels,) as :func:`learn_appearance` has them.
+    """Return histograms (5, bins) and brightness (channels,) of :func:`learn_appearance`.
 
-    Without the rounding of an :class:`~cardbox_tracker.body.appearance.Appearance`.
+    They lack the rounding of an :class:`~cardbox_tracker.body.appearance.Appearance`.
     """
     labels = {}
     for name in LEARNED_FROM:
@@ -119,17 +118,17 @@ def learn_histograms(
 def seen_appearance(
     image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
 ) -> Appearance | None:
-    """Learn what can be learned of a person in any posture: hands look like the face.
+    """Learn colours from one image of any posture; the hands get the colours of the face.
 
     Args:
         image: (H, W, 3) bgr or (H, W).
         silhouette: (H, W) of the person.
-        body: the person, at their place.
-        camera: working camera, pitched as the body model says.
-        posture: theirs, (12,).
+        body: the person at the current place.
+        camera: working camera with the pitch of the body model.
+        posture: of the person, (12,).
 
     Returns:
-        None if head or torso are not seen.
+        None if head or torso are not visible.
     """
     labels = part_labels(body, camera, posture, silhouette)
     channels = 1 if image.ndim == 2 else 3
@@ -140,7 +139,7 @@ def seen_appearance(
     bins = _bins(image, steps_of_levels(brightness, brightness))
     counts = np.zeros((len(PARTS) + 1, bins_of(channels)))
     for part in range(len(counts)):
-        # Where the hand is, is not known yet, and what looks like a forearm may be the torso.
+        # The arms' posture is not reliable yet, so a presumed forearm may be the torso.
         if part not in (HAND, FOREARM):
             counts[part] = np.bincount(bins[labels == part], minlength=len(counts.T))
     return Appearance.of(_histograms(counts, channels), brightness)
@@ -149,7 +148,7 @@ def seen_appearance(
 def torso_colors(
     image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
 ) -> FloatArray | None:
-    """Return the histogram (bins,) of the torso as :func:`seen_appearance` has it, or None."""
+    """Return the torso's histogram (bins,) as in :func:`seen_appearance`; None if not visible."""
     torso = image[part_labels(body, camera, posture, silhouette) == TORSO]
     if len(torso) < _MIN_PX:
         return None
@@ -162,7 +161,7 @@ def torso_colors(
 
 
 def _histograms(counts: FloatArray, channels: int) -> FloatArray:
-    """Return histograms (5, bins) of counts (6, bins), the last of which is the face's."""
+    """Return histograms (5, bins) from counts (6, bins); the last row counts the face."""
     counts[HEAD] += counts[_FACE]
     for part, instead in ((LEGS, TORSO), (_FACE, HEAD), (HAND, _FACE), (FOREARM, TORSO)):
         if counts[part].sum() < _MIN_PX:
@@ -173,7 +172,7 @@ def _histograms(counts: FloatArray, channels: int) -> FloatArray:
 
 
 def _bins(image: Image, steps: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Bin of every pixel (H, W), with the steps (channels, 256) of each channel's levels."""
+    """Return the bin of each pixel (H, W); ``steps`` (channels, 256) maps levels to steps."""
     channels = image.reshape(*image.shape[:2], -1)
     bins = np.zeros(image.shape[:2], np.int32)
     for c, of_level in enumerate(steps):
@@ -182,7 +181,7 @@ def _bins(image: Image, steps: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _smoothed(counts: FloatArray, channels: int) -> FloatArray:
-    """Smooth counts (parts, bins) over neighbouring colours, and make each sum to one."""
+    """Return counts (parts, bins) smoothed over neighbouring colours and normalized."""
     steps = GREY_STEPS if channels == 1 else COLOR_STEPS
     cube = counts.reshape(len(counts), *(steps,) * channels)
     for axis in range(1, channels + 1):
@@ -199,7 +198,7 @@ def _smoothed(counts: FloatArray, channels: int) -> FloatArray:
 def fit_posture(
     body: BodyModel, camera: Camera, silhouette: Silhouette, name: str, seed: int = 0
 ) -> FloatArray:
-    """Return the posture (12,) near the reference ``name`` whose outline fits best."""
+    """Return the posture (12,) near the reference ``name`` with the best outline."""
     rng = np.random.default_rng(seed)
     seen = CompiledSilhouette(body, camera).look(silhouette)
     best = reference_posture(name)
@@ -218,21 +217,21 @@ def fit_posture(
 def part_labels(
     body: BodyModel, camera: Camera, posture: FloatArray, silhouette: Silhouette
 ) -> NDArray[np.int8]:
-    """Return the part of each pixel (H, W) where it is beyond doubt, else -1."""
+    """Return the part of each pixel (H, W), or -1 if it is not certain."""
     frames = forward_kinematics(body, posture)
     labels = np.full(silhouette.shape, -1, np.int8)
     size = body.size
 
     def pixels(points_m: FloatArray) -> FloatArray:
         optical = camera.reference_to_optical(np.asarray(points_m, dtype=np.float64))
-        # A hand may be said to be at the lens, or behind it.
+        # An estimated hand can be at the lens or behind it.
         optical[..., 2] = np.maximum(optical[..., 2], _NEAREST_M)
         return np.asarray(camera.project(optical))
 
     def upright(
         part: int, low: float, high: float, half_low: float, half_high: float, x: float = 0.0
     ) -> None:
-        """Label a trapezoid of the torso's frame, from height ``low`` to ``high``, metres."""
+        """Label a trapezoid in the torso frame from height ``low`` to ``high``, metres."""
         corners = np.array(
             [(x, -half_low, low), (x, half_low, low), (x, half_high, high), (x, -half_high, high)]
         )
@@ -246,7 +245,7 @@ def part_labels(
     half, forward = 0.4 * size("head_width"), size("head_offset")
     upright(TORSO, 0.5 * waist, top, 0.4 * size("waist_width"), 0.36 * size("torso_top_width"))
     upright(HEAD, chin + 0.02, chin + head, half, 0.8 * half, forward)
-    # The neck is skin, too, and counts as the head, or it would look like a hand before the torso.
+    # The neck is labelled as head, so that its skin is not taken for a hand before the torso.
     upright(HEAD, top + 0.01, chin + 0.02, 0.75 * half, 0.75 * half)
     upright(_FACE, chin + 0.2 * head, chin + 0.6 * head, 0.6 * half, 0.6 * half, forward)
     upright(LEGS, -0.3, -0.08, 0.42 * size("waist_width"), 0.42 * size("waist_width"))
@@ -265,13 +264,13 @@ def part_labels(
                 area = np.zeros(silhouette.shape, np.uint8)
                 cv2.line(area, a, b, 1, thick)
                 labels[area > 0] = part
-    # Pixels at the outline are mixed with the background.
+    # Pixels at the outline are a mixture with the background.
     labels[cv2.erode(silhouette, np.ones((3, 3), np.uint8)) == 0] = -1
     return labels
 
 
 def _tip_m(silhouette: Silhouette, elbow: FloatArray, per_m: FloatArray, length_m: float) -> float:
-    """How far from the elbow a stretched arm's outline ends; ``length_m`` if none ends near it."""
+    """Return the distance from elbow to the arm's tip; ``length_m`` if no tip is near it."""
     height, width = silhouette.shape
     for metres in np.arange(length_m + 0.12, length_m - 0.12, -0.005):
         u, v = np.round(elbow + metres * per_m).astype(int)

@@ -1,12 +1,9 @@
-"""Whether each reference silhouette shows the posture that it should.
+"""Checks that each reference silhouette shows its posture.
 
-:mod:`.references` refuses images without a usable person. Here widths and directions in the
-silhouettes are compared with those of people who hold the postures, so that whoever mixed them up,
-or did not turn or stretch the arms, is told so by name instead of being measured.
-
-The bounds were chosen on 210 rendered bodies who hold the postures, none of whom is refused, and 26
-who make mistakes. 60 of the 210 have arms up to 10 degrees off, 70 were cut out by the background
-model.
+:mod:`.references` refuses images without a usable person. This module compares widths and
+directions in the silhouettes with those of people in the right postures, and reports references
+that are swapped, or show a person who did not turn or did not stretch the arms. The bounds were
+chosen on rendered bodies with right and wrong postures.
 """
 
 from __future__ import annotations
@@ -35,38 +32,38 @@ from cardbox_tracker.vision.camera import Camera
 Silhouette = NDArray[np.uint8]
 
 MIN_ARMS_TO_FRONT = 1.72
-"""Width of ``arms`` to width of ``front``; 1.8 to 2.7 in people who hold the postures."""
+"""Least ratio of the widths of ``arms`` and ``front``."""
 
 MAX_ARMS_TO_FRONT = 3.0
-"""Beyond this the arms touch the body in ``front``; 3.4 with hands on the trousers' seams."""
+"""Largest ratio of the widths of ``arms`` and ``front``; beyond it the arms touch the body."""
 
 MIN_FRONT_TO_SIDE = 0.95
-"""Width of ``front`` to width of ``side``; 1.2 to 3.3, and 0.3 to 0.65 if swapped."""
+"""Least ratio of the widths of ``front`` and ``side``."""
 
 MAX_SIDE_SHOULDERS = 0.74
-"""Width of the shoulders, ``side`` to ``front``; 0.3 to 0.65, and 0.75 half turned."""
+"""Largest ratio of the shoulder widths of ``side`` and ``front``."""
 
 LEAST_SHOULDERS = 0.27
-"""Width of the shoulders of ``front``, of the span; 0.25 to 0.34."""
+"""Least shoulder width of ``front`` in spans."""
 
 ARM_DROP_DEG = (-8.0, 32.0)
-"""Arms of ``arms`` below the level; 10 is asked for."""
+"""Range of the arms' angle below the horizontal in ``arms``; 10 degrees are requested."""
 
 MIN_SPAN_TO_HEAD = 3.3
-"""Span to height of the crown above the arms; 3.5 to 6.2, and 2.6 to 3.3 with bent elbows."""
+"""Least ratio of the span and the height of the crown above the arms; bent elbows reduce it."""
 
 MAX_UNEVEN = 0.17
-"""By how much one arm reaches further than the other, of the span; 0.16 at most."""
+"""Largest difference between the reaches of the arms in spans."""
 
 HANGING_SPREAD = (-0.2, 1.25)
-"""Growth of the width of ``front`` from armpit to wrist per height; 0.2 to 1.0, hands on the hips
--1.6 to -0.8, arms at 40 degrees 1.46 or more."""
+"""Range of the slope of the width of ``front`` between armpit and wrist. It is lower with hands on
+the hips, and higher with arms raised by 40 degrees."""
 
 MAX_CROWN_SHIFT = 0.035
-"""Change of the crown's height between references, of the span; 2 cm at most."""
+"""Largest change of the crown's height between references in spans."""
 
-# The shoulder joints below the arms' axes; where widths are read, below the joints: at the
-# shoulders of `side`, and at armpits and wrists of `front`. All of the span.
+# Heights in spans: the shoulder joints below the arms' axes; and below the joints the rows for
+# widths at the shoulders of `side`, and at armpits and wrists of `front`.
 _JOINT_BELOW_AXIS = 0.01
 _SHOULDERS, _ARMPITS, _WRISTS = (0.02, 0.03, 0.04), (0.04, 0.05, 0.06), (0.21, 0.22, 0.23)
 
@@ -81,7 +78,7 @@ class Widths(NamedTuple):
 
 @dataclass(frozen=True)
 class _View:
-    """The references and what they are measured with."""
+    """The references, their camera and the distance of the person."""
 
     references: Mapping[str, Silhouette]
     camera: Camera
@@ -91,13 +88,13 @@ class _View:
         return Widths(*(_extent_px(self.references[name]) for name in REFERENCE_NAMES))
 
     def crown_m(self, name: str) -> float:
-        """Height of the top of the head above the camera's centre."""
+        """Return the height of the top of the head above the camera's centre."""
         silhouette = self.references[name]
         row = int(np.argmax(silhouette.any(axis=1)))
         return float(row_heights_m(silhouette, self.camera, self.distance_m)[row])
 
     def widest_m(self, name: str, arms: _Arms, below: tuple[float, ...]) -> float:
-        """Largest width at heights below the shoulders, given as fractions of the span."""
+        """Return the largest width at heights below the shoulders, given in spans."""
         heights = [arms.shoulder_m - fraction * arms.span_m for fraction in below]
         silhouette = self.references[name]
         widths = [width_m(silhouette, self.camera, self.distance_m, z) for z in heights]
@@ -105,7 +102,7 @@ class _View:
 
 
 class _Arms(NamedTuple):
-    """Both arms of ``arms``, their span and the height where the shoulders are, metres."""
+    """Both arms of ``arms``, their span, and the height of the shoulders, metres."""
 
     left: LevelArm
     right: LevelArm
@@ -116,12 +113,12 @@ class _Arms(NamedTuple):
 def posture_problems(
     references: Mapping[str, Silhouette], camera: Camera, distance_m: float
 ) -> list[str]:
-    """Return what is wrong with the references, in sentences for the person; empty if nothing.
+    """Return the problems of the references as sentences; an empty list if there are none.
 
     Args:
-        references: usable silhouettes (H, W) of ``front``, ``side`` and ``arms``, as
-            ``outline.filled`` returns them.
-        camera: working camera, pitched as it is.
+        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, as ``outline.filled``
+            returns them.
+        camera: working camera including the pitch.
         distance_m: level distance to the person.
     """
     view = _View(references, camera, distance_m)
@@ -130,8 +127,8 @@ def posture_problems(
         return [mixed_up]
     arms = _arms(view)
     if arms is None:
-        return [f"reference 'arms': no arms are seen; {_again('arms')}"]
-    # What is said of `front` and `side` builds on the span of `arms`, so that one comes first.
+        return [f"reference 'arms': no arms are visible; {_again('arms')}"]
+    # The checks of `front` and `side` use the span of `arms`, so `arms` is checked first.
     for problem in (_problem_of_arms, _problem_of_front, _problem_of_side, _problem_of_height):
         found = problem(view, arms)
         if found:
@@ -140,7 +137,7 @@ def posture_problems(
 
 
 def check_postures(references: Mapping[str, Silhouette], camera: Camera, distance_m: float) -> None:
-    """Refuse references that do not show what they should; arguments as ``posture_problems``.
+    """Refuse references in wrong postures; the arguments are those of ``posture_problems``.
 
     Raises:
         InitializationError: the text names the reference and the mistake.
@@ -155,12 +152,12 @@ def _again(name: str) -> str:
 
 
 def _mixed_up(widths: Widths) -> str:
-    """Name the references that were captured for each other: arms are wide, sides narrow."""
+    """Return a text that names swapped references, recognized by their widths, or no text."""
     if widths.arms > widths.front > MIN_FRONT_TO_SIDE * widths.side:
         return ""
     if widths.arms <= widths.front and widths.arms > MIN_FRONT_TO_SIDE * widths.front:
         return (
-            "reference 'arms': the arms were not raised (it is no wider than 'front'); "
+            "reference 'arms': the arms are not raised (it is not wider than 'front'); "
             f"{_again('arms')}"
         )
     by_width = sorted(REFERENCE_NAMES, key=lambda name: int(getattr(widths, name)))
@@ -188,7 +185,7 @@ def _problem_of_arms(view: _View, arms: _Arms) -> str:
     for side, arm, sign in (("left", arms.left, -1.0), ("right", arms.right, 1.0)):
         drop = float(np.degrees(np.arctan(sign * arm.slope)))
         if not lowest <= drop <= highest:
-            where = f"{abs(drop):.0f} degrees {'below' if drop > 0 else 'above'} the level"
+            where = f"{abs(drop):.0f} degrees {'below' if drop > 0 else 'above'} the horizontal"
             return (
                 f"reference 'arms': the {side} arm is not stretched sideways (it points {where}, "
                 f"expected 10 below); {_again('arms')}"
@@ -237,7 +234,7 @@ def _problem_of_front(view: _View, arms: _Arms) -> str:
 
 def _problem_of_side(view: _View, arms: _Arms) -> str:
     front, side = (view.widest_m(name, arms, _SHOULDERS) for name in ("front", "side"))
-    # Where the chest was not cut out, the span tells how wide it is.
+    # If a part of the chest is missing in the silhouette, the width follows from the span.
     turned = side / max(front, LEAST_SHOULDERS * arms.span_m)
     if turned <= MAX_SIDE_SHOULDERS:
         return ""
@@ -257,7 +254,7 @@ def _problem_of_height(view: _View, arms: _Arms) -> str:
                 f"reference '{name}': the head is {100 * abs(shift):.0f} cm "
                 f"{'higher' if shift > 0 else 'lower'} than in 'front'; stand upright, on the "
                 f"same spot, for all three, and capture '{name}' again; or the head is missing "
-                "from one silhouette, as where a shirt has the colour of the wall"
+                "in a silhouette, because it has the colour of the background"
             )
     return ""
 

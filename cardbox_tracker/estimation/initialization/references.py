@@ -1,6 +1,6 @@
-"""The three reference silhouettes: what makes them usable, and what they say of the place.
+"""Checks of the reference silhouettes, and the person's lateral place in them.
 
-The size estimation itself is in :mod:`cardbox_tracker.estimation.initialization.measure`.
+:mod:`cardbox_tracker.estimation.initialization.measure` estimates the sizes.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from cardbox_tracker.vision.camera import Camera
 Silhouette = NDArray[np.uint8]
 
 MIN_PERSON_FRACTION = 0.02
-"""Somebody close enough to be measured covers at least this fraction of the image."""
+"""Least fraction of the image that is covered by a person near enough to be measured."""
 
 MAX_PERSON_FRACTION = 0.6
-"""More foreground than this fraction of the image is no person, but another light or background."""
+"""Largest fraction of foreground; beyond it the light or the background has changed."""
 
 MAX_LIKENESS = 0.80
-"""Two different reference postures overlap less than this, as IoU when laid over each other."""
+"""Largest IoU of two different reference postures after their alignment."""
 
 POSTURE_TEXT = {
     "front": "face the camera, arms 20 degrees away from the body",
     "side": "turn by 90 degrees, arms as before",
     "arms": "face the camera, both arms stretched sideways, hands open",
 }
-"""What a person has to do for each reference."""
+"""Instruction for each reference."""
 
 
 def average_silhouette(silhouettes: Sequence[Silhouette]) -> Silhouette:
-    """Return the majority (H, W) of the images of one held posture.
+    """Return the pixelwise majority (H, W) of the silhouettes of one posture.
 
     Raises:
-        InitializationError: there are none.
+        InitializationError: there are no silhouettes.
     """
     if not silhouettes:
         raise InitializationError(
@@ -52,7 +52,7 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
     """Refuse a silhouette (H, W) that cannot show the reference posture ``name``.
 
     Raises:
-        InitializationError: nobody is in the image, or the person is cut off at its border.
+        InitializationError: no person is in the image, or the person is cut off at its border.
     """
     if name not in REFERENCE_NAMES:
         raise ValueError(f"reference {name!r} is unknown; it is one of {REFERENCE_NAMES}")
@@ -66,9 +66,10 @@ def check_reference(name: str, silhouette: Silhouette) -> None:
         )
     if share > MAX_PERSON_FRACTION:
         raise InitializationError(
-            f"reference '{name}': {rounded_up(100 * share, 0)} % of the image are foreground, more "
-            "than a person can be; the background was learned in another light or with somebody "
-            "in it: leave the image and learn it again (background/learn)",
+            f"reference '{name}': {rounded_up(100 * share, 0)} % of the image is foreground, "
+            f"expected at most {100 * MAX_PERSON_FRACTION:.0f} %; the background was learned in "
+            "another light or with a person in the image: leave the image and learn it again "
+            "(background/learn)",
             "Step out of the picture",
         )
     for border, pixels in (
@@ -88,7 +89,7 @@ def check_references(references: Mapping[str, Silhouette]) -> None:
     """Refuse silhouettes that are missing, differ in size, or show the same posture twice.
 
     Raises:
-        InitializationError: the text says which and what to do.
+        InitializationError: the text names the references and the remedy.
     """
     missing = [name for name in REFERENCE_NAMES if name not in references]
     if missing:
@@ -112,7 +113,7 @@ def check_references(references: Mapping[str, Silhouette]) -> None:
 
 
 def aligned_iou(first: Silhouette, second: Silhouette) -> float:
-    """Return the IoU of two silhouettes after moving the second sideways over the first."""
+    """Return the IoU of two silhouettes after horizontal alignment."""
     shift = round(_middle_column(first) - _middle_column(second))
     moved = np.zeros_like(second)
     width = second.shape[1]
@@ -128,7 +129,7 @@ def _middle_column(silhouette: Silhouette) -> float:
 
 
 def lateral_m(silhouette: Silhouette, camera: Camera, distance_m: float) -> float:
-    """``torso_y`` under which the head and chest of a silhouette lie, metres."""
+    """Return ``torso_y`` of the middle of a silhouette's head and chest, metres."""
     rows = np.nonzero(np.any(silhouette, axis=1))[0]
     upper = silhouette[rows[0] : rows[0] + max(1, (rows[-1] - rows[0]) // 3)]
     columns = np.count_nonzero(upper, axis=0).cumsum()

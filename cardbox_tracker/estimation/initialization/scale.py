@@ -1,8 +1,8 @@
-"""The scale of a person from a second camera or from depth images: how far away, and how large.
+"""Metric scale of a person from a second camera or from depth images.
 
-One camera's outline is the same for a small person who is near and a large one who is far. Scaled
-about the first camera's centre, the body stays as it is in its image, but moves through the other
-camera's, and through measured depths; where it fits there, it has its true size.
+One camera cannot separate a small person nearby from a large person far away. Scaling the body
+about the first camera's centre does not change that camera's image, but changes the image of the
+second camera and the depths; the best fit to these gives the true scale.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from cardbox_tracker.estimation.initialization.config import (
 from cardbox_tracker.vision.camera import Camera
 
 _LEAST, _MOST, _STEP = 0.5, 2.0, 0.005
-# A silhouette that differs from the body by more than this share of its pixels is another posture.
+# Largest share of differing pixels of a fit.
 _LARGEST_SHARE = 0.5
-# A person whose depth is known at fewer pixels is not measured by it.
+# Least number of the person's pixels with a known depth.
 _FEWEST_DEPTHS = 100
 _TERM = Depth()
 
 SCALE_REFERENCES = ("front", "arms")
-"""Reference postures of which another camera's silhouettes, or depth images, are needed."""
+"""Reference postures that need silhouettes of the second camera, or depth images."""
 
 Measure = Callable[[InitializationConfig, bool], InitializationResult]
-"""Measures a person with the first camera at the distance of the settings that it is given.
+"""Function that measures a person with the first camera at the distance of the settings.
 
-It is called with False, then with True at the distance that was found.
+Its second argument is False in the first call, and True in the last one at the final distance.
 """
 
 
 class DepthReference(NamedTuple):
-    """What was measured of a reference posture.
+    """Silhouette and depth of a reference posture.
 
     Attributes:
         silhouette: (H, W), 0 or 255.
-        depth_m: (H, W), metres along the optical axis; 0 where it is not known.
+        depth_m: (H, W), metres along the optical axis; 0 if unknown.
     """
 
     silhouette: NDArray[np.uint8]
@@ -65,17 +65,17 @@ def measured_with_second(
     other: OtherCamera,
     references: Mapping[str, NDArray[np.uint8]],
 ) -> InitializationResult:
-    """Measure a person with one camera, and how far away they are with another.
+    """Measure a person with the first camera, and the distance with the second camera.
 
     Args:
-        measure: with the first camera.
-        config: settings; their distance is only where the search begins.
-        camera: the first camera, whatever its pitch.
-        other: the other camera.
-        references: its silhouettes, as for :func:`measured_scale`.
+        measure: measurement with the first camera.
+        config: settings; the search starts at their distance.
+        camera: the first camera; its pitch is replaced by that of ``config``.
+        other: the second camera.
+        references: its silhouettes, see :func:`measured_scale`.
 
     Raises:
-        InitializationError: as ``measure``, or the second camera does not show that person.
+        InitializationError: see ``measure``; or the second camera does not show that person.
     """
     pitched = camera.with_pitch(config.camera_pitch_rad)
     guessed = measure(config, False).body
@@ -89,16 +89,16 @@ def measured_with_depth(
     camera: Camera,
     references: Mapping[str, DepthReference],
 ) -> InitializationResult:
-    """Measure a person with one camera, and how far away they are with depth images.
+    """Measure a person with one camera, and the distance with depth images.
 
     Args:
-        measure: with that camera.
-        config: settings; their distance is only where the search begins.
-        camera: whose pixels the depth images have, whatever its pitch.
-        references: as for :func:`depth_scale`.
+        measure: measurement with the camera.
+        config: settings; the search starts at their distance.
+        camera: camera of silhouettes and depth; its pitch is replaced by that of ``config``.
+        references: see :func:`depth_scale`.
 
     Raises:
-        InitializationError: as ``measure``, or the depth images do not show that person.
+        InitializationError: see ``measure``; or the depth images do not show that person.
     """
     pitched = camera.with_pitch(config.camera_pitch_rad)
     guessed = measure(config, False).body
@@ -108,7 +108,7 @@ def measured_with_depth(
 def _measured_again(
     measure: Measure, config: InitializationConfig, scale: float
 ) -> InitializationResult:
-    # What no outline shows is taken from the proportions of people of that size.
+    # The measurement is repeated because sizes that no outline shows depend on the scale.
     return measure(replace(config, distance_m=scale * config.distance_m), True)
 
 
@@ -118,17 +118,17 @@ def measured_scale(
     other: OtherCamera,
     references: Mapping[str, NDArray[np.uint8]],
 ) -> float:
-    """Return how many times larger, and farther away, ``body`` is than it was measured.
+    """Return the factor by which size and distance of ``body`` must be multiplied.
 
     Args:
-        body: measured before ``camera`` at a distance that was assumed.
-        camera: the first camera, pitched as it stands.
-        other: another camera.
-        references: silhouettes (H, W) of the other camera, 0 or 255, by the names of the reference
-            postures ``front`` and ``arms``.
+        body: measured by ``camera`` at an assumed distance.
+        camera: the first camera including its pitch.
+        other: the second camera.
+        references: silhouettes (H, W) of the second camera, 0 or 255, by the names of the
+            reference postures ``front`` and ``arms``.
 
     Raises:
-        InitializationError: the body fits the other camera's silhouettes at no scale.
+        InitializationError: the body does not fit the second camera's silhouettes at any scale.
     """
     best, share = _best_scale(body, lambda there: _share(there, camera, other, references))
     if share > _LARGEST_SHARE:
@@ -141,14 +141,14 @@ def measured_scale(
 
 
 def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthReference]) -> float:
-    """Return how many times larger, and farther away, ``body`` is than it was measured.
+    """Return the factor by which size and distance of ``body`` must be multiplied.
 
-    The model's visible surface is compared with the measured one, see
+    The visible surface of the model is compared with the depth images, see
     :mod:`cardbox_tracker.estimation.cost.depth`.
 
     Args:
-        body: measured before ``camera`` at a distance that was assumed.
-        camera: whose pixels the depth images have, pitched as it stands.
+        body: measured by ``camera`` at an assumed distance.
+        camera: camera of silhouettes and depth, including its pitch.
         references: by the names of the reference postures ``front`` and ``arms``.
 
     Raises:
@@ -162,25 +162,25 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
         known = int(np.count_nonzero((silhouette > 0) & (depth_m > 0)))
         if known < _FEWEST_DEPTHS:
             raise InitializationError(
-                f"reference '{name}': the depth images know {known} pixels of the person; expected "
-                f"{_FEWEST_DEPTHS} or more: check that they show what the camera shows, or give "
+                f"reference '{name}': the depth images have {known} pixels of the person; expected "
+                f"{_FEWEST_DEPTHS} or more: check that they have the view of the camera, or give "
                 "the distance"
             )
     best, share = _best_scale(body, lambda there: _off_surface(there, camera, frames))
     if share > _LARGEST_SHARE:
         raise InitializationError(
-            "the depth images show the person at no distance at which the silhouettes do: check "
-            "that they are of the camera that measures, in metres or millimetres; or give the "
-            "distance"
+            "the depth images do not agree with the silhouettes at any distance: check that they "
+            "belong to the camera of the silhouettes, and are in metres or millimetres; or give "
+            "the distance"
         )
     return best
 
 
 def scaled(body: BodyModel, scale: float) -> BodyModel:
-    """Return ``body`` larger and farther away, so that it looks the same.
+    """Return ``body`` with sizes and place multiplied by ``scale``.
 
     Raises:
-        BodyModelError: no person is of that size, or nobody stands there.
+        BodyModelError: the sizes or the place are out of range.
     """
     place = body.placement
     sizes: FloatArray = scale * body.sizes
@@ -193,7 +193,7 @@ def scaled(body: BodyModel, scale: float) -> BodyModel:
 
 
 def _best_scale(body: BodyModel, share: Callable[[BodyModel], float | None]) -> tuple[float, float]:
-    """Return the scale of ``body`` with the least share, and that; 1 and 1 if all are None."""
+    """Return the scale of ``body`` with the least share, and the share; 1 and 1 without any."""
     rated: dict[float, float] = {}
     for scale in np.exp(np.arange(np.log(_LEAST), np.log(_MOST), _STEP)).tolist():
         try:
@@ -212,7 +212,7 @@ def _share(
     other: OtherCamera,
     references: Mapping[str, NDArray[np.uint8]],
 ) -> float | None:
-    """Mean share of the silhouettes' pixels that differ; None of nobody before that camera."""
+    """Return the mean share of differing pixels; None if the body is not before that camera."""
     try:
         view = View.of(there, camera, other)
     except CameraError:
@@ -228,7 +228,7 @@ def _share(
 
 
 def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -> float:
-    """Mean share of the visible surface that is not where the depth images have it."""
+    """Return the mean share of the visible surface that differs from the depth images."""
     term = DepthTerm(_TERM, body, camera)
     shares = [
         float(term.observe(frame).postures(_held(name, body)[None])[0]) / term.body_px
@@ -238,7 +238,7 @@ def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -
 
 
 def _held(name: str, body: BodyModel) -> FloatArray:
-    """Return the state (14,) of somebody who holds a reference posture."""
+    """Return the state (14,) of a reference posture at the measured place."""
     state = np.append(reference_posture(name), [0.0, 0.0])
     state[0] = body.placement.lateral_m
     return state

@@ -1,21 +1,19 @@
-"""Where the shoulder joints are and how long the arms, from the outlines of ``front`` and ``arms``.
+"""Shoulder joints and arm lengths from the outlines of ``front`` and ``arms``.
 
-A fit of all 18 sizes at once finds arms 5 to 10 % too long and shoulders 2 cm too high: the girdle
-lifts the shoulders in ``arms``, open fingers reach beyond the fist, and nothing in the outline of a
-straight arm shows the elbow. So the bones of the arms are measured before the fit, from what the
-outline does show, with the proportions of people for the rest:
+A fit of all 18 sizes at once is biased: the girdle lifts the shoulders in ``arms``, open fingers
+reach beyond the fist, and the outline of a straight arm does not show the elbow. So the bones of
+the arms are measured before the fit, with the proportions of people:
 
-1. Each arm of ``arms`` is followed from the fingertips to the armpit; a line through its middle is
-   the arm's axis. The span goes from fingertip to fingertip.
-2. The axes pass by the shoulder joints. They are lower when the arms hang, by the rise of the
-   girdle.
-3. The breadth is read three times: where the axes of the hanging arms of ``front`` reach the
-   joints' height, from the width of the shoulders there, and from the span. The three are averaged
-   by their precision; one that contradicts the others counts less.
-4. What the span leaves beside the breadth is the reach of the arms, shared among upper arm,
-   forearm and fingers as people's arms are.
+1. Each arm of ``arms`` is traced from the fingertips to the armpit; a line through its middle is
+   the arm's axis. The span is the distance between the fingertips.
+2. The shoulder joints lie near the axes, and lower by the lift of the girdle if the arms hang.
+3. The breadth has three readings: the distance of the axes of the hanging arms in ``front`` at the
+   joints' height, the width of the shoulders there, and the span. They are averaged by their
+   precision, with less weight for outliers.
+4. The span minus the breadth is the reach of the arms, which is divided into upper arm, forearm
+   and fingers by mean proportions.
 
-Constants without a source were chosen on about 200 rendered bodies whose joint centres are known.
+Constants without a source were chosen on rendered bodies with known joint centres.
 """
 
 from __future__ import annotations
@@ -39,60 +37,58 @@ FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]
 
 GIRDLE_RISE = 0.068
-"""How much higher the shoulder joints are in ``arms`` than in ``front``, of their breadth.
+"""Lift of the shoulder joints from ``front`` to ``arms`` in shoulder breadths.
 
-The clavicle is about 0.43 of the breadth long, since its inner ends are close to each other, and
-rises by about 9 degrees until the arm is at 80 degrees (Inman, Saunders & Abbott, "Observations on
-the Function of the Shoulder Joint", 1944).
+The clavicle has a length of about 0.43 breadths and rises by about 9 degrees until the arm is at 80
+degrees (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder Joint", 1944).
 """
 
 KNUCKLES_SHARE = 0.874
-"""Shoulder to the knuckles at the base of the fingers, of shoulder to fingertips.
+"""Distance from shoulder to knuckles, divided by the distance from shoulder to fingertips.
 
-Mean of 60 rendered bodies (standard deviation 0.7 %); 0.862 in men and 0.868 in women after de
-Leva, "Adjustments to Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996.
+Mean of rendered bodies; 0.862 for men and 0.868 for women by de Leva, "Adjustments to
+Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996.
 """
 
 UPPER_ARM_SHARE = 0.420
-"""Upper arm, of shoulder to knuckles, at the mean ratio of hip width to shoulder breadth.
+"""Length of the upper arm, divided by the distance from shoulder to knuckles, at the mean ratio of
+hip width to shoulder breadth.
 
-Mean of 214 rendered bodies (standard deviation 3.5 %); 0.442 in men and 0.446 in women after de
-Leva, whose joint centres are defined differently.
+Mean of rendered bodies; 0.442 for men and 0.446 for women by de Leva, with other joint centres.
 """
 
 BREADTH_OF_SPAN = 0.204
-"""Distance of the shoulder joints, of the span (rendered bodies)."""
+"""Distance of the shoulder joints in spans (rendered bodies)."""
 
-# Whose hips are wide beside the shoulders has a short forearm beside the upper arm: an exponent of
-# 0.2 on the rendered bodies, taken smaller and never more than 3 % of the share, for clothes widen
-# the hips.
+# Mean ratio of hip width to shoulder breadth; the upper arm's share grows with a power of that
+# ratio, by a limited factor because clothes widen the hips.
 _HIP_RATIO, _HIP_EXPONENT, _HIP_EFFECT = 1.042, 0.15, 0.03
-# Axis of the outline of a level arm below its shoulder joint, of the span.
+# Height of the shoulder joint above the axis of a level arm in spans.
 _AXIS_BELOW_JOINT = 0.0034
-# Where the width of the shoulders is read, below the arms' axes, of the span.
+# Row of the shoulders' width below the arms' axes in spans.
 _SHOULDERS_BELOW = 0.02
-# Where the hips are widest, below the shoulder joints, of the span.
+# Row of the widest hips below the shoulder joints in spans.
 _HIPS_BELOW = 0.28
-# The fingertips bend down and are nearer than the body, so that less of the span is the arms'.
+# Correction of the span for fingertips that bend down and are nearer to the camera than the body.
 _SPAN_IN_PLANE = 0.980
-# The breadth by each reading, and the standard deviation of span, axes and width, as a fraction.
+# Factors from axes distance and width to breadth; relative deviations by span, axes and width.
 _BREADTH_OF_AXES, _BREADTH_OF_WIDTH = 1.044, 0.733
 _BREADTH_SD = np.array([0.05, 0.031, 0.046])
-# A reading counts half of its weight where it is so many standard deviations off the mean.
+# Distance from the mean, in standard deviations, at which a reading has half of its weight.
 _OUTLIER_SD = 1.5
 _AVERAGING_STEPS = 10
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The arms' bones, metres.
+    """The bones of the arms, metres.
 
     Attributes:
-        shoulder_breadth_m: between the shoulder joints.
-        shoulder_height_m: of the shoulder joints above the camera's centre, arms hanging.
-        upper_arm_m: shoulder joint to elbow joint.
-        forearm_m: elbow joint to the knuckles.
-        span_m: fingertip to fingertip in ``arms``.
+        shoulder_breadth_m: distance between the shoulder joints.
+        shoulder_height_m: height of the shoulder joints, with hanging arms, above the camera.
+        upper_arm_m: distance from shoulder joint to elbow joint.
+        forearm_m: distance from elbow joint to knuckles.
+        span_m: distance from fingertip to fingertip in ``arms``.
     """
 
     shoulder_breadth_m: float
@@ -110,11 +106,11 @@ def measure_skeleton(
     Args:
         references: silhouettes (H, W) of ``front`` and ``arms``, as ``outline.filled`` returns
             them.
-        camera: the working camera, pitched as it is.
+        camera: working camera including the pitch.
         distance_m: level distance to the person.
 
     Returns:
-        None if no arms are found in ``arms``.
+        None if ``arms`` shows no arms.
     """
     front, arms = references["front"], references["arms"]
     right, left = (level_arm(arms, camera, distance_m, side) for side in (-1, 1))
@@ -125,7 +121,7 @@ def measure_skeleton(
     half = BREADTH_OF_SPAN * span / 2.0
     axis = float(np.mean([left.axis_m(centre + half), right.axis_m(centre - half)]))
     raised = axis + _AXIS_BELOW_JOINT * span
-    # The height takes a breadth, which takes a height: the span's breadth is good enough for that.
+    # Height and breadth depend on each other; the first height uses the breadth from the span.
     height = raised - GIRDLE_RISE * 2.0 * half
     readings = [
         BREADTH_OF_SPAN * span,
@@ -142,11 +138,11 @@ def measure_skeleton(
 
 
 def combined(readings: FloatArray, sd: FloatArray) -> float:
-    """Average readings by their precision; one that is far off the others counts less.
+    """Return the mean of readings, weighted by precision and by Cauchy weights.
 
     Args:
-        readings: shape (n,), above 0; NaN where there is none. The first one is there.
-        sd: their standard deviations (n,) as fractions.
+        readings: shape (n,), above 0; NaN if missing. The first reading must not be missing.
+        sd: relative standard deviations (n,).
     """
     known = np.isfinite(readings) & (readings > 0)
     logs, weights = np.log(readings[known]), sd[known] ** -2.0
@@ -158,9 +154,9 @@ def combined(readings: FloatArray, sd: FloatArray) -> float:
 
 
 def effect_of_hips(ratio: float) -> float:
-    """Return the factor on the upper arm's share for a ratio of hip width to shoulder breadth.
+    """Return the factor of the upper arm's share for a ratio of hip width to shoulder breadth.
 
-    It is 1 where the ratio is not known (NaN).
+    The factor is 1 if the ratio is NaN.
     """
     if not np.isfinite(ratio):
         return 1.0

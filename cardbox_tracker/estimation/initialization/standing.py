@@ -1,4 +1,4 @@
-"""Where somebody stands whose size is about that of a body model, before they are measured."""
+"""Estimate of the hips' height before a person is measured, from the top of the head."""
 
 from __future__ import annotations
 
@@ -12,25 +12,22 @@ from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.estimation.initialization.stature import height_of_row_m
 from cardbox_tracker.vision.camera import Camera
 
-# Hips of a person on any floor or step that a camera in the same room looks at; beyond it, the
-# topmost row is not that of a head.
+# Range of the hips' height; beyond it, the topmost row is not the top of a head.
 _LOWEST_M, _HIGHEST_M = -2.5, 1.5
-# A row with this many foreground pixels or fewer is noise.
+# Rows with at most this number of foreground pixels are noise.
 _SPECK_PX = 2
 
 
 def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera) -> BodyModel:
-    """Return ``body`` so high that the top of its head is that of the person in the image.
-
-    How high the camera stands is not known before somebody is measured.
+    """Return ``body`` with the hip height that aligns its head with the silhouette's top row.
 
     Args:
         silhouette: (H, W), 0 or 255, of the camera's size.
-        body: somebody at the person's distance, before a camera of that pitch.
+        body: body model with the person's distance and the camera's pitch.
         camera: working camera.
 
     Returns:
-        ``body`` itself if nobody is in the image, or their head is above it.
+        ``body`` unchanged if the silhouette is empty or the head is cut off.
     """
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:
@@ -40,8 +37,7 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
         head[2] - body.placement.hip_height_m + body_parts(body.sizes).head.height_m / 2
     )
     view = camera.with_pitch(body.camera_pose.pitch_rad)
-    # The reference frame's X points from the person to the camera; a row's upper edge is half a
-    # pixel above its centre.
+    # X of the reference frame points to the camera, and a row's upper edge is half a pixel higher.
     crown_m = height_of_row_m(view, rows[0] - 0.5, -float(head[0]))
     hip_height_m = crown_m - float(crown_above_hip_m)
     if not _LOWEST_M <= hip_height_m <= _HIGHEST_M:

@@ -57,8 +57,8 @@ class BackgroundParameters(NodeParameters):
     )
     within_m: float = parameter(
         0.0,
-        "with depth images: whoever is nearer than this is the person, and nothing has to be "
-        "learned; choose it between them and the wall; 0: learn the empty scene",
+        "with depth images: pixels nearer than this are the person, and nothing has to be "
+        "learned; choose it between the person and the wall; 0: learn the empty scene",
         unit="m",
         limits=(0.0, WITHIN_LIMITS_M[1]),
     )

@@ -25,9 +25,9 @@ from cardbox_tracker.estimation.initialization.cancellation import Cancellation
 from cardbox_tracker.estimation.initialization.guidance import (
     ASK,
     Guidance,
-    Step,
+    Prompt,
     measuring,
-    said,
+    spoken,
 )
 from cardbox_tracker.estimation.initialization.saved_model import SavedModel
 from cardbox_tracker.ros.messages import conversions
@@ -164,8 +164,8 @@ class InitializerNode(CardboxNode):
         references.captured, references.images = {}, {}
         return answer
 
-    def _show(self, step: Step) -> None:
-        self._guide.show(step, self.parameters.value.bell)
+    def _show(self, prompt: Prompt) -> None:
+        self._guide.show(prompt, self.parameters.value.bell)
 
     def _progress(self, fraction: float) -> None:
         self._cancellation.wait(0.0)
@@ -197,13 +197,13 @@ class InitializerNode(CardboxNode):
 class GuideOutputs:
     """Tells a person what to do next: drawn on ``overlay``, in words to say aloud on ``~/say``.
 
-    Whoever runs the program gets more of it on ``~/status``. ``~/guiding`` is true meanwhile: the
-    tracker then leaves ``overlay`` to the guidance.
+    ``~/status`` has the details for the operator. ``~/guiding`` is true meanwhile: the tracker then
+    leaves ``overlay`` to the guidance.
     """
 
     def __init__(self, node: CardboxNode) -> None:
         """Advertise the topics for ``node``."""
-        self._step: Step | None = None
+        self._prompt: Prompt | None = None
         self._guide: Guide | None = None
         self._status = node.advertise(String, "~/status", qos.LATCHED)
         self._say = node.advertise(String, "~/say", qos.RESULT)
@@ -211,25 +211,25 @@ class GuideOutputs:
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
         self._guiding.publish(Bool(data=False))
 
-    def show(self, step: Step, bell: bool = False) -> None:
-        """Show a step of the guidance; with ``bell``, ring the terminal's where it is a result."""
-        if self._step is None:
+    def show(self, prompt: Prompt, bell: bool = False) -> None:
+        """Show a prompt; with ``bell``, ring the terminal bell at a success or failure."""
+        if self._prompt is None:
             self._guiding.publish(Bool(data=True))
-        words = said(self._step, step)
+        words = spoken(self._prompt, prompt)
         if words:
             self._say.publish(String(data=words))
-            if bell and step.mood != ASK:
+            if bell and prompt.mood != ASK:
                 # With the end of a line, at which 'ros2 launch' hands on what a node writes.
                 print("\a", file=sys.stderr, flush=True)
-        self._step = step
-        self._status.publish(String(data=step.text))
+        self._prompt = prompt
+        self._status.publish(String(data=prompt.text))
 
     def end(self, text: str, words: str) -> None:
         """End the guidance with a last line, and ``words`` to say."""
-        if self._step is not None:
+        if self._prompt is not None:
             self._say.publish(String(data=words))
             self._guiding.publish(Bool(data=False))
-        self._step = None
+        self._prompt = None
         self._status.publish(String(data=text))
 
     def draw(
@@ -239,12 +239,12 @@ class GuideOutputs:
         camera: Camera | None,
         settings: InitializerParameters,
     ) -> None:
-        """Draw the present step over an image, if there is one and somebody to see it.
+        """Draw the present prompt over an image, if there is one and somebody to see it.
 
         ``message`` is the silhouette, and ``seen`` what it is cut out of, if that came in time.
         """
-        step = self._step
-        if step is None or camera is None or not self._overlay.get_subscription_count():
+        prompt = self._prompt
+        if prompt is None or camera is None or not self._overlay.get_subscription_count():
             return
         silhouette = conversions.silhouette_of(message)
         if silhouette.shape != (camera.height, camera.width):
@@ -252,10 +252,10 @@ class GuideOutputs:
         config = settings.config()
         if self._guide is None or (self._guide.camera, self._guide.config) != (camera, config):
             self._guide = Guide(camera, config)
-        # Of another size it is another's: then the silhouette has to do.
+        # An image of another size is not that of the silhouette, which is drawn instead.
         fits = seen is not None and (seen.height, seen.width) == silhouette.shape
         image = conversions.image_of(seen) if fits else None
-        picture = self._guide.draw(step, silhouette, image, settings.mirror)
+        picture = self._guide.draw(prompt, silhouette, image, settings.mirror)
         self._overlay.publish(conversions.image_message(message.header, picture, "bgr8"))
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import yaml
 from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
@@ -33,7 +34,6 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _PROGRESS_S = 5.0
 # The nodes of a second camera may start so much later.
@@ -109,7 +109,7 @@ class PlayBagNode(CardboxNode):
         self._position_s = settings.start_s
         self._paused = False
         self._anchor = (0.0, 0.0)
-        self._executor = make_executor(self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
         self._status = self.advertise(String, "~/status", qos.LATCHED)
         self.offer("~/pause", self._pause)

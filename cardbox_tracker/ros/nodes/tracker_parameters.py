@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
-from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
@@ -143,7 +142,7 @@ class TrackerParameters(NodeParameters):
         """Return the settings of the core; raises ValueError where they do not go together."""
         base = PRESETS[self.preset]()
         if self.depth:
-            base = replace(base, terms=(*base.terms, Depth()))
+            base = base.with_depth()
         if self.particles:
             base = base.with_particles(self.particles)
         return replace(

@@ -16,17 +16,17 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from cardbox_tracker.settings import Setting, settings_of
 
 NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
-"""What a live change does: it holds from the next image on, or tracking starts again."""
+"""Effects of a live change: it holds from the next image on, or tracking starts again."""
 
 
 @dataclass(frozen=True)
 class ParameterSpec(Setting):
-    """What is known of one parameter besides its name, type and default.
+    """Description, range and behaviour of one parameter.
 
     Attributes:
         read_only: True if it can only be given at the start.
         effect: when a live change takes effect.
-        was: name of the version before, which still works; empty if it was not renamed.
+        was: former name, which still works; empty if it was not renamed.
     """
 
     read_only: bool = False

@@ -130,9 +130,9 @@ class LiveParameters(Generic[T]):
         )
 
     def _warn_of_unknown(self) -> None:
-        """Say which names given at the start are no parameters: ROS leaves them out without a word.
+        """Warn of names given at the start that are no parameters, which ROS ignores in silence.
 
-        No error, for a file may be for several nodes; only what was one of this node is refused.
+        It is no error, since a file may be for several nodes; only a removed parameter is refused.
         """
         # rclpy has no public name for what was given.
         given = getattr(self._node, "_parameter_overrides", {})

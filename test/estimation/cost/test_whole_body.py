@@ -275,7 +275,7 @@ def test_the_median_column_is_where_the_person_is() -> None:
         person = np.zeros((120, 160), np.uint8)
         person[10:90, column - 10 : column + 10] = 255
         of.see(person, state())
-        assert of.sight() == pytest.approx((column - 79.5) / 165, abs=4 / 165)
+        assert of.bearing() == pytest.approx((column - 79.5) / 165, abs=4 / 165)
 
 
 def test_the_front_reference_has_the_pixels_of_the_front() -> None:

@@ -10,11 +10,11 @@ from cardbox_tracker.estimation.initialization.guidance import (
     GOOD,
     HOLD_STILL,
     Guidance,
-    Step,
+    Prompt,
     instruction,
     measuring,
-    said,
     short_words,
+    spoken,
 )
 
 
@@ -22,7 +22,7 @@ class Room:
     """A person whose first ``failures`` captures fail."""
 
     def __init__(self, failures: int = 0) -> None:
-        self.steps: list[Step] = []
+        self.steps: list[Prompt] = []
         self.captured: list[str] = []
         self.waited_s = 0.0
         self.failures = failures
@@ -80,16 +80,16 @@ def test_steps_have_their_posture_words_and_count() -> None:
     assert {step.name for step in room.steps} == {"front", "side", "arms"}
     words = short_words("front", "left")
     assert room.steps[:5] == [
-        *(Step("front", words, left, instruction("front", "left")) for left in (3, 2, 1)),
-        Step("front", HOLD_STILL, detail="hold still"),
-        Step("front", "Good.", detail="captured", mood=GOOD),
+        *(Prompt("front", words, left, instruction("front", "left")) for left in (3, 2, 1)),
+        Prompt("front", HOLD_STILL, detail="hold still"),
+        Prompt("front", "Good.", detail="captured", mood=GOOD),
     ]
 
 
 def test_steps_as_lines() -> None:
-    assert Step("side", "turn", 2).text == "side: turn: 2"
-    assert Step("side", "hold still").text == "side: hold still"
-    assert Step("side", "Good.", detail="captured 'side' from 5").text == (
+    assert Prompt("side", "turn", 2).text == "side: turn: 2"
+    assert Prompt("side", "hold still").text == "side: hold still"
+    assert Prompt("side", "Good.", detail="captured 'side' from 5").text == (
         "side: captured 'side' from 5"
     )
     assert measuring(0.404).text == "measuring: 40 %"
@@ -100,8 +100,8 @@ def test_what_is_said_is_short_and_said_once() -> None:
     room = Room()
     room.guidance().run(["front", "side"], "left", count_down_s=5, attempts=1)
     steps = [*room.steps, measuring(0.1), measuring(0.2)]
-    spoken = [said(before, step) for before, step in zip([None, *steps], steps, strict=False)]
-    assert [words for words in spoken if words] == [
+    heard = [spoken(before, step) for before, step in zip([None, *steps], steps, strict=False)]
+    assert [words for words in heard if words] == [
         *("Face the camera, arms a little out", "3", "2", "1", "Hold still", "Good."),
         *("Now turn left, arms as before", "3", "2", "1", "Hold still", "Good."),
         "Good. Measuring, you may relax",

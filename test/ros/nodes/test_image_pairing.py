@@ -28,6 +28,7 @@ from cardbox_tracker.estimation.estimate import Estimate  # noqa: E402
 from cardbox_tracker.estimation.initialization.config import (  # noqa: E402
     InitializationConfig,
 )
+from cardbox_tracker.estimation.observation import Observation  # noqa: E402
 from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages import conversions  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
@@ -202,10 +203,10 @@ def test_the_tracker_gets_silhouette_and_image_of_one_stamp(
 ) -> None:
     seen: list[Any] = []
 
-    def track(
-        _: Tracker, silhouette: np.ndarray, image: np.ndarray | None = None, _stamp_ns: int = 0
-    ) -> Estimate:
-        seen.append((silhouette.copy(), None if image is None else image.copy()))
+    def track(_: Tracker, observations: list[Observation]) -> Estimate:
+        (one,) = observations
+        assert one.silhouette is not None
+        seen.append((one.silhouette.copy(), None if one.image is None else one.image.copy()))
         return Estimate("no_person")
 
     probe, executor = graph(inside, use_image)

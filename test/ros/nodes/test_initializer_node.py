@@ -12,14 +12,14 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from std_msgs.msg import Header
 
-from cardbox_tracker.estimation.initialization.guidance import BAD, GOOD, Step
+from cardbox_tracker.estimation.initialization.guidance import BAD, GOOD, Prompt
 from cardbox_tracker.ros.messages.conversions import image_message
 from cardbox_tracker.ros.nodes.initializer_node import GuideOutputs
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(80, 60, 80.0, 80.0, 39.5, 29.5)
-ASKED = Step("front", "Face the camera", 2, "face the camera, arms hanging")
+ASKED = Prompt("front", "Face the camera", 2, "face the camera, arms hanging")
 SILHOUETTE = image_message(Header(), np.zeros((60, 80), np.uint8), "mono8")
 
 
@@ -45,7 +45,11 @@ def outputs(node: Any) -> GuideOutputs:
 def test_details_go_to_the_status_and_few_words_to_the_loudspeaker() -> None:
     node = Node()
     guide = outputs(node)
-    for step in (ASKED, ASKED._replace(left_s=1), Step("front", "Good.", None, "captured 5", GOOD)):
+    for step in (
+        ASKED,
+        ASKED._replace(left_s=1),
+        Prompt("front", "Good.", None, "captured 5", GOOD),
+    ):
         guide.show(step)
     guide.end("measured; iou 0.9", "Thank you. Done.")
     assert node.texts("~/say") == ["Face the camera", "1", "Good.", "Thank you. Done."]
@@ -65,7 +69,7 @@ def test_the_bell_rings_where_a_posture_was_captured_or_not(
     guide = outputs(Node())
     for mood in (GOOD, BAD):
         guide.show(ASKED, bell)
-        guide.show(Step("front", mood, mood=mood), bell)
+        guide.show(Prompt("front", mood, mood=mood), bell)
     assert capfd.readouterr().err.count("\a\n") == rings
 
 

@@ -19,11 +19,9 @@ WAIT_S = 30.0
 
 def wait_for(condition: Callable[[], Any]) -> Any:
     end = time.monotonic() + WAIT_S
-    while time.monotonic() < end:
-        if value := condition():
-            return value
-        time.sleep(0.02)
-    raise AssertionError("not in time")
+    while not (value := condition()):
+        assert time.monotonic() < end, "not in time"
+    return value
 
 
 def test_two_publishers_are_named_until_one_has_gone(make_node: Callable[..., Any]) -> None:

@@ -1,0 +1,205 @@
+"""Masks of the image regions in which a person is expected, from the last posture.
+
+The masks are drawn on a grid of square cells, about 80 in a row of the image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.vision.camera import Camera
+
+Mask = NDArray[np.uint8]
+Point = tuple[float, float, float]
+"""Column and row in cells, and cells per metre at the point's depth."""
+
+_CELLS_IN_A_ROW = 80
+# Clothes are added to the widths of the body model.
+_CLOTHES_M = 0.02
+# All foreground within this distance of the last posture belongs to the person.
+_BAND_M = 0.1
+# Distance from the fist to the fingertips, plus the error of keypoints.
+_BEYOND_HAND_M = 0.25
+# Length of the fingers in forearm lengths.
+_FINGERS = 0.15
+_NEAREST_M = 0.2
+# Limit of the dilation in cells.
+_WIDEST = 40
+# Indices of the points of a posture; an arm has three points.
+_HIP, _NECK, _HEAD, _LEFT, _RIGHT = 0, 1, 2, 3, 6
+# Gap and width of the background ring around head and shoulders.
+_GAP_M, _RING_M = 0.05, 0.2
+
+
+@dataclass(frozen=True)
+class PersonMasks:
+    """Regions of the expected person on the grid, each (h, w), 0 or 1.
+
+    Attributes:
+        core: the body in the last posture.
+        band: all cells within 10 cm of the body.
+        near: cells that the person can occupy in the next frame.
+        reach: cells that the arms can reach.
+        hip: column and row of mid-hip, cells.
+    """
+
+    core: Mask
+    band: Mask
+    near: Mask
+    reach: Mask
+    hip: tuple[float, float]
+
+
+class PersonDrawer:
+    """Draws the masks of one body for one camera.
+
+    Attributes:
+        cell_px: side of a cell, px.
+        shape: rows and columns of the grid.
+        front: state (14,) of the front reference at the measured place.
+        cells_per_m: scale at the person's distance in the body model.
+    """
+
+    def __init__(self, body: BodyModel, camera: Camera) -> None:
+        """Set up the grid; ``camera`` includes the pitch."""
+        self._body = body
+        self.cell_px = cell = max(1, round(camera.width / _CELLS_IN_A_ROW))
+        self.shape = -(-camera.height // cell), -(-camera.width // cell)
+        self._camera = replace(
+            camera,
+            width=self.shape[1],
+            height=self.shape[0],
+            fx=camera.fx / cell,
+            fy=camera.fy / cell,
+            cx=(camera.cx + 0.5) / cell - 0.5,
+            cy=(camera.cy + 0.5) / cell - 0.5,
+        )
+        self.cells_per_m = self._camera.fx / body.placement.distance_m
+        self.front: FloatArray = np.zeros(N_JOINTS + 2)
+        self.front[:N_JOINTS] = reference_posture("front")
+        self.front[0] = body.placement.lateral_m
+
+    def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
+        """Return the masks of a person for their last posture.
+
+        Args:
+            posture: (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and metres.
+            near_m: largest movement of a body part until the next frame.
+        """
+        points = self._points(posture)
+        core: Mask = np.zeros(self.shape, np.uint8)
+        self._draw_head(core, points, _CLOTHES_M)
+        self._draw_torso(core, points, _CLOTHES_M)
+        size = self._body.size
+        thick_m = size("upper_arm_width") + 2 * _CLOTHES_M
+        for first in (_LEFT, _RIGHT):
+            for start in (first, first + 1):
+                nearest = max(points[start][2], points[start + 1][2])
+                _line(core, points[start], points[start + 1], nearest * thick_m)
+        scale = points[_HIP][2]
+        band, near = (_dilated(core, scale * grow_m) for grow_m in (_BAND_M, near_m))
+        reach = near.copy()
+        length_m = size("upper_arm_length") + size("forearm_length") + _BEYOND_HAND_M
+        for first in (_LEFT, _RIGHT):
+            depth_m = self._camera.fx / points[first][2]
+            radius_m = min(length_m, 0.9 * depth_m)
+            # The silhouette of a sphere is wider than a disc of its radius.
+            radius_m *= depth_m / float(np.sqrt(depth_m**2 - radius_m**2))
+            _disc(reach, points[first], radius_m * points[first][2])
+        return PersonMasks(core, band, near, reach, points[_HIP][:2])
+
+    def head_and_shoulders(self) -> tuple[list[NDArray[np.float32]], tuple[int, int]]:
+        """Return a head kernel, a trunk kernel, and column and row of the hips in them.
+
+        A kernel's product with a silhouette on the grid is the foreground share of head or trunk,
+        minus the foreground share of the ring around head and shoulders.
+        """
+        points = self._points(self.front)
+        head, trunk, gap, ring = (np.zeros(self.shape, np.uint8) for _ in range(4))
+        self._draw_head(head, points, 0.0)
+        self._draw_torso(trunk, points, 0.0)
+        for mask, grow_m in ((gap, _GAP_M), (ring, _RING_M)):
+            self._draw_head(mask, points, grow_m)
+            self._draw_torso(mask, points, grow_m)
+        hip, shoulder = points[_HIP], points[_LEFT]
+        rows = np.arange(self.shape[0])
+        trunk[rows > hip[1]] = 0
+        around = (ring > 0) & (gap == 0) & (rows < shoulder[1])[:, None]
+        kernels = []
+        for inside in (head > 0, trunk > 0):
+            kernel = np.zeros(self.shape, np.float32)
+            kernel[around] = -1.0 / max(int(np.count_nonzero(around)), 1)
+            kernel[inside] = 1.0 / max(int(np.count_nonzero(inside)), 1)
+            kernels.append(kernel)
+        column, row = (
+            int(np.clip(round(place), 0, length - 1))
+            for place, length in zip(hip[:2], self.shape[::-1], strict=True)
+        )
+        return kernels, (column, row)
+
+    def _points(self, posture: FloatArray) -> list[Point]:
+        """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
+        place, camera = self._body.placement, self._camera
+        x_m, z_m = posture[N_JOINTS:].tolist() or (0.0, 0.0)
+        moved = self._body.with_values(
+            distance_m=max(place.distance_m - x_m, _NEAREST_M),
+            hip_height_m=place.hip_height_m + z_m,
+        )
+        frames = forward_kinematics(moved, posture[:N_JOINTS])
+        points_m = [frames.hip, frames.neck, frames.head]
+        for arm in (frames.left, frames.right):
+            tips = arm.hand + _FINGERS * (arm.hand - arm.elbow)
+            points_m += [arm.shoulder, arm.elbow, tips]
+        optical_m = camera.reference_to_optical(np.array(points_m))
+        scales = camera.fx / np.maximum(optical_m[:, 2], _NEAREST_M)
+        columns = scales * optical_m[:, 0] + camera.cx
+        rows = camera.fy / camera.fx * scales * optical_m[:, 1] + camera.cy
+        table: list[list[float]] = np.stack([columns, rows, scales], axis=1).tolist()
+        return [(column, row, scale) for column, row, scale in table]
+
+    def _draw_head(self, mask: Mask, points: list[Point], grow_m: float) -> None:
+        """Draw head and neck, widened by ``grow_m``."""
+        size, neck, head = self._body.size, points[_NECK], points[_HEAD]
+        _line(mask, neck, head, 2 * head[2] * (0.3 * size("head_width") + grow_m))
+        _disc(mask, head, head[2] * (0.5 * size("head_height") + grow_m))
+
+    def _draw_torso(self, mask: Mask, points: list[Point], grow_m: float) -> None:
+        """Draw the torso and the region below the hips, widened by ``grow_m``."""
+        size, hip, neck = self._body.size, points[_HIP], points[_NECK]
+        half_m = 0.5 * max(size("torso_top_width"), size("torso_bottom_width"))
+        wide = 2 * hip[2] * (half_m + grow_m)
+        floor = (hip[0], self.shape[0] + wide, hip[2])
+        middle = (0.5 * (hip[0] + neck[0]), 0.5 * (hip[1] + neck[1]), hip[2])
+        _line(mask, middle, hip, wide)
+        _line(mask, hip, floor, wide)
+        arm = 2 * hip[2] * (0.5 * size("upper_arm_width") + grow_m)
+        _line(mask, points[_LEFT], points[_RIGHT], arm)
+        for shoulder in (points[_LEFT], points[_RIGHT]):
+            _line(mask, shoulder, hip, 2 * hip[2] * (0.5 * half_m + grow_m))
+
+
+def _dilated(mask: Mask, cells: float) -> Mask:
+    wide = 2 * max(0, min(round(cells), _WIDEST)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+    return np.asarray(cv2.dilate(mask, kernel), np.uint8)
+
+
+def _whole(place: Point) -> tuple[int, int]:
+    column, row = (round(min(max(value, -1000.0), 1000.0)) for value in place[:2])
+    return column, row
+
+
+def _line(mask: Mask, start: Point, end: Point, wide: float) -> None:
+    cv2.line(mask, _whole(start), _whole(end), 1, min(max(1, round(wide)), 255))
+
+
+def _disc(mask: Mask, middle: Point, radius: float) -> None:
+    cv2.circle(mask, _whole(middle), min(max(0, round(radius)), 1000), 1, cv2.FILLED)
