@@ -1,16 +1,16 @@
-"""Wraps numba's ``njit`` so that a missing or damaged cache never ends a program.
+"""numba's ``njit`` with a cache on disk that may be missing or damaged, but never ends a program.
 
 numba keeps compiled code beside the sources, or below the home folder; ``NUMBA_CACHE_DIR`` names
-another place. If none of them is writable, numba fails when a module is imported; if a file of the
-cache is truncated, it fails when the function is called. Here a folder below the folder for
-temporary files is tried next, and then no cache is used; damaged code is compiled again.
+another place. Where it can write to none of them it fails when a module is imported, and where a
+file of the cache was cut off, whenever the function is called. Here a folder of our own below the
+folder for temporary files is tried next, then there is no cache; what is damaged is compiled again.
 
 Compiled code contains its callees and the constants of other files. numba alone only checks the
 file of the function itself; here an entry is valid for one state of all kernel sources of a
 package, see :func:`digest_of_kernels`. A newer entry overwrites the older one.
 
-A user who can write to the cache can run any code. The folder therefore belongs to the user, and
-only they may write to it; a folder of that name that another user made is not used.
+Anybody who can write to the folder of the cache can have any code run. So ours belongs to the user
+and nobody else may write to it; a folder that another user made under its name is not used.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ _LINE_NUMBER = re.compile(r"-\d+(?=\.py)")
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
-    """Return a decorator that compiles a function like ``numba.njit`` with ``options``.
+    """Return a decorator that compiles a function, as numba's of that name with ``options``.
 
     Args:
-        cache: keep the compiled code on disk if possible.
-        options: options of ``numba.njit``.
+        cache: keep the compiled code on disk where that is possible.
+        options: those of ``numba.njit``.
     """
 
     def decorate(function: F) -> F:
@@ -63,15 +63,15 @@ kernel = njit(cache=True, nogil=True, error_model="numpy")
 """Compiles a function that runs without the interpreter's lock."""
 
 inlined_kernel = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-"""Compiles a function that is inlined into the kernels that call it."""
+"""The same for a function that becomes a part of the kernels that call it."""
 
 
 @cached
 def digest_of_kernels(package: str) -> str:
     """Return a digest of all sources that compiled code of a package may contain.
 
-    These are the files that import this module and the files that they import, since constants
-    become part of the code.
+    These are the files that import this module, and the files that they import, for constants
+    become a part of the code.
 
     Args:
         package: folder of a top-level package.
@@ -93,7 +93,7 @@ def digest_of_kernels(package: str) -> str:
 
 
 def _package_of(file: str) -> str | None:
-    """Return the top-level package's folder of a source file; None outside a package."""
+    """Folder of the top-level package of a source file; None if it is in no package."""
     folder, found = os.path.dirname(os.path.abspath(file)), None
     while os.path.isfile(os.path.join(folder, "__init__.py")):
         folder, found = os.path.dirname(folder), folder
@@ -101,7 +101,7 @@ def _package_of(file: str) -> str | None:
 
 
 def own_folder() -> Path | None:
-    """Return a folder for the cache that only this user can write to; None if it cannot be made."""
+    """Return a folder for the cache that only this user can write to; None if there can be none."""
     folder = Path(tempfile.gettempdir()) / f"cardbox_tracker-{os.geteuid()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -113,7 +113,7 @@ def own_folder() -> Path | None:
 
 
 def _cache_of(function: Callable[..., Any]) -> _Cache | None:
-    """Return the cache of a function at numba's place, or else in our own folder."""
+    """The cache of a function, where numba would have it or else in our own folder."""
     try:
         return _Cache(function)
     except (RuntimeError, OSError):
@@ -135,25 +135,25 @@ def _cache_of(function: Callable[..., Any]) -> _Cache | None:
 
 
 class _Cache(FunctionCache):
-    """numba's cache of one function; after an error the entry counts as missing."""
+    """numba's cache of one function, whose errors mean that there is nothing in it."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         """Find the folder of the cache.
 
         Raises:
-            RuntimeError: no folder is writable.
+            RuntimeError: there is no folder that can be written to.
         """
         super().__init__(function)
         locator = self._impl.locator
         packages = {_PACKAGE, _package_of(function.__code__.co_filename) or _PACKAGE}
         digests = tuple(digest_of_kernels(package) for package in sorted(packages))
-        # Names have no line numbers, so that a moved function leaves no stale files.
+        # Names without line numbers, so that a function that moves leaves no files behind.
         name = _LINE_NUMBER.sub("", self._impl.filename_base)
         stamp = locator.get_source_stamp(), digests
         self._cache_file = IndexDataCacheFile(locator.get_cache_path(), name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled code; None if it is missing or damaged."""
+        """Return the compiled code; None if it is not there or damaged."""
         try:
             return super().load_overload(sig, target_context)
         except Exception as error:
@@ -162,11 +162,11 @@ class _Cache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Save the compiled code if possible."""
+        """Keep the compiled code, if that is possible."""
         try:
             super().save_overload(sig, data)
         except Exception as error:
-            # A truncated index cannot be extended.
+            # An index that was cut off cannot be added to.
             if self._empties():
                 with contextlib.suppress(Exception):
                     super().save_overload(sig, data)
