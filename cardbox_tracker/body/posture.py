@@ -1,4 +1,7 @@
-"""The 12 posture angles d1..d12, the place beside them, limits and reference postures.
+"""The 14 values of a state: names, order, limits, mirror image, and the reference postures.
+
+A state (14,) is a posture d1..d12 followed by ``torso_x`` and ``torso_z``. Everything else takes
+the places of these values from here.
 
 The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
 rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
@@ -30,9 +33,26 @@ JOINT_NAMES: tuple[str, ...] = (
 )
 N_JOINTS = len(JOINT_NAMES)
 
+PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
+"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
+
+N_STATE = N_JOINTS + len(PLACE_NAMES)
+ARM_ANGLES = 4
+"""Abduction and flexion of the shoulder, then of the elbow."""
+
+TORSO_Y, ROLL, PITCH, YAW = range(4)
+FIRST_ANGLES = 4, 8
+"""Indices at which the angles of the left and of the right arm begin."""
+TORSO_X, TORSO_Z = N_JOINTS, N_JOINTS + 1
+
 TORSO = slice(0, 4)
-LEFT_ARM = slice(4, 8)
-RIGHT_ARM = slice(8, 12)
+LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
+POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
+
+MIRRORED = np.array([*range(4), *range(8, 12), *range(4, 8), TORSO_X, TORSO_Z])
+"""Index (14,) of each value in the state of the mirror image, where the arms change places."""
+MIRROR_SIGNS = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * (N_STATE - 4)])
+"""Factor (14,) of each value in the mirror image: aside, roll and yaw turn over."""
 
 # Source of the anatomical ranges: American Academy of Orthopaedic Surgeons, "Joint Motion: Method
 # of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"):
@@ -63,11 +83,8 @@ JOINT_LIMITS.setflags(write=False)
 _TURN_DEG = 100.0
 TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
 """Shape (12, 2): the limits of somebody who also turns with the feet, to walk or to look aside."""
-TURNING_LIMITS[3] = np.radians([-_TURN_DEG, _TURN_DEG])
+TURNING_LIMITS[YAW] = np.radians([-_TURN_DEG, _TURN_DEG])
 TURNING_LIMITS.setflags(write=False)
-
-PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
-"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
 
 TORSO_X_LIMIT_M = 0.9
 """A step or two to the camera or away from it; beyond that, measure with another distance."""
@@ -79,6 +96,9 @@ PLACE_LIMITS: FloatArray = np.array(
 )
 """Shape (2, 2): lowest and highest value of each of ``PLACE_NAMES``, metres."""
 PLACE_LIMITS.setflags(write=False)
+
+STATE_LIMITS: FloatArray = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
+"""Shape (14, 2): lowest and highest value of each value of a state."""
 
 REFERENCE_NAMES: tuple[str, ...] = ("front", "side", "arms")
 SIDE_TURNS: tuple[str, ...] = ("left", "right")
@@ -110,7 +130,7 @@ def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
     abduction = _STRETCHED_ABDUCTION_RAD if name == "arms" else _HANGING_ABDUCTION_RAD
     posture[LEFT_ARM.start] = posture[RIGHT_ARM.start] = abduction
     if name == "side":
-        posture[3] = np.pi / 2 if side_turn == "left" else -np.pi / 2
+        posture[YAW] = np.pi / 2 if side_turn == "left" else -np.pi / 2
     return posture
 
 

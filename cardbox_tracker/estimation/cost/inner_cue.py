@@ -36,7 +36,7 @@ from cardbox_tracker.body.appearance import (
 )
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
+from cardbox_tracker.estimation.cost.inner_cue_arms import N_TORSO, ArmView, torsos_of
 from cardbox_tracker.estimation.cost.inner_cue_kernels import ratio_maps
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
@@ -235,7 +235,7 @@ class InnerCueObservation:
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
         """Rate arms by what is seen at their place; the other arm is where it was last."""
-        torsos = np.zeros((1, 6))
+        torsos = np.zeros((1, N_TORSO))
         torsos[0, : len(torso)] = torso
 
         def costs(side: str, arms: FloatArray) -> FloatArray:

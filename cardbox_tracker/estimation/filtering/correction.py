@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.body.posture import STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import (
@@ -159,8 +159,7 @@ class Correction:
         answers_m, self._memory = self._network(self.features, self._memory)
         corrected = state.copy()
         corrected[_TURNS] = self._turns(state[_TURNS], frame.interval_s)
-        figure = cost.parts, cost.girdle, cost.place, cost.view
         wanted = self._keypoints(moved(self.found_m, answers_m), frame.interval_s)
-        pose_at_keypoints(corrected, *figure, wanted, STATE_LIMITS)
-        fit_keypoints(corrected, *figure, wanted, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
+        pose_at_keypoints(corrected, cost.body, wanted, STATE_LIMITS)
+        fit_keypoints(corrected, cost.body, wanted, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
         return corrected

@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cardbox_tracker.body.posture import STATE_LIMITS, TORSO_X, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
@@ -22,9 +23,8 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import iou_of
-from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
-from cardbox_tracker.estimation.filtering import whole_body_moves as moves
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS, propose_arms
+from cardbox_tracker.estimation.filtering import state_choice
+from cardbox_tracker.estimation.filtering.arms import propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
 from cardbox_tracker.estimation.filtering.refinement import Refinement
@@ -164,8 +164,7 @@ class MultiViewFilter(WholeBodyFilter):
                     arm,
                     self._config,
                     views.costs[number],
-                    normals[begin:end],
-                    uniforms[begin:end],
+                    (normals[begin:end], uniforms[begin:end]),
                     count,
                     times,
                 )
@@ -183,7 +182,7 @@ class MultiViewFilter(WholeBodyFilter):
     def _together(self, states: FloatArray, ratings: FloatArray, draws: Draws) -> None:
         # Several outlines leave little that is flat: a step of Gauss and Newton is worth rounds.
         cost = self._cost
-        kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
+        kept = state_choice.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
         fitted = np.array(
             [self.refine.outline.fitted(self._frame, state, _FIT_STEPS) for state in states[kept]]
         )

@@ -12,22 +12,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.posture import (
+    N_JOINTS,
+    N_STATE,
+    STATE_LIMITS,
+    TORSO_X,
+    TORSO_Z,
+    reference_posture,
+)
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.kernel_arguments import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    N_STATE,
-    TORSO,
-    TORSO_X,
-    TORSO_Z,
+from cardbox_tracker.estimation.filtering import (
+    arm_proposals,
+    joint_moves,
+    loss,
+    state_choice,
+    torso_proposals,
 )
-from cardbox_tracker.estimation.filtering import loss
-from cardbox_tracker.estimation.filtering import whole_body_moves as moves
-from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS, propose_arms
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
@@ -75,7 +82,7 @@ class WholeBodyFilter:
         self._cost: WholeBodyCost | MultiViewCost = self._one
         self.refine = Refinement(self._one, silhouette.camera, self._config)
         # From the hips to the torso's top: about where the shoulders are.
-        self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
+        self._lever_m = float(self._one.parts[TORSO, BOTTOM] + self._one.parts[TORSO, HEIGHT])
 
     def best(self) -> tuple[WholeBodyCost, FloatArray]:
         """Return what has rated the last frame, of the first camera, and the best state (14,)."""
@@ -160,12 +167,12 @@ class WholeBodyFilter:
         pool = self._torsos(before, draws)
         ratings = cost.bodies(pool)[0]
         best = pool[np.argmin(ratings)]
-        by_rating = moves.best_states(pool, ratings, min(len(pool), config.survivors))
+        by_rating = state_choice.best_states(pool, ratings, min(len(pool), config.survivors))
         cost.fix_torso(best)
         (left, left_ratings), (right, right_ratings) = (
             self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
-        pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
+        pairs = joint_moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(states, ratings, draws)
@@ -177,30 +184,17 @@ class WholeBodyFilter:
         fresh = self._reference.copy()
         fresh[TORSO_X], sight, fresh_x_m = self._upright(before, is_settled)
         upright = config.fresh_torsos if is_settled else config.torso_explorers
-        torsos = moves.propose_torsos(
+        torsos = torso_proposals.propose_torsos(
             self._survivors,
-            self._torso_sigma,
-            self._lever_m,
-            config.torso_explorers,
-            upright,
-            fresh,
-            fresh_x_m,
-            sight,
+            (self._torso_sigma, STATE_LIMITS, self._lever_m),
             self._step_m,
-            self._body.placement.distance_m,
-            STATE_LIMITS,
-            *draws.for_torsos(config.torsos),
+            config.torso_explorers,
+            (upright, fresh, fresh_x_m, sight, self._body.placement.distance_m),
+            draws.for_torsos(config.torsos),
         )
         ratings = cost.torsos(torsos, before)
-        pool = moves.pool_of(
-            self._survivors,
-            torsos,
-            ratings,
-            config.best_torsos,
-            before,
-            cost.place,
-            cost.view,
-            ARM_LIMITS,
+        pool = torso_proposals.pool_of(
+            self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
         return np.concatenate([pool, torsos[len(torsos) - upright :]])
@@ -213,17 +207,17 @@ class WholeBodyFilter:
         self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
     ) -> FloatArray:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state."""
-        return propose_arms(pool, arm, self._config, self._one, normals, uniforms)
+        return propose_arms(pool, arm, self._config, self._one, (normals, uniforms))
 
     def _arm(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
         config, cost = self._config, self._cost
         arms = self._propose_arms(pool, arm, *draws.for_arms(self.candidates * config.arms))
         ratings = cost.arms(arms, arm)
-        self._arm_spread[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
+        self._arm_spread[2 * arm : 2 * arm + 2] = state_choice.spread_of_arm(
             arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
         )
-        near = moves.around_best(
+        near = arm_proposals.around_best(
             arms,
             ratings,
             _BEST_ARMS,
@@ -246,15 +240,15 @@ class WholeBodyFilter:
             if number == 0:
                 sources = self._apart(states, ratings)
             else:
-                sources = moves.best_states(states, ratings, min(config.survivors, len(states)))
-            moved = moves.move_all(
+                sources = state_choice.best_states(
+                    states, ratings, min(config.survivors, len(states))
+                )
+            moved = joint_moves.move_all(
                 sources,
-                sigma,
-                self._lever_m,
+                (sigma, STATE_LIMITS, self._lever_m),
                 int(config.differing * config.together),
                 config.difference_scale,
-                STATE_LIMITS,
-                *draws.for_states(config.together),
+                draws.for_states(config.together),
             )
             states = np.concatenate([states, moved])
             ratings = np.concatenate([ratings, cost.bodies(moved)[0]])
@@ -265,13 +259,13 @@ class WholeBodyFilter:
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
         c, cost = self._config, self._cost
         kept = (c.survivors, c.alike, c.apart_m)
-        return states[moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
+        return states[state_choice.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
 
     def _fit(self) -> Fit:
         """Return the smoothed mean of the best states, and how far to believe it."""
         config, cost, frame = self._config, self._cost, self._frame
         rated = self.states, self.ratings
-        mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
+        mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
