@@ -45,9 +45,7 @@ ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAG
 
 # One concept a module. Beyond it: a list of a report's paragraphs.
 MAX_LINES = 310
-LONGER = (
-    "evaluation/paper/report.py",
-)
+LONGER = ("evaluation/paper/report.py",)
 MAX_NODE_LINES = 200
 
 
@@ -243,6 +241,13 @@ def test_modules_are_short_and_say_what_they_are(path: Path) -> None:
     assert ast.get_docstring(ast.parse(text))
     if str(path.relative_to(SOURCES)) not in LONGER:
         assert len(text.splitlines()) <= MAX_LINES
+
+
+def test_a_module_imports_no_private_name_of_another_one() -> None:
+    for path in SOURCES.rglob("*.py"):
+        for name in imported_by(path):
+            last = name.split(".")[-1]
+            assert not last.startswith("_") or last.startswith("__"), f"{path} imports {name}"
 
 
 def outside(folder: Path) -> set[str]:

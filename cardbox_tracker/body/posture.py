@@ -37,8 +37,9 @@ PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
 """How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
 
 N_STATE = N_JOINTS + len(PLACE_NAMES)
+SHOULDER_ABDUCTION, SHOULDER_FLEXION, ELBOW_ABDUCTION, ELBOW_FLEXION = range(4)
 ARM_ANGLES = 4
-"""Abduction and flexion of the shoulder, then of the elbow."""
+"""Values of an arm, in that order."""
 
 TORSO_Y, ROLL, PITCH, YAW = range(4)
 FIRST_ANGLES = 4, 8
@@ -46,6 +47,7 @@ FIRST_ANGLES = 4, 8
 TORSO_X, TORSO_Z = N_JOINTS, N_JOINTS + 1
 
 TORSO = slice(0, 4)
+TURNS = slice(ROLL, YAW + 1)
 LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
 POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 

@@ -99,7 +99,7 @@ class DepthTerm:
         wide = 0.5 * (parts[:, BOTTOM_WIDTH] + parts[:, TOP_WIDTH])
         areas_px = config.weight * per_m**2 * parts[:, HEIGHT] * wide
         self.areas_px = np.ascontiguousarray(areas_px)
-        # Of two arms.
+        # A body has two arms.
         self.body_px = float(areas_px[:3].sum() + 2.0 * areas_px[3:].sum())
         self.costs(np.zeros((1, N_STATE)), np.zeros((camera.height, camera.width), np.float32))
 
@@ -107,7 +107,7 @@ class DepthTerm:
         """Return the term's observation, which is zero without a depth image."""
         if frame.depth_m is None:
             return _SILENCE
-        # At the outline a pixel may show the person or what is behind.
+        # At the outline a pixel may show the person or the background.
         inside = cv2.erode(frame.silhouette, np.ones((3, 3), np.uint8))
         known = (inside > 0) & np.isfinite(frame.depth_m)
         return DepthObservation(self, np.where(known, frame.depth_m, 0.0).astype(np.float32))

@@ -32,8 +32,9 @@ _CLAIM = 0.5
 # Beyond this distance from its axis the other forearm, or its hand, covers nothing.
 _CLAIM_REACH_M = 0.09
 # A hand further behind the torso's middle than this, and within its width, is covered by it.
-_BEHIND_M = 0.03
-_NEAREST_M = 0.1
+_BEHIND_M, _NEAREST_M = 0.03, 0.1
+# Values of a torso (6,) behind d1..d4.
+_X, _Z = 4, 5
 
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
 
@@ -63,7 +64,7 @@ class Lengths(NamedTuple):
 
 
 class Person(NamedTuple):
-    """A person before a camera: lengths of the body, place of the hips, and the camera."""
+    """A person before a camera."""
 
     lengths: Lengths
     place: Place
@@ -71,13 +72,7 @@ class Person(NamedTuple):
 
 
 class Maps(NamedTuple):
-    """Log-likelihood ratios of hand and forearm in a part of the image.
-
-    Attributes:
-        ratios: (2, h, w), nats.
-        u0: first column of the maps in the image.
-        v0: first row.
-    """
+    """Log-likelihood ratios (2, h, w), nats, of hand and forearm, from column u0 and row v0 on."""
 
     ratios: Any
     u0: int
@@ -116,7 +111,7 @@ def _person_of(fields: PersonTuple) -> Person:
 @inlined_kernel
 def _torso_pose(torso: Any, place: Place, camera: Intrinsics, rotation: Any, hip: Any) -> None:
     """Write rotation (3, 3) and mid-hip (3,) of a torso (6,) in the optical frame."""
-    moved = Place(place.distance_m - torso[4], place.hip_height_m + torso[5])
+    moved = Place(place.distance_m - torso[_X], place.hip_height_m + torso[_Z])
     torso_pose(torso, moved, camera, rotation, hip)
 
 
@@ -233,7 +228,7 @@ def project_arms(
 
 @kernel
 def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
-    """Mean of ``ratios`` (h, w) over a grid of so many points, along and across, of a patch.
+    """Mean of ``ratios`` (h, w) over a grid of ``points``, along and across, of a patch.
 
     ``half`` is half the patch along the limb, ``aside`` half of it across, px; outside is 0.
     """

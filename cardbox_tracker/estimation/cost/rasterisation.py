@@ -38,7 +38,7 @@ _FIRST_ROW, _END_ROW, _CROSSING, _STEP = 0, 1, 2, 3
 
 
 class Workspace(NamedTuple):
-    """Scratch of one call for K patches and so many rows.
+    """Scratch of one call for K patches.
 
     Functions that are inlined take all of it; the others take the arrays they need, for handing
     over all of them makes a call dear.
@@ -76,7 +76,7 @@ class Workspace(NamedTuple):
 
 @inlined_kernel
 def new_workspace(patches: int, rows: int) -> Workspace:
-    """Return scratch for so many patches and rows; its shape is zero."""
+    """Return the scratch for a number of patches and rows; its shape is zero."""
     return Workspace(
         shape=np.zeros((3, 4 * patches)),
         corners=np.zeros((3, 4 * patches)),

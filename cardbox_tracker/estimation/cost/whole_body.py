@@ -70,7 +70,7 @@ class WholeBodyCost:
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
             (4,).
-        terms: what further terms say of the present frame.
+        terms: observations of further terms in the present frame.
     """
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
@@ -137,7 +137,7 @@ class WholeBodyCost:
         return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
 
     def see_nothing(self) -> None:
-        """Let this frame's silhouette and terms say nothing: ratings are the priors alone."""
+        """Ignore this frame's silhouette and terms: ratings are the priors alone."""
         self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
         self._seen[:] = 0
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()

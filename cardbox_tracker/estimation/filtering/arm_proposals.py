@@ -35,7 +35,7 @@ from cardbox_tracker.estimation.filtering.joint_moves import NumbersTuple
 # Shoulder and hand of an arm that reaches for a pixel are at least so far apart beyond the
 # difference of its bones, and the arm is never quite straight; m.
 _FOLDED_M, _STRETCHED_M = 0.05, 0.001
-# The nearer one of the two points at a distance is taken so often: people gesture to the front.
+# Probability of the nearer one of the two points at a distance: people gesture to the front.
 _NEARER = 0.8
 # An elbow hangs down and outwards: the direction (forwards, outwards, up) it has without a turn.
 _ELBOW_HANGS = (-0.2, 0.4, -1.0)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.posture import N_STATE, STATE_LIMITS
+from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
@@ -31,7 +31,7 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.vision.camera import Camera
 
 # Deviations of a state around the filter's: angles in rad, places in m.
-_STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * 8, 0.1, 0.1])
+_STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])
 # Share of the last correction in the next one, against jitter.
 _KEPT = 0.6
 # Around the silhouette, more than the distance at which distances are cut off.
@@ -93,7 +93,7 @@ class OutlineFit:
         Args:
             cost: of the first camera.
             camera: the first one.
-            steps: of Gauss and Newton.
+            steps: number of Gauss-Newton steps.
             others: costs of the further cameras, and their views of the body.
         """
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))

@@ -19,7 +19,7 @@ from cardbox_tracker.body.posture import (
     YAW,
 )
 from cardbox_tracker.compiling import kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import Floats, body_of
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.kinematics import (
     angles_in,
     angles_of_arm,
@@ -48,14 +48,14 @@ class Upright(NamedTuple):
     """Torsos that stand upright where the silhouette is.
 
     Attributes:
-        count: number of them.
+        number: of them.
         state: with arms that hang, (14,).
         x_deviation_m: of their distance.
         direction: of the silhouette, aside over ahead.
         distance_m: of the person in the body model.
     """
 
-    count: int
+    number: int
     state: Floats
     x_deviation_m: float
     direction: float

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS, TURNS
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import (
@@ -96,7 +96,7 @@ def track_runs(folder: Path, setting: Setting, first: int, end: int) -> Arrays:
     session = load_session(folder / setting.session)
     silhouettes = session.silhouettes[:: setting.every]
     shape = (end - first, len(silhouettes))
-    postures = np.full((*shape, 12), np.nan)
+    postures = np.full((*shape, N_JOINTS), np.nan)
     keypoints_m = np.full((*shape, 6, 3), np.nan)
     costs_px = np.full(shape, np.nan)
     cost = make_silhouette_term(setting.model, session.body, session.camera)
@@ -222,7 +222,7 @@ def _angle_errors(motion: MotionRuns) -> dict[str, float]:
     if not np.any(np.isnan(motion.postures)):
         names, truth = JOINT_NAMES[1:], motion.postures[:, 1:]
     elif not np.any(np.isnan(motion.torso_rad)):
-        names, truth = JOINT_NAMES[1:4], motion.torso_rad
+        names, truth = JOINT_NAMES[TURNS], motion.torso_rad
     else:
         return {}
     estimates = motion.runs.postures[..., 1 : 1 + len(names)]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import TRACKING, Estimate
@@ -120,7 +121,7 @@ def _distances(
     distances, moved = [], []
     for stamp_ns, one, posture in zip(stamps_ns, estimates, truth, strict=True):
         command = measured.update(stamp_ns, one.state, body, one.posture, one.posture_stddev)
-        wanted = true.update(stamp_ns, TRACKING, body, posture, np.zeros(12))
+        wanted = true.update(stamp_ns, TRACKING, body, posture, np.zeros(N_JOINTS))
         hands = [follower.hand_m(each.positions) for each in (command, wanted)]
         distances.append(100 * float(np.linalg.norm(hands[0] - hands[1])))
         moved.append(command.is_moving)
