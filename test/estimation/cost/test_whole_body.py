@@ -23,7 +23,9 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     HEIGHT,
     TOP_WIDTH,
     TORSO,
+    WAIST,
 )
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms, directions_of_arm
 from cardbox_tracker.estimation.cost.pose_prior import ArmPrior
 from cardbox_tracker.estimation.cost.prior import RestPrior
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
@@ -104,12 +106,12 @@ def test_below_the_start_the_shoulder_stays() -> None:
 def test_angles_and_directions_are_each_others_inverse(seed: int) -> None:
     for angles in random_states(5, seed)[:, 4:8]:
         for side in (1.0, -1.0):
-            directions = kernels.directions_of_arm(angles, side)
+            directions = directions_of_arm(angles, side)
             assert np.linalg.norm(directions[:3]) == pytest.approx(1.0)
             assert np.linalg.norm(directions[3:]) == pytest.approx(1.0)
             wide = np.array([[-10.0, 10.0]] * 4)
-            back = kernels.angles_of_arms(directions[None], side, wide)[0]
-            again = kernels.directions_of_arm(back, side)
+            back = angles_of_arms(directions[None], side, wide)[0]
+            again = directions_of_arm(back, side)
             np.testing.assert_allclose(again, directions, atol=1e-6)
 
 
@@ -141,7 +143,7 @@ def test_a_trunk_looks_as_wide_from_the_side_as_it_is_deep() -> None:
     body = somebody(torso_depth=0.1, waist_depth=0.1).with_values(distance_m=8.0)
     of = cost(body=body)
     for yaw, width_m in ((0.0, body.size("waist_width")), (np.pi / 2, 0.1)):
-        corners = of.corners(state(d4=yaw))[kernels.WAIST]
+        corners = of.corners(state(d4=yaw))[WAIST]
         assert np.ptp(corners[:, 0]) == pytest.approx(width_m, abs=1e-3)
 
 
