@@ -53,7 +53,7 @@ class MultiViewCost:
         self.seeing: tuple[int, ...] = (0,)
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle
-        self.place, self.view = first.place, first.view
+        self.place, self.view, self.body = first.place, first.view, first.body
         self.anchor = first.anchor
 
     def see(self, silhouettes: Sequence[Silhouette], state: FloatArray) -> None:
