@@ -2,8 +2,9 @@
 
 A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
 the best torso, then all joints together (``docs/architecture.md``). Proposals are in
-:mod:`.whole_body_moves`, ratings in :mod:`cardbox_tracker.estimation.cost.multi_view`, what depends
-on the number of cameras in :mod:`.search_plan`.
+:mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
+:mod:`cardbox_tracker.estimation.cost.multi_view`, and :mod:`.search_plan` has all that depends on
+the number of cameras.
 """
 
 from __future__ import annotations
