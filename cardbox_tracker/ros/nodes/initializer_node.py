@@ -79,7 +79,11 @@ class InitializerNode(CardboxNode):
         self.offer("~/cancel", self._cancellation.cancel)
         # It answers when the measurement is done; a second call meanwhile is refused at once.
         self.create_service(
-            Trigger, "~/initialize", self._initialize, callback_group=ReentrantCallbackGroup()
+            Trigger,
+            "~/initialize",
+            self._initialize,
+            qos_profile=qos.SERVICE,
+            callback_group=ReentrantCallbackGroup(),
         )
         self.diagnostics.extra = self._values
         self.diagnostics.source = f"silhouettes on {self._topic}"

@@ -135,7 +135,7 @@ class CardboxNode(Node):
             response.success, response.message = self.outcome(name, action)
             return response
 
-        self.create_service(Trigger, name, answer, callback_group=group)
+        self.create_service(Trigger, name, answer, qos_profile=qos.SERVICE, callback_group=group)
 
     def outcome(self, name: str, action: Callable[[], str]) -> tuple[bool, str]:
         """Run ``action``; return whether it succeeded, and its text or that of its error."""

@@ -31,6 +31,8 @@ RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # A recording may wait for a slow subscriber; no image is lost while 100 are queued.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+# Calls wait while a node is busy; with ROS's default of ten, the oldest of more would be lost.
+SERVICE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # For a subscriber that records a replay and must not miss a message.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
