@@ -15,7 +15,7 @@ SPAN = "expected T0:T1, seconds from the start of the recording"
     [
         *((("--" + name, "9:3"), f"--{name}: {SPAN}") for name in ("front", "side", "arms")),
         (("--background", "5"), f"--background: {SPAN}"),
-        (("--depth", "/depth"), "--depth measures how far away the person is, which --distance"),
+        (("--depth", "/depth"), "--depth and --distance"),
         (("--distance", "far"), "invalid float value: 'far'"),
         (("--distance", "-2"), "distance_m is -2 m; expected 0.3 to 20 m"),
         (("--distance", "0"), "distance_m is 0 m; expected 0.3 to 20 m"),
