@@ -24,7 +24,7 @@ _OF_HIERARCHICAL = MappingProxyType(
         "arm.particles": "effort",
         "torso.survival_rate": "survivors",
         "arm.survival_rate": "survivors",
-        "torso.rotation_noise_rad": "roll_noise_rad, pitch_noise_rad and yaw_noise_rad",
+        "torso.rotation_noise_rad": "yaw_noise_rad",
         "arm.rotation_noise_rad": "arm_noise_rad",
         "torso.translation_noise_m": "y_noise_m",
         "torso": "effort",
