@@ -12,7 +12,7 @@ SHELL ["/bin/bash", "-eo", "pipefail", "-c"]
 ENV DEBIAN_FRONTEND=noninteractive
 WORKDIR /ws
 
-# What ROS has. pip brings numba and OpenCV; RViz is for a machine with a screen.
+# The packages of ROS. pip brings numba and OpenCV; RViz is for a machine with a screen.
 COPY package.xml src/cardbox_tracker/package.xml
 RUN apt-get update \
     && apt-get install --yes --no-install-recommends python3-venv \

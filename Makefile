@@ -3,11 +3,12 @@
 # make example   a small recording, its measured person and their posture, in example/
 # make test    set-up, lint, types, all tests
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
+# make experiments   repeat the paper's experiments (hours); writes docs/evaluation/report.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
-# make clean   remove all that the above made
+# make clean   remove the results of the targets above
 #
 # PYTHON=python3.12 chooses the interpreter of a new .venv (3.11 or later). No venv has to be active.
 
@@ -16,8 +17,8 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 
-# What another venv or a sourced ROS installation leaves behind would be mixed into ours: its
-# libraries, its packages, or a DDS implementation that the wheels lack.
+# Another venv or a sourced ROS installation would add its libraries, its packages, or a DDS
+# implementation that the wheels lack.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME VIRTUAL_ENV
 unexport AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH RMW_IMPLEMENTATION
 
@@ -51,7 +52,7 @@ $(NAMES): | $(VENV)/bin/python
 	@rm -f $(VENV)/sources-*
 	@touch $@
 
-# Setuptools builds in the tree and would pick up what an earlier build left there.
+# Setuptools builds in the tree and would pick up the files of an earlier build.
 $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyproject.toml package.xml
 	@rm -rf build/lib build/bdist.* *.egg-info
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
@@ -90,7 +91,7 @@ test: lint $(VENV)/extras
 demo: setup
 	$(BIN)/cardbox demo --output demo_output
 
-# As the README does it by hand; the times are those of the synthetic session.
+# The commands of the README, with the times of the synthetic session.
 .PHONY: example
 example: setup
 	@mkdir -p example
@@ -100,10 +101,17 @@ example: setup
 	$(BIN)/cardbox track example/session --model example/person.yaml --background 0:3.9 \
 		--start 15.6 --force --csv example/person.csv --video example/person.mp4 --bag example/results
 
-# The extra is left out of the set-up, for few need it: it replaces NumPy by an older one.
+# Few need the extra 'mediapipe', which replaces NumPy by an older one.
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
+	$(BIN)/python -m tools.readme_figures
+
+# Fewer runs: make experiments RUNS=2
+RUNS ?= 100
+.PHONY: experiments
+experiments: setup
+	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
 	$(BIN)/python -m tools.readme_figures
 
 # All recorded sessions that lie beside the checkout, against their ground truth.

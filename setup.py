@@ -10,9 +10,12 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # On a ROS installation these come with it, so pip installs them only when asked to.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
-# Learns the package's networks anew. 3 GB, so only for those who do.
-LEARN = ["torch>=2.2,<3"]
+# Learns the package's networks and coefficients anew. 3 GB, so only for those who do.
+LEARN = ["scikit-learn>=1.4,<2", "torch>=2.2,<3"]
+# The paper's experiments, in a checkout.
+EXPERIMENTS = ["joblib>=1.3,<2"]
 TEST = [
+    *EXPERIMENTS,
     "catkin_pkg>=1.0",
     "hypothesis>=6.100",
     "mcap>=1.2",
@@ -22,6 +25,7 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
+    "scikit-learn>=1.4,<2",
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",
@@ -89,6 +93,7 @@ setup(
         "retarget": RETARGET,
         "mediapipe": ["mediapipe==0.10.21"],
         "learn": LEARN,
+        "experiments": EXPERIMENTS,
     },
     entry_points={
         "console_scripts": [

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         InitializationResult,
     )
     from cardbox_tracker.estimation.initialization.measure import initialize_body
+    from cardbox_tracker.estimation.observation import Observation
     from cardbox_tracker.estimation.tracker import Tracker
     from cardbox_tracker.vision.background import (
         BackgroundConfig,
@@ -74,6 +75,7 @@ __all__ = [
     "InitializationError",
     "InitializationResult",
     "NotFiniteError",
+    "Observation",
     "OtherCamera",
     "RosMissingError",
     "SilhouetteExtractor",
@@ -110,6 +112,7 @@ _MODULES = {
     "estimation.initialization.config": ("InitializationConfig", "InitializationResult"),
     "estimation.initialization.measure": ("initialize_body",),
     "estimation.estimate": ("Estimate",),
+    "estimation.observation": ("Observation",),
     "estimation.tracker": ("Tracker",),
     "vision.background": (
         "BackgroundConfig",

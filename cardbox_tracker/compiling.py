@@ -5,28 +5,39 @@ another place. Where it can write to none of them it fails when a module is impo
 file of the cache was cut off, whenever the function is called. Here a folder of our own below the
 folder for temporary files is tried next, then there is no cache; what is damaged is compiled again.
 
-Whoever can write to the folder of the cache can have any code run. So ours belongs to the user and
-nobody else may write to it; a folder that somebody else has made under its name is not used.
+Compiled code contains its callees and the constants of other files. numba alone only checks the
+file of the function itself; here an entry is valid for one state of all kernel sources of a
+package, see :func:`digest_of_kernels`. A newer entry overwrites the older one.
+
+Anybody who can write to the folder of the cache can have any code run. So ours belongs to the user
+and nobody else may write to it; a folder that another user made under its name is not used.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import logging
 import os
+import re
 import stat
 import tempfile
 from collections.abc import Callable
+from functools import cache as cached
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 _LOG = logging.getLogger(__name__)
 _said: set[str] = set()
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+_PACKAGE = os.path.dirname(os.path.abspath(__file__))
+_IMPORT = re.compile(rb"^from (\S+) import (\([^)]*\)|.*)", re.MULTILINE)
+_LINE_NUMBER = re.compile(r"-\d+(?=\.py)")
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
@@ -46,6 +57,47 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
         return compiled
 
     return decorate
+
+
+kernel = njit(cache=True, nogil=True, error_model="numpy")
+"""Compiles a function that runs without the interpreter's lock."""
+
+inlined_kernel = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+"""The same for a function that becomes a part of the kernels that call it."""
+
+
+@cached
+def digest_of_kernels(package: str) -> str:
+    """Return a digest of all sources that compiled code of a package may contain.
+
+    These are the files that import this module, and the files that they import, for constants
+    become a part of the code.
+
+    Args:
+        package: folder of a top-level package.
+    """
+    sources = {}
+    for folder, _, names in os.walk(package):
+        for path in (os.path.join(folder, name) for name in names if name.endswith(".py")):
+            with open(path, "rb", buffering=0) as file:
+                sources[path] = file.read()
+    used = {path for path, text in sources.items() if b"cardbox_tracker.compiling" in text}
+    for module, names in [found for path in used for found in _IMPORT.findall(sources[path])]:
+        place = os.path.join(os.path.dirname(package), *module.decode().split("."))
+        used.add(f"{place}.py")
+        used.update(f"{place}/{name.decode()}.py" for name in re.findall(rb"\w+", names))
+    digest = hashlib.sha256()
+    for path in sorted(used & sources.keys()):
+        digest.update(os.path.relpath(path, package).encode() + b"\0" + sources[path] + b"\0")
+    return digest.hexdigest()
+
+
+def _package_of(file: str) -> str | None:
+    """Folder of the top-level package of a source file; None if it is in no package."""
+    folder, found = os.path.dirname(os.path.abspath(file)), None
+    while os.path.isfile(os.path.join(folder, "__init__.py")):
+        folder, found = os.path.dirname(folder), folder
+    return found
 
 
 def own_folder() -> Path | None:
@@ -84,6 +136,21 @@ def _cache_of(function: Callable[..., Any]) -> _Cache | None:
 
 class _Cache(FunctionCache):
     """numba's cache of one function, whose errors mean that there is nothing in it."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Find the folder of the cache.
+
+        Raises:
+            RuntimeError: there is no folder that can be written to.
+        """
+        super().__init__(function)
+        locator = self._impl.locator
+        packages = {_PACKAGE, _package_of(function.__code__.co_filename) or _PACKAGE}
+        digests = tuple(digest_of_kernels(package) for package in sorted(packages))
+        # Names without line numbers, so that a function that moves leaves no files behind.
+        name = _LINE_NUMBER.sub("", self._impl.filename_base)
+        stamp = locator.get_source_stamp(), digests
+        self._cache_file = IndexDataCacheFile(locator.get_cache_path(), name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled code; None if it is not there or damaged."""

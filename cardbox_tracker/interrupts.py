@@ -1,8 +1,9 @@
-"""Ctrl-C and SIGTERM end every program of the package without a traceback, however early they come.
+"""Signals end every program of the package without a traceback, however early they come.
 
-Python turns Ctrl-C into an exception at whatever it does: an import, the construction of half an
-executor, a destructor, whose exception nobody can catch. So nodes only take note of a signal, upon
-which ROS shuts down, and the programs that have no ROS get the exception where they can handle it.
+Python turns Ctrl-C into an exception wherever it is: in an import, in a destructor, half-way
+through a constructor of rclpy. Here a program chooses: while it imports, a signal ends the process;
+a command raises KeyboardInterrupt where it can clean up; a running node leaves the signal to rclpy,
+which shuts ROS down.
 """
 
 from __future__ import annotations
@@ -13,93 +14,100 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from types import FrameType
-from typing import Any, NoReturn
-
-INTERRUPTED = 130
-"""Exit code of a command that a signal has ended."""
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Less than launch waits before it sends the next signal.
-_PATIENCE_S = 4.0
-
-_received = threading.Event()
+from typing import Literal, NoReturn
 
 
-def were_received() -> bool:
-    """Return whether a signal has asked this program to end."""
-    return _received.is_set()
+@dataclass
+class _State:
+    """The response to signals.
 
-
-def note() -> None:
-    """Take note that a signal has come."""
-    _received.set()
-
-
-def leave_at_once(code: int | None = None) -> None:
-    """From now on a signal ends the process with ``code``: for imports, when nothing is open.
-
-    None is 128 and the signal's number, as shells have it.
+    Attributes:
+        response: end the process, raise KeyboardInterrupt, or only note the signal.
+        code: exit code of an ended process; None: 128 and the signal's number, as in a shell.
+        received: number of the first signal; 0 before it.
     """
 
-    def leave(number: int, _: FrameType | None) -> NoReturn:
-        os._exit(128 + number if code is None else code)
-
-    for number in _SIGNALS:
-        signal.signal(number, leave)
+    response: Literal["end", "raise", "note"] = "end"
+    code: int | None = None
+    received: int = 0
 
 
-def leave_interrupted() -> NoReturn:
-    """End the process with :data:`INTERRUPTED`, once what it has printed is written.
+_state = _State()
 
-    Returning to Python would not do: what it runs by ``-m`` it ends by SIGINT if Ctrl-C came within
-    exec() of a text, as the definition of a dataclass has it, even if the exception was caught.
+
+def received() -> int:
+    """Return the number of the signal that asked this program to end; 0 if none has."""
+    return _state.received
+
+
+def end_at_once(code: int | None = None) -> None:
+    """Let SIGINT and SIGTERM end the process with ``code``: for imports, when nothing is open.
+
+    None is 128 and the signal's number.
     """
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(INTERRUPTED)
-
-
-def interrupt_commands() -> None:
-    """From now on Ctrl-C raises KeyboardInterrupt; what SIGTERM does is ``commands/signals.py``."""
-
-    def interrupt(_: int, __: FrameType | None) -> NoReturn:
-        note()
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, interrupt)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _state.response, _state.code = "end", code
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _handle)
 
 
 @contextmanager
-def only_noted() -> Iterator[None]:
-    """Context in which signals raise nothing: rclpy, whose handler comes first, shuts ROS down.
+def raised() -> Iterator[None]:
+    """Context in which SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt; ignored ones stay so.
 
-    A program that has not ended some seconds later, such as one that still compiles its kernels,
-    is ended. In another thread than the main one, which gets no signals, it does nothing.
+    It does nothing in a thread other than the main one, which alone gets signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    handled = {n: handler for n, handler in before.items() if handler is not signal.SIG_IGN}
+    for number in handled:
+        signal.signal(number, _handle)
+    _state.received = 0
+    try:
+        with _responding("raise"):
+            yield
+    finally:
+        for number, handler in handled.items():
+            signal.signal(number, handler)
 
-    def note(_: int, __: FrameType | None) -> None:
-        if not _received.is_set():
-            _received.set()
-            timer = threading.Timer(_PATIENCE_S, _give_up)
-            timer.daemon = True
-            timer.start()
 
-    before: dict[Any, Any] = {number: signal.signal(number, note) for number in _SIGNALS}
+@contextmanager
+def only_noted() -> Iterator[None]:
+    """Context in which signals raise nothing, since rclpy, which sees them first, ends ROS.
+
+    The handler is not replaced: it would take the place of rclpy's.
+    """
+    with _responding("note"):
+        yield
+
+
+def leave(code: int) -> NoReturn:
+    """End the process with ``code`` once its output is written, skipping Python's own end.
+
+    Python has no handlers while it ends, so that a second signal would kill the process. It also
+    ends ``python -m`` by SIGINT where Ctrl-C came within exec(), even if that was caught.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
+
+
+@contextmanager
+def _responding(response: Literal["raise", "note"]) -> Iterator[None]:
+    before, _state.response = _state.response, response
     try:
         yield
     finally:
-        for number, handler in before.items():
-            # While Python ends it has no handlers; launch and a terminal send one signal each, and
-            # the second would then kill a process that has done all it should.
-            signal.signal(number, signal.SIG_IGN if _received.is_set() else handler)
+        _state.response = before
 
 
-def _give_up() -> None:
-    print("ended at once: it was busy for too long after the signal", file=sys.stderr, flush=True)
-    os._exit(0)
+def _handle(number: int, _: FrameType | None) -> None:
+    _state.received = _state.received or number
+    if _state.response == "end":
+        os._exit(128 + number if _state.code is None else _state.code)
+    if _state.response == "raise":
+        raise KeyboardInterrupt

@@ -3,7 +3,7 @@
 :mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
 as messages of a bag, and :mod:`.recordings.track` as rows of a CSV file. Add a joint to
 ``JOINT_STATE_NAMES`` and the two functions after it, a topic to ``outputs``, and a number to
-``FIGURES``.
+``METRICS``.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Metric:
     """One number of an estimate.
 
     Attributes:
@@ -193,9 +193,9 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
 OUTPUTS: tuple[Output, ...] = outputs()
 """All topics, with all joints."""
 
-FIGURES: tuple[Figure, ...] = (
-    Figure("cost", "px", "d", lambda estimate: estimate.cost_px),
-    Figure("iou", "", ".4f", lambda estimate: estimate.iou),
+METRICS: tuple[Metric, ...] = (
+    Metric("cost", "px", "d", lambda estimate: estimate.cost_px),
+    Metric("iou", "", ".4f", lambda estimate: estimate.iou),
 )
 """Numbers that describe the fit of the model."""
 

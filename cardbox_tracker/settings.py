@@ -6,8 +6,14 @@ documentation take all of it from there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+_TYPE_TEXTS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,20 @@ class Setting:
                 raise ValueError(f"{name} is {value:g}; expected {lowest:g} to {highest:g}")
 
 
+class NoEffectError(ValueError):
+    """A setting was given that changes nothing beside the others.
+
+    Attributes:
+        name: of the setting.
+        instead: names of settings that act.
+    """
+
+    def __init__(self, name: str, where: str, instead: str) -> None:
+        """``where`` says in which case it has no effect, such as ``with the strategy drs``."""
+        super().__init__(f"{name} has no effect {where}; use {instead}")
+        self.name, self.instead = name, instead
+
+
 def setting(
     default: Any,
     description: str,
@@ -92,6 +112,71 @@ def check(instance: Any) -> None:
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
+
+
+def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
+    """Return a settings dataclass with other values.
+
+    Args:
+        instance: the settings to change; they stay as they are.
+        given: values by the names of the fields. Nested settings are mappings in turn; a tuple of
+            settings is a mapping from the names of their classes.
+        where: what precedes a name in an error, such as ``whole_body.``.
+
+    Raises:
+        ValueError: a name is unknown, a value has the wrong type or is out of range; the text has
+            the whole name and what is expected.
+    """
+    known = {entry.name: getattr(instance, entry.name) for entry in fields(instance)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, value in given.items():
+        _check_name(name, known, where)
+        before, whole = known[name], f"{where}{name}"
+        if isinstance(before, tuple):
+            values[name] = _changed_parts(before, value, whole)
+        elif is_dataclass(before):
+            values[name] = changed(before, _mapping(value, whole), f"{whole}.")
+        else:
+            values[name] = _typed(before, value, whole)
+    try:
+        return replace(instance, **values)  # type: ignore[type-var]
+    except ValueError as error:
+        raise ValueError(f"{where}{error}") from None
+
+
+def _changed_parts(before: tuple[Any, ...], given: Any, where: str) -> tuple[Any, ...]:
+    """Return settings of several classes with other values, by the names of the classes."""
+    parts = {type(one).__name__: one for one in before}
+    for name, values in _mapping(given, where).items():
+        _check_name(name, parts, f"{where}.")
+        whole = f"{where}.{name}"
+        parts[name] = changed(parts[name], _mapping(values, whole), f"{whole}.")
+    return tuple(parts.values())
+
+
+def _check_name(name: Any, known: Mapping[str, Any], where: str) -> None:
+    if name in known:
+        return
+    near = difflib.get_close_matches(str(name), known, 1)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    raise ValueError(
+        f"'{where}{name}' is no setting; {hint}expected one of {', '.join(known) or 'none'}"
+    )
+
+
+def _mapping(value: Any, where: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{where} is {value!r}; expected names and values below it")
+    return value
+
+
+def _typed(before: Any, value: Any, where: str) -> Any:
+    """Return a value of the type of ``before``; a whole number may stand for a float."""
+    if isinstance(before, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(before):
+        raise ValueError(f"{where} is {value!r}; expected {_TYPE_TEXTS[type(before)]}")
+    return value
 
 
 def restarts(old: Any, new: Any) -> bool:

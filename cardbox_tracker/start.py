@@ -1,18 +1,22 @@
 """Start a program of the package: ``python -m cardbox_tracker.start NAME ARGUMENTS``.
 
-What is installed as ``cardbox``, ``background`` and so on begins here, before any slow import, so
-that a signal during the imports ends it without a traceback. ``colcon build`` outside the virtual
-environment makes executables for the system's Python, which lacks numba and rosbags: that is said
-in words.
+The installed ``cardbox``, ``background`` and so on begin here, before any slow import, so that a
+signal during the imports ends them without a traceback. ``colcon build`` outside the virtual
+environment makes executables for the system's Python, which lacks numba and rosbags: the error
+names the missing package.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 
 from cardbox_tracker import interrupts
+
+COMMAND = "cardbox_tracker.commands.main"
+"""Module of the executable ``cardbox``."""
 
 NODES: dict[str, str] = {
     "background": "cardbox_tracker.ros.nodes.background_node",
@@ -26,11 +30,6 @@ NODES: dict[str, str] = {
     "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
 }
 """Module of each executable that ``ros2 run cardbox_tracker`` knows, besides ``cardbox``."""
-
-
-def _node(name: str) -> int:
-    interrupts.leave_at_once(0)
-    return start(name, lambda: import_module(NODES[name]).main())
 
 
 def start(name: str, main: Callable[[], int]) -> int:
@@ -55,67 +54,27 @@ def start(name: str, main: Callable[[], int]) -> int:
         return 1
 
 
-def background() -> int:
-    """Run the node ``background``."""
-    return _node("background")
-
-
-def initializer() -> int:
-    """Run the node ``initializer``."""
-    return _node("initializer")
-
-
-def tracker() -> int:
-    """Run the node ``tracker``."""
-    return _node("tracker")
-
-
-def camera() -> int:
-    """Run the node ``camera``."""
-    return _node("camera")
-
-
-def play_bag() -> int:
-    """Run the node ``play_bag``."""
-    return _node("play_bag")
-
-
-def stereo_depth() -> int:
-    """Run the node ``stereo_depth``."""
-    return _node("stereo_depth")
-
-
-def rula() -> int:
-    """Run the node ``rula``."""
-    return _node("rula")
-
-
-def retarget() -> int:
-    """Run the node ``retarget``."""
-    return _node("retarget")
-
-
-def cardbox_nodes() -> int:
-    """Run all nodes in one process."""
-    return _node("cardbox_nodes")
-
-
-def cardbox() -> int:
-    """Run the command ``cardbox``."""
-    interrupts.leave_at_once()
-    code = start("cardbox", _command)
-    # All is done and closed; what Python does at its end must not be interrupted.
-    interrupts.leave_at_once(code)
-    if code == interrupts.INTERRUPTED:
-        interrupts.leave_interrupted()
+def _run(name: str) -> int:
+    """Import and run the program ``name``; return its exit code."""
+    # A node that is asked to end has done what it should: 0. A command has not.
+    interrupts.end_at_once(0 if name in NODES else None)
+    code = start(name, lambda: import_module(NODES.get(name, COMMAND)).main())
+    if interrupts.received():
+        interrupts.leave(code)
     return code
 
 
-def _command() -> int:
-    main = import_module("cardbox_tracker.commands.main").main
-    interrupts.interrupt_commands()
-    code: int = main()
-    return code
+# The console scripts of setup.py.
+cardbox = partial(_run, "cardbox")
+background = partial(_run, "background")
+initializer = partial(_run, "initializer")
+tracker = partial(_run, "tracker")
+camera = partial(_run, "camera")
+play_bag = partial(_run, "play_bag")
+stereo_depth = partial(_run, "stereo_depth")
+rula = partial(_run, "rula")
+retarget = partial(_run, "retarget")
+cardbox_nodes = partial(_run, "cardbox_nodes")
 
 
 def main() -> int:
@@ -125,7 +84,7 @@ def main() -> int:
         print(f"expected one of {', '.join(NODES)} or cardbox; got '{name}'", file=sys.stderr)
         return 2
     sys.argv = [name, *sys.argv[2:]]
-    return cardbox() if name == "cardbox" else _node(name)
+    return _run(name)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 MOST_DOMAINS = 100
 
 # These take longest; begun first, none of them is left over at the end for one process alone.
-LONGEST = ("system", "estimation", "evaluation", "demo", "benchmarks", "recordings")
+LONGEST = ("system", "estimation", "experiments", "evaluation", "demo", "benchmarks", "recordings")
 
 
 @pytest.hookimpl(tryfirst=True)

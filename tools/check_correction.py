@@ -1,8 +1,8 @@
-"""What the package's correction brings: ``python -m tools.check_correction SESSION...``.
+"""Errors with and without the learned correction: ``python -m tools.check_correction SESSION...``.
 
 Recorded sessions with ground truth are tracked in one of the ways of ``tools/tracked_ways.py``.
-Printed are absolute and aligned error, cm, and the error of the acceleration, m/s^2: of what the
-filter has found, and of the keypoints as the network says that they are.
+It prints absolute and aligned error, cm, and the error of the acceleration, m/s^2, of the filter's
+keypoints and of the corrected ones.
 """
 
 from __future__ import annotations

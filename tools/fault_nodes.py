@@ -15,8 +15,13 @@ from std_msgs.msg import Header
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
+from cardbox_tracker.ros.messages.conversions import (
+    camera_info_message,
+    image_message,
+    stamp_ns,
+)
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
+from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess
 from tools.fault_scene import EMPTY, START_NS, Found, Person, S, Sent
@@ -69,9 +74,9 @@ class InsideNodes:
     def _start_tracker(self) -> TrackerNode:
         node: TrackerNode = self._node(TrackerNode, model_file=str(self._model))
 
-        def note(header: Header, estimate: Estimate, *_: Any) -> None:
-            stamp_ns = header.stamp.sec * S + header.stamp.nanosec
-            self.found.append(Found(stamp_ns, estimate.posture, estimate.offset_m))
+        def note(seen: ObservationSet, estimate: Estimate, _: Any) -> None:
+            stamp = stamp_ns(seen.header.stamp)
+            self.found.append(Found(stamp, estimate.posture, estimate.offset_m))
 
         node._outputs.publish = note  # type: ignore[method-assign, assignment]
         return node

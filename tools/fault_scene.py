@@ -52,7 +52,7 @@ class Sent:
 
 @dataclass(frozen=True)
 class Found:
-    """What the tracker said of one image: posture (12,) and place (2,), or None."""
+    """Result of the tracker for one image: posture (12,) and place (2,), or None."""
 
     stamp_ns: int
     posture: NDArray[np.float64] | None
@@ -130,7 +130,7 @@ def even(from_s: float, to_s: float, period_s: float = PERIOD_S) -> list[Sent]:
 
 
 Fault = Callable[[list[Sent], np.random.Generator], list[Sent]]
-"""Takes the images during the fault, undisturbed; returns what is sent instead."""
+"""Replaces the undisturbed images during a fault by those that are sent."""
 
 
 def shifted(images: Iterable[Sent], by_s: float) -> list[Sent]:
@@ -195,7 +195,7 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
 def run_of(
     fault: Fault, seed: int = 0, from_s: float = 0.0
 ) -> tuple[list[Sent], list[Sent], list[Sent]]:
-    """Return what is sent before, during and after a fault; the first image is of ``from_s``."""
+    """Return the images sent before, during and after a fault; the first is of ``from_s``."""
     begin = from_s + BEFORE_S
     end = begin + FAULT_S
     during = fault(even(begin, end), np.random.default_rng(seed))
@@ -212,7 +212,7 @@ def run_of(
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a fault went.
+    """Outcome of a fault.
 
     Attributes:
         fault: what happened.
@@ -233,7 +233,7 @@ class Verdict:
 
     @property
     def is_good(self) -> bool:
-        """Whether it went as promised."""
+        """Whether the promise was kept."""
         return self.resumed_s <= RESUME_S and self.iou_after >= LEAST_IOU and not self.unseen
 
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.estimation.filtering.correction import moved
+from cardbox_tracker.estimation.filtering.correction import NetworkCorrector, moved
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import (
@@ -47,8 +47,8 @@ FloatArray = NDArray[np.float64]
 
 # About the deviations of the answers, m: middle of the shoulders, elbow, hand; x, y, z of each.
 UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
-# Nodes of the first layer, of the memory, of the last layer but one.
-ENTERED, NODES, LEFT = 192, 160, 96
+# Nodes of the first layer, of the hidden state, of the last layer but one.
+INPUTS, NODES, LEFT = 192, 160, 96
 NETWORKS, EPOCHS = 2, 12
 # Images of a sequence, which begin half as many apart, and sequences of a batch.
 LENGTH, BATCH = 120, 16
@@ -96,14 +96,14 @@ def samples_of(folder: Path, seed: int) -> Samples:
 
     def keep(_: int, stamp_ns: int, __: Estimate, tracker: Tracker) -> None:
         assert isinstance(tracker.filter, WholeBodyFilter)
-        correction = tracker.filter.refine.correction
-        assert correction is not None
-        # Of a lost person it sees something, too, and remembers it; of nobody it sees nothing.
-        is_new = not rows or rows[-1][0] is not correction.features
-        if not is_new or not correction.features.size:
+        refine = tracker.filter.refine
+        assert isinstance(refine.corrector, NetworkCorrector)
+        features = refine.corrector.features
+        # It also sees a person who is lost; without a person its features stay the same array.
+        if refine.found is None or (rows and rows[-1][0] is features):
             return
         true_m = wanted.get(stamp_ns, unknown)
-        rows.append((correction.features, correction.found_m, true_m, stamp_ns))
+        rows.append((features, refine.found.keypoints_m, true_m, stamp_ns))
 
     track(session, PRESETS["default"](), seed, keep)
     if len(rows) < LENGTH:
@@ -124,12 +124,12 @@ def learn(
     layers = [
         _layers(_learned(sequences, seed + number, begin, number)) for number in range(NETWORKS)
     ]
-    enter, receive, keep, first, last = (
+    input_layer, gru_input, gru_hidden, first, last = (
         (np.stack([one[i][0] for one in layers]), np.stack([one[i][1] for one in layers]))
         for i in range(5)
     )
     network = RecurrentNetwork(
-        mean, scale, networks.MOST, enter, receive, keep, (first, last), UNIT_M
+        mean, scale, networks.MOST, input_layer, gru_input, gru_hidden, (first, last), UNIT_M
     )
     return network if begin is None else _between(begin, network)
 
@@ -145,11 +145,15 @@ def _between(begin: RecurrentNetwork, end: RecurrentNetwork) -> RecurrentNetwork
         weights, biases = ((1 - KEPT_ON) * a + KEPT_ON * b for a, b in zip(one, other, strict=True))
         return weights, biases
 
-    layers = [
-        mixed(getattr(begin, name), getattr(end, name)) for name in ("enter", "receive", "keep")
-    ]
-    first, last = (mixed(one, other) for one, other in zip(begin.leave, end.leave, strict=True))
-    return end._replace(enter=layers[0], receive=layers[1], keep=layers[2], leave=(first, last))
+    first, last = (
+        mixed(*pair) for pair in zip(begin.output_layers, end.output_layers, strict=True)
+    )
+    return end._replace(
+        input_layer=mixed(begin.input_layer, end.input_layer),
+        gru_input=mixed(begin.gru_input, end.gru_input),
+        gru_hidden=mixed(begin.gru_hidden, end.gru_hidden),
+        output_layers=(first, last),
+    )
 
 
 def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) -> list[Any]:
@@ -170,7 +174,7 @@ def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) 
 
 
 def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, number: int) -> Any:
-    """Return the modules (enter, recurrent, leave_0, leave_1) that learned from the sequences.
+    """Return the modules (input_layer, recurrent, first, last) that learned from the sequences.
 
     They are those of the network ``number`` of ``begin`` first, if there is one.
     """
@@ -181,9 +185,9 @@ def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, nu
     features, found, true, known, period = sequences
     modules = nn.ModuleList(
         [
-            nn.Linear(features.shape[3], ENTERED),
-            nn.GRU(ENTERED, NODES, batch_first=True),
-            nn.Linear(NODES + ENTERED, LEFT),
+            nn.Linear(features.shape[3], INPUTS),
+            nn.GRU(INPUTS, NODES, batch_first=True),
+            nn.Linear(NODES + INPUTS, LEFT),
             nn.Linear(LEFT, len(UNIT_M)),
         ]
     )
@@ -214,13 +218,13 @@ def _answers(modules: Any, features: Any) -> Any:
     """Return the answers (B, L, 2, 9), metres, to features (B, L, 2, F)."""
     import torch
 
-    enter, recurrent, first, last = modules
-    entered = torch.relu(enter(features))
+    input_layer, recurrent, first, last = modules
+    inputs = torch.relu(input_layer(features))
     batch, length = features.shape[:2]
     # Each arm is a sequence of its own.
-    arms = entered.permute(0, 2, 1, 3).reshape(2 * batch, length, -1)
-    memory = recurrent(arms)[0]
-    scaled = last(torch.relu(first(torch.cat([memory, arms], dim=2))))
+    arms = inputs.permute(0, 2, 1, 3).reshape(2 * batch, length, -1)
+    hidden = recurrent(arms)[0]
+    scaled = last(torch.relu(first(torch.cat([hidden, arms], dim=2))))
     scaled = scaled.reshape(batch, 2, length, -1).permute(0, 2, 1, 3)
     return scaled * torch.tensor(UNIT_M, dtype=torch.float32)
 
@@ -281,11 +285,11 @@ def _length(vectors: Any, least: float) -> Any:
 
 def _layers(modules: Any) -> list[tuple[FloatArray, FloatArray]]:
     """Return weights and biases of the five layers as :class:`RecurrentNetwork` has them."""
-    enter, unit, first, last = modules
+    input_layer, gru, first, last = modules
     pairs = [
-        (enter.weight, enter.bias),
-        (unit.weight_ih_l0, unit.bias_ih_l0),
-        (unit.weight_hh_l0, unit.bias_hh_l0),
+        (input_layer.weight, input_layer.bias),
+        (gru.weight_ih_l0, gru.bias_ih_l0),
+        (gru.weight_hh_l0, gru.bias_hh_l0),
         (first.weight, first.bias),
         (last.weight, last.bias),
     ]
@@ -297,13 +301,13 @@ def _put(network: RecurrentNetwork, number: int, modules: Any) -> None:
     """Write the weights of one network into modules: the inverse of :func:`_layers`."""
     import torch
 
-    enter, unit, first, last = modules
+    input_layer, gru, first, last = modules
     pairs = [
-        (network.enter, enter.weight, enter.bias),
-        (network.receive, unit.weight_ih_l0, unit.bias_ih_l0),
-        (network.keep, unit.weight_hh_l0, unit.bias_hh_l0),
-        (network.leave[0], first.weight, first.bias),
-        (network.leave[1], last.weight, last.bias),
+        (network.input_layer, input_layer.weight, input_layer.bias),
+        (network.gru_input, gru.weight_ih_l0, gru.bias_ih_l0),
+        (network.gru_hidden, gru.weight_hh_l0, gru.bias_hh_l0),
+        (network.output_layers[0], first.weight, first.bias),
+        (network.output_layers[1], last.weight, last.bias),
     ]
     with torch.no_grad():
         for (weights, biases), weight, bias in pairs:
@@ -313,11 +317,11 @@ def _put(network: RecurrentNetwork, number: int, modules: Any) -> None:
 
 def corrected(network: RecurrentNetwork, samples: Samples) -> FloatArray:
     """Return the keypoints as the network says that they are, steadied, (n, 6, 3)."""
-    memory, low_pass = network.new_memory(2), LowPass(SMOOTHING_S)
+    hidden, low_pass = network.initial_hidden(2), LowPass(SMOOTHING_S)
     intervals_s = np.diff(samples.stamps_ns, prepend=samples.stamps_ns[:1]) / 1e9
     result = np.empty_like(samples.found_m)
     for i, (features, found_m) in enumerate(zip(samples.features, samples.found_m, strict=True)):
-        answers_m, memory = network(features, memory)
+        answers_m, hidden = network(features, hidden)
         result[i] = low_pass(moved(found_m, answers_m), float(intervals_s[i]))
     return result
 

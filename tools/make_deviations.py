@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.filtering.correction import NetworkCorrector
 from cardbox_tracker.estimation.filtering.deviations import TORSO, deviations_of
 from cardbox_tracker.estimation.filtering.networks import Network
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
@@ -70,7 +71,9 @@ def errors_of(folder: Path, seed: int) -> Errors:
         assert isinstance(tracker.filter, WholeBodyFilter)
         error_rad = np.radians(angle_errors_deg(estimate.posture[1:], truth[1:]))
         stddev = np.asarray(estimate.posture_stddev)[1:]
-        rows.append((tracker.filter.refine.features, error_rad, stddev))
+        corrector = tracker.filter.refine.corrector
+        assert isinstance(corrector, NetworkCorrector)
+        rows.append((corrector.result_features, error_rad, stddev))
 
     track(session, config, seed, keep)
     if not rows:

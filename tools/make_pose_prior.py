@@ -47,7 +47,7 @@ USED_IN_SESSIONS = (
 )  # fmt: skip
 BROKEN = ("13_18",)
 
-# Kinds of motion by clip; who is in none of them is "other".
+# Kinds of motion by clip; all further clips are "other".
 KINDS = {
     "soccer": r"10_0[12356]|11_01|soccer_\d+",
     "walk": r"10_04|12_0[123]|walking_\d+",

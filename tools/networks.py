@@ -150,7 +150,10 @@ def save(network: Network | RecurrentNetwork, path: Path, about: str) -> None:
     if isinstance(network, Network):
         layers = list(zip(network.weights, network.biases, strict=True))
     else:
-        layers = [network.enter, network.receive, network.keep, *network.leave]
+        layers = [
+            *(network.input_layer, network.gru_input, network.gru_hidden),
+            *network.output_layers,
+        ]
     arrays = {
         "about": np.array(about),
         "mean": network.mean,

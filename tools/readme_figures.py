@@ -15,15 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.benchmarks import report as benchmark_report
-from cardbox_tracker.evaluation.paper.report import recorded_results
-from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from benchmarks import report as benchmark_report
 from cardbox_tracker.evaluation.recorded.report import mean_of
+from cardbox_tracker.evaluation.results import read_json
 from cardbox_tracker.files import atomic_path
+from experiments.results import motions_in, recorded_results
+from tools.marks import replaced
 
 BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"
 RESULTS = Path("docs/evaluation")
+ACCURACY, SESSIONS_REPORT = "accuracy.json", "sessions.md"
 BENCHMARKS = Path("docs/benchmarks.json")
 
 
@@ -62,64 +64,61 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
     return "\n".join(lines)
 
 
-def sessions_section(results: Mapping[str, Any]) -> str:
-    """Return the text between the marks of the sessions, from ``sessions.json``."""
+def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of accuracy.
+
+    Args:
+        results: ``sessions.json``, the rendered recordings; its means are the first row.
+        others: rows of ``accuracy.json``, errors in cm; a pair is a range, null is not measured.
+    """
     sessions = results["sessions"]
-    rows, better, worst = [], 0, 0.0
-    for session in sessions:
-        absolute, aligned = (mean_of(session["runs"], key) for key in ("absolute", "aligned"))
-        peer = float(session["mediapipe"]["aligned"])
-        missing = mean_of(session["runs"], "without_estimate")
-        share = 100 * missing / mean_of(session["runs"], "frames")
-        better += aligned < peer
-        worst = max(worst, aligned / peer)
-        figures = (f"{value:.1f} cm" for value in (aligned, peer, absolute))
-        rows.append(f"| {session['name']} | {' | '.join(figures)} | {share:.0f} % |")
-    keys = ("aligned", "absolute")
-    means = {key: np.mean([mean_of(s["runs"], key) for s in sessions]) for key in keys}
-    peers = np.mean([s["mediapipe"]["aligned"] for s in sessions])
-    ms = np.mean([mean_of(s["runs"], "ms") for s in sessions])
+    means = {
+        key: float(np.mean([mean_of(session["runs"], key) for session in sessions]))
+        for key in ("aligned", "absolute", "ms")
+    }
+    peers = [float(session["mediapipe"]["aligned"]) for session in sessions]
+    better = sum(
+        mean_of(session["runs"], "aligned") < peer
+        for session, peer in zip(sessions, peers, strict=True)
+    )
+    first = {
+        "people": f"rendered like those that the correction learned from ({len(sessions)} "
+        "recordings)",
+        "cameras": "one",
+        "aligned": means["aligned"],
+        "mediapipe": float(np.mean(peers)),
+        "absolute": means["absolute"],
+        "source": f"[each recording](docs/evaluation/{SESSIONS_REPORT})",
+    }
     lines = [
         *_wrapped(
-            f"Preset `default` on {len(sessions)} recordings, {len(results['seeds'])} seeds. "
-            "Bodies and rooms are rendered, so this is not film of people (and what corrects the "
-            "results was learned from others of the same renderer); in sessions named `cmu` the "
-            "motions are motion capture. Aligned: after both skeletons are shifted to the middle "
-            "of their shoulders, for MediaPipe Pose (full) has no metric place:"
+            f"Mean 3D error of shoulders, elbows and hands, preset `default`, "
+            f"{len(results['seeds'])} seeds. *Aligned* is the error after both skeletons are "
+            "shifted to the middle of their shoulders, because MediaPipe Pose (one camera) has no "
+            "metric place:"
         ),
         "",
-        "| session | aligned error | MediaPipe Pose | absolute error | images without estimate |",
-        "|---|---|---|---|---|",
-        *rows,
-        f"| **mean** | {means['aligned']:.1f} cm | {peers:.1f} cm | {means['absolute']:.1f} cm | |",
+        "| people | cameras | aligned | MediaPipe | absolute | measured on |",
+        "|---|---|---|---|---|---|",
+        *(_accuracy_row(row) for row in (first, *others)),
         "",
         *_wrapped(
-            f"Better than MediaPipe on {better} of {len(sessions)}, at worst {worst:.1f} times its "
-            f"error. An image takes {ms:.1f} ms from silhouette and image to posture, on one core. "
-            "Most of the error is depth."
+            f"The aligned error is below MediaPipe's on {better} of the {len(sessions)} rendered "
+            f"recordings. An image takes {means['ms']:.1f} ms from silhouette and image to "
+            "posture, on one core."
         ),
     ]
     return "\n".join(lines)
-
-
-def replaced(text: str, section: str, begin: str = BEGIN, end: str = END) -> str:
-    """Return the README ``text`` with ``section`` between the marks.
-
-    Raises:
-        ValueError: the marks are not there, each once.
-    """
-    if text.count(begin) != 1 or text.count(end) != 1:
-        raise ValueError(f"the README needs the marks {begin} and {end}, each once")
-    before, rest = text.split(begin)
-    return f"{before}{begin}\n{section}\n{end}{rest.split(end)[1]}"
 
 
 def current(root: Path) -> str:
     """Return what the README in ``root`` should read."""
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
-    text = replaced((root / "README.md").read_text(encoding="utf-8"), section)
-    sessions = sessions_section(read_json(folder / "sessions.json"))
+    text = replaced((root / "README.md").read_text(encoding="utf-8"), section, BEGIN, END)
+    sessions = sessions_section(
+        read_json(folder / "sessions.json"), read_json(folder / ACCURACY)["rows"]
+    )
     text = replaced(text, sessions, SESSIONS_BEGIN, SESSIONS_END)
     speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))
     return replaced(text, speed, benchmark_report.BEGIN, benchmark_report.END)
@@ -159,6 +158,26 @@ def _row(name: str, motion: Mapping[str, Any]) -> str:
         cells.append(_cm((errors["left_hand"] + errors["right_hand"]) / 2))
     cells += [f"{motion[s]['mean_cost_px']:.0f} px" for s in ("drs", "srs")]
     return "| " + " | ".join(cells) + " |"
+
+
+def _accuracy_row(row: Mapping[str, Any]) -> str:
+    aligned, absolute = _range(row["aligned"]), _range(row["absolute"])
+    if "hands" in row:
+        aligned += f" (hands {row['hands']:.0f})"
+    if "without_correction" in row:
+        without = row["without_correction"]
+        aligned += f" ({without[0]:.1f} without the correction)"
+        absolute += f" ({without[1]:.1f})"
+    figures = (aligned, _range(row["mediapipe"]), absolute)
+    return f"| {row['people']} | {row['cameras']} | {' | '.join(figures)} | {row['source']} |"
+
+
+def _range(value_cm: float | Sequence[float] | None) -> str:
+    if value_cm is None:
+        return ""
+    if isinstance(value_cm, Sequence):
+        return " to ".join(f"{value:.1f}" for value in value_cm) + " cm"
+    return f"{value_cm:.1f} cm"
 
 
 def _cm(value_m: float) -> str:

@@ -1,4 +1,4 @@
-r"""Track real people whom nobody measured, and compare with what MediaPipe sees in the same images.
+r"""Track real people without measuring them, and compare with MediaPipe on the same images.
 
 python -m tools.real_report --session DIR \
     --output docs/evaluation/real.md --sheet docs/images/real.jpg
@@ -33,6 +33,7 @@ from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
+from tools.marks import replaced
 from tools.real_sheet import contact_sheet
 from tools.silhouette_report import read_masks
 
@@ -72,7 +73,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Variant:
-    """What is tracked, and with which silhouettes.
+    """One way to track a session.
 
     Attributes:
         name: in the table.
@@ -103,12 +104,12 @@ VARIANTS = (
     Variant("the same without colours", "mediapipe", colors=False),
 )
 SHOWN = VARIANTS[3]
-"""The one that is reported by clip and drawn."""
+"""The variant that is reported by clip and drawn."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came out: estimates and bodies (N,), errors (N, 6) in px (nan without), IoU (N,)."""
+    """Results: estimates and bodies (N,), errors (N, 6) in px (nan without), IoU (N,)."""
 
     estimates: list[Estimate]
     bodies: list[BodyModel]
@@ -278,19 +279,6 @@ def report(
     yield ""
 
 
-def replaced(document: str, figures: str) -> str:
-    """Return the document with other figures between its two marks.
-
-    Raises:
-        CardboxError: it has no marks.
-    """
-    before, begin, rest = document.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise CardboxError(f"the document has no marks {BEGIN} and {END}; the figures go between")
-    return f"{before}{begin}\n{figures}\n{end}{after}"
-
-
 def sheet_of(frames: Frames, run: Run) -> Image:
     """Return the middle of each clip with model and landmarks."""
     numbers = [np.flatnonzero(frames.clips == clip) for clip in dict.fromkeys(frames.clips)]
@@ -329,7 +317,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(variant.name, *cells(results[variant], chosen), sep=" | ", flush=True)
     document = options.output.read_text(encoding="utf-8")
     figures = "\n".join(report(frames, results, options))
-    options.output.write_text(replaced(document, figures), encoding="utf-8")
+    options.output.write_text(replaced(document, figures, BEGIN, END), encoding="utf-8")
     if options.sheet is not None:
         quality = (cv2.IMWRITE_JPEG_QUALITY, 85)
         cv2.imwrite(str(options.sheet), sheet_of(frames, results[SHOWN][0]), quality)

@@ -1,4 +1,4 @@
-"""What is promised, how often it was tried, and that it held: ``docs/reliability.md``.
+"""Table of the promises, their tests and the number of inputs tried: ``docs/reliability.md``.
 
 ``python -m tools.reliability`` (``make reliability``) runs every test that has the marker
 ``promise`` and writes the table between the marks of that page. A test of examples (hypothesis)
@@ -16,8 +16,8 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.files import atomic_path
+from tools.marks import replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = "docs/reliability.md"
@@ -49,7 +49,7 @@ def run_tests(report: Path, examples: int, paths: list[str]) -> int:
 
 
 def rows_of(report: Path) -> list[Row]:
-    """Return what a report of pytest says of promises, in its order; skipped tests are left out."""
+    """Return the promises in a report of pytest, in its order, without skipped tests."""
     rows: dict[tuple[str, str], Row] = {}
     for case in ElementTree.parse(report).getroot().iter("testcase"):
         found = {entry.get("name"): entry.get("value", "") for entry in case.iter("property")}
@@ -63,19 +63,10 @@ def rows_of(report: Path) -> list[Row]:
     return list(rows.values())
 
 
-def with_table(page: str, rows: list[Row]) -> str:
-    """Return the page with the table of ``rows`` between its marks.
-
-    Raises:
-        CardboxError: the page has no such marks.
-    """
-    head, begin, rest = page.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not (begin and end):
-        raise CardboxError(f"{PAGE} has no '{BEGIN}' and '{END}'; put them where the table goes")
+def table_of(rows: list[Row]) -> str:
+    """Return the table of ``rows``, sorted by test."""
     lines = ["| promise | test | tried | survived |", "|---|---|---|---|"]
-    lines += [row.line() for row in sorted(rows, key=lambda row: row.test)]
-    return "\n".join([head + begin, "", *lines, "", end + tail])
+    return "\n".join(lines + [row.line() for row in sorted(rows, key=lambda row: row.test)])
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -89,7 +80,8 @@ def main(arguments: list[str] | None = None) -> int:
         code = run_tests(report, options.examples, options.paths)
         rows = rows_of(report)
     path = ROOT / PAGE
-    page = with_table(path.read_text(encoding="utf-8"), rows)
+    text = path.read_text(encoding="utf-8")
+    page = replaced(text, f"\n{table_of(rows)}\n", BEGIN, END)
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     print(f"{sum(row.tried for row in rows):,} inputs; written: {PAGE}")

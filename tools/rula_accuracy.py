@@ -1,4 +1,4 @@
-"""How far RULA scores are from those of the true joints, as a table for ``docs/ergonomics.md``.
+"""Error of RULA scores against those of the true joints, as a table for ``docs/ergonomics.md``.
 
 python -m tools.rula_accuracy SESSION...
 
@@ -10,17 +10,31 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.config import RulaConfig
+from cardbox_tracker.ergonomics.distribution import (
+    SAMPLES,
+    ScoreDistribution,
+    score_distribution,
+)
 from cardbox_tracker.ergonomics.recording import ABOVE
-from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.evaluation.recorded.rula import WAYS, ScoreError, score_errors
-from cardbox_tracker.evaluation.recorded.session import load_session
-from tools.readme_figures import replaced
+from cardbox_tracker.ergonomics.rula import rula_scores
+from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
+from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.sampling import normal_postures
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
+from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
+from cardbox_tracker.evaluation.recorded.tracking import track_session
+from tools.marks import replaced
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"
@@ -38,6 +52,96 @@ _HEAD = (
     "chance of the true score",
     f"time above {ABOVE}, true",
 )
+WAYS = ("mean posture", "normal", "particles", "always the same")
+"""Sources of a score: the mean posture; mean and deviations, as in the node; the particles; and the
+most frequent true score of the session, for comparison."""
+
+
+@dataclass(frozen=True)
+class ScoreError:
+    """Errors of scores over the images with a true score.
+
+    Attributes:
+        frames: number of images.
+        difference: mean absolute difference of the expected score.
+        equal: share of images whose likeliest score is the true one.
+        within_one: share of those where it is at most 1 off.
+        chance_of_truth: mean chance that the distribution gives the true score.
+        above: mean chance of a score above ``ABOVE``.
+        true_above: share of images whose true score is.
+    """
+
+    frames: int
+    difference: float
+    equal: float
+    within_one: float
+    chance_of_truth: float
+    above: float
+    true_above: float
+
+
+def score_errors(
+    session: RecordedSession, config: TrackerConfig, seed: int, tasks: Mapping[str, RulaConfig]
+) -> dict[str, dict[str, ScoreError]]:
+    """Track a session; return the error of each of ``WAYS`` for each of the ``tasks``.
+
+    Raises:
+        CardboxError: the recording cannot be read.
+        ValueError: the truth lacks the torso's angles, or nobody was tracked.
+    """
+    found: dict[int, dict[tuple[str, str], ScoreDistribution]] = {}
+    rng = np.random.default_rng(seed)
+    body: list[BodyModel] = []
+
+    def observe(_: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
+        if estimate.posture is None or estimate.posture_stddev is None:
+            return
+        body[:] = [tracker.body]
+        normal = normal_postures(estimate.posture, estimate.posture_stddev, SAMPLES, rng)
+        drawn = (estimate.posture[None], normal, tracker.sample(estimate, SAMPLES, rng))
+        found[stamp_ns] = {
+            (task, way): score_distribution(tracker.body, postures, rula)
+            for task, rula in tasks.items()
+            for way, postures in zip(WAYS, drawn, strict=False)
+        }
+
+    track_session(session, config, (seed,), observe=observe)
+    known = comparable(session, found)
+    stamps = session.stamps_ns[known].tolist()
+    errors: dict[str, dict[str, ScoreError]] = {}
+    for task, rula in tasks.items():
+        truth = true_scores(session, body[0], rula)[known]
+        same = np.eye(HIGHEST)[np.bincount(truth).argmax() - 1]
+        constant = [ScoreDistribution(same, same, same)] * len(truth)
+        of_way = [[found[s][task, way] for s in stamps] for way in WAYS[:-1]]
+        errors[task] = {
+            way: score_error(scores, truth)
+            for way, scores in zip(WAYS, [*of_way, constant], strict=True)
+        }
+    return errors
+
+
+def true_scores(session: RecordedSession, body: BodyModel, rula: RulaConfig) -> ScoreArray:
+    """Return the grand scores (n,) of the true joints with the lengths of ``body``."""
+    postures = true_postures(session)
+    return rula_scores(body, postures, rula).grand
+
+
+def score_error(scores: list[ScoreDistribution], truth: ScoreArray) -> ScoreError:
+    """Compare distributions with the true scores (n,)."""
+    means = np.array([one.mean for one in scores])
+    likeliest = np.array([one.likeliest for one in scores])
+    chances: FloatArray = np.array([one.grand for one in scores])
+    off = np.abs(likeliest - truth)
+    return ScoreError(
+        frames=len(truth),
+        difference=float(np.abs(means - truth).mean()),
+        equal=float((off == 0).mean()),
+        within_one=float((off <= 1).mean()),
+        chance_of_truth=float(chances[np.arange(len(truth)), truth - 1].mean()),
+        above=float(chances[:, ABOVE:].sum(axis=1).mean()),
+        true_above=float((truth > ABOVE).mean()),
+    )
 
 
 def row(name: str, task: str, way: str, error: ScoreError) -> str:

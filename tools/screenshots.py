@@ -4,7 +4,7 @@
 
 A synthetic session is recorded, its person measured and tracked, all without ROS; the same seed
 gives the same images. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` an image, its
-silhouette and the model over it, ``guidance.jpg`` what a person sees who is to be measured.
+silhouette and the model over it, ``guidance.jpg`` the guidance while a person is measured.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.session import synthesize_session
 
@@ -82,7 +82,7 @@ def _shots(
         for motion, part in _MOMENTS.items()
     }
     overlays: dict[str, ImageArray] = {}
-    frames: dict[str, Frame] = {}
+    frames: dict[str, RecordedFrame] = {}
     rng = np.random.default_rng(seed)
     tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
     span = segments["neutral"].start_s, max(moments.values()) + 1.0
@@ -103,7 +103,7 @@ def _shots(
 
 
 def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> ImageArray:
-    """What is shown before the references are captured, as in a mirror."""
+    """Draw the mirrored guidance before the references are captured."""
     guide = Guide(source.camera, InitializationConfig(2.0))
     shown = []
     for name, before_s, left_s in _GUIDED:

@@ -1,18 +1,17 @@
-"""Compare silhouettes with the true ones of recorded sessions, before and after an improvement.
+r"""Compare silhouettes with the true ones of recorded sessions, also in changing light.
 
-python -m tools.silhouette_report --sessions DIR... --output docs/evaluation/silhouettes.md
+python -m tools.silhouette_report --sessions DIR... [--light DIR] \
+    --output docs/evaluation/silhouettes.md
 
-A session is a folder with ``bag/``, ``ground_truth.json`` and ``masks.npz``. "Before" is brightness
-alone without following the light (``color: false``, ``soft_shadow: 0``, ``follow: false``).
+A session is a folder with ``bag/``, ``ground_truth.json`` and ``masks.npz``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,29 +21,20 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-    brightness_of,
-)
+from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
-from tools.silhouette_faults import Session, fault_lines
 
 Image = NDArray[np.uint8]
 # Factor of an image of a time (s) and a shape (H, W[, channels]).
 Light = Callable[[float, tuple[int, ...]], Any]
 
-AFTER = BackgroundConfig()
-BEFORE = replace(AFTER, color=False, soft_shadow=0.0, follow=False)
 # At the ends of the empty scene, somebody may be about to come in.
 _MARGIN_S = 0.2
 # A smaller part of the image is no person to be compared.
 _LEAST = 0.004
 _LIMBS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 _STEP_S = 6.0
-# Images that are cut out by one and then by the other, and how often in all.
-_TURN, _TURNS = 10, 60
+FIGURES = {"IoU": "iou", "missing": "missing", "extra": "extra", "arms found": "limbs"}
 
 
 def _lamp(time_s: float, _: tuple[int, ...]) -> float:
@@ -132,14 +122,14 @@ def images_of(folder: Path, light: Light | None) -> Iterator[tuple[float, Image]
             yield time_s, sent
 
 
-def rows_of(folder: Path, config: BackgroundConfig, light: Light | None = None) -> list[Row]:
+def rows_of(folder: Path, light: Light | None = None) -> list[Row]:
     """Compare every image of a session after its empty scene."""
     truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
     masks = read_masks(folder / "masks.npz")
     empty = next(s for s in truth["segments"] if s["name"] == "empty")
     with BagReader(folder / "bag") as bag:
         calibration = bag.calibration()
-    pipeline = SilhouettePipeline(calibration, WORKING_SIZE, config)
+    pipeline = SilhouettePipeline(calibration, WORKING_SIZE)
     scale = WORKING_SIZE[0] / float(truth["camera"]["width"])
     rows = []
     for number, (time_s, image) in enumerate(images_of(folder, light)):
@@ -187,93 +177,44 @@ def soon_after(rows: list[Row]) -> float:
     return mean(chosen, "iou")
 
 
-def session_lines(before: list[Row], after: list[Row], name: str) -> Iterator[str]:
-    """Yield the table's lines of one session: all of it, then each segment."""
-    for segment in (None, *dict.fromkeys(row.segment for row in after)):
-        pair = [[r for r in rows if segment in (None, r.segment)] for rows in (before, after)]
-        if not np.isfinite(mean(pair[1], "iou")):
-            continue
-        cells = [f"**{name}**" if segment is None else f"{segment}"]
-        for figure in ("iou", "missing", "extra", "limbs"):
-            cells += [f"{mean(rows, figure):.3f}" for rows in pair]
-        yield "| " + " | ".join(cells) + " |"
-
-
-def cost_ratio(folder: Path, grey: bool) -> float:
-    """Return the time of a silhouette over that of one before, in one run; the median of turns."""
-    truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
-    empty_s = next(s for s in truth["segments"] if s["name"] == "empty")["end_s"] - _MARGIN_S
-    with BagReader(folder / "bag") as bag:
-        pipeline = SilhouettePipeline(bag.calibration(), WORKING_SIZE)
-        learner, images = BackgroundLearner(), []
-        for image in bag.images():
-            prepared = pipeline.prepare(image.as_sent)
-            prepared = brightness_of(prepared) if grey else prepared
-            if learner.count < AFTER.learn_images:
-                learner.add(prepared)
-            elif (image.stamp_ns - bag.start_ns) / 1e9 <= empty_s:
-                continue
-            else:
-                images.append(prepared.copy())
-    before, after = (SilhouetteExtractor(learner.model(), config) for config in (BEFORE, AFTER))
-    ratios = []
-    for turn in range(_TURNS):
-        some = [images[(turn * _TURN + k) % len(images)] for k in range(_TURN)]
-        times = []
-        for extractor in (before, after):
-            start = time.perf_counter()
-            for one in some:
-                extractor(one)
-            times.append(time.perf_counter() - start)
-        ratios.append(times[1] / times[0])
-    return float(np.median(ratios))
-
-
-def report(sessions: list[Path], lit: Path | None) -> str:
-    """Return the document."""
-    columns = ("IoU", "missing", "extra", "arms found")
-    text = [
+def report(sessions: list[Path], lit: Path | None) -> Iterator[str]:
+    """Yield the document's lines."""
+    yield from (
         "# Silhouettes against the true ones",
         "",
         "Made by `python -m tools.silhouette_report`. Over all images with a person after the "
         "empty scene. *Missing* and *extra* pixels as a share of the person; *arms found*: share "
-        "of the true pixels along forearms and hands. Before: brightness alone, light not "
-        "followed (`color: false`, `soft_shadow: 0`, `follow: false`); after: the defaults. The "
-        f"scene is learned from its first {AFTER.learn_images} images, as the node does.",
+        "of the true pixels along forearms and hands. The scene is learned from its first "
+        f"{BackgroundConfig().learn_images} images, as the node does.",
         "",
-        "| session, segment | " + " | ".join(f"{c} before | after" for c in columns) + " |",
-        "|---|" + "---|" * 8,
-    ]
-    means: list[tuple[list[Row], list[Row]]] = []
+        f"| session | {' | '.join(FIGURES)} |",
+        "|---" * (1 + len(FIGURES)) + "|",
+    )
+    table = []
     for folder in sessions:
-        before, after = rows_of(folder, BEFORE), rows_of(folder, AFTER)
-        means.append((before, after))
-        text += session_lines(before, after, folder.name)
-        print("\n".join(session_lines(before, after, folder.name)).splitlines()[0], flush=True)
-    figures = ("iou", "missing", "extra", "limbs")
-    cells = [f"{np.nanmean([mean(p[k], f) for p in means]):.3f}" for f in figures for k in (0, 1)]
-    text.append(f"| **mean of {len(sessions)} sessions** | " + " | ".join(cells) + " |")
-    if lit is not None:
-        text += ["", f"## `{lit.name}` in changing light", ""]
-        text += ["IoU over all images, and 2 to 2.5 s after each step.", ""]
-        text += ["| light | before | after | after, 2 s after a step |", "|---|---|---|---|"]
-        for name, light in LIGHTS.items():
-            before, after = rows_of(lit, BEFORE, light), rows_of(lit, AFTER, light)
-            late = "-" if light is _drift else f"{soon_after(after):.3f}"
-            line = f"| {name} | {mean(before, 'iou'):.3f} | {mean(after, 'iou'):.3f} | {late} |"
-            text.append(line)
-            print(line, flush=True)
-        grey, color = (cost_ratio(lit, is_grey) for is_grey in (True, False))
-        text += [
-            "",
-            f"Time of a silhouette there, after over before, in turns of one run: {grey:.1f} for "
-            f"grey images, {color:.1f} for images in colour.",
-        ]
-        print(text[-1], flush=True)
-    print("faults", flush=True)
-    faults = fault_lines(Session(f, read_masks(f / "masks.npz")) for f in sessions)
-    text += ["", *faults]
-    return "\n".join(text) + "\n"
+        rows = rows_of(folder)
+        table.append([mean(rows, figure) for figure in FIGURES.values()])
+        yield _line(folder.name, table[-1])
+    yield _line(f"**mean of {len(sessions)}**", np.nanmean(table, axis=0).tolist())
+    if lit is None:
+        return
+    yield from (
+        "",
+        f"## `{lit.name}` in changing light",
+        "",
+        "IoU over all images, and 2 to 2.5 s after each step.",
+        "",
+        "| light | IoU | 2 s after a step |",
+        "|---|---|---|",
+    )
+    for name, light in LIGHTS.items():
+        rows = rows_of(lit, light)
+        yield _line(name, [mean(rows, "iou"), np.nan if light is _drift else soon_after(rows)])
+
+
+def _line(name: str, values: list[float]) -> str:
+    cells = [f"{value:.3f}" if np.isfinite(value) else "-" for value in values]
+    return f"| {name} | {' | '.join(cells)} |"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -283,8 +224,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--light", type=Path, metavar="DIR", help="session to change the light of")
     parser.add_argument("--output", type=Path, required=True)
     options = parser.parse_args(arguments)
-    text = report(options.sessions, options.light)
-    options.output.write_text(text, encoding="utf-8")
+    lines = []
+    for line in report(options.sessions, options.light):
+        print(line, flush=True)
+        lines.append(line)
+    options.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return 0
 
 

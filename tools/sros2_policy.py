@@ -35,7 +35,7 @@ from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
 _CONFIG = Path(__file__).resolve().parents[1] / "config"
-# What a person who operates the tracker needs: no parameters, no topics of ours to publish.
+# Rights of an operator of the tracker: no parameters, no published topics.
 OPERATOR = "operator"
 _TRIGGER = "std_srvs/srv/Trigger"
 _WAIT_S = 30.0

@@ -1,8 +1,9 @@
-"""What a person's parts look like: one histogram of colours, or of grey values, for each part.
+"""Appearance of a person: one histogram of colours or grey values for each part.
 
-Colours are counted in ``COLOR_STEPS`` equal steps a channel, grey values in ``GREY_STEPS``. The
-probabilities are kept as logarithms of one byte each, 1/255 of the way from that of a colour never
-seen to 1, and travel as text in the body model: a few kB, for most colours are never seen.
+Colours are counted in ``COLOR_STEPS`` equal steps a channel, grey values in ``GREY_STEPS``. Each
+probability is stored as one byte: its logarithm, scaled so that 0 is the probability of a colour
+never seen and 255 is 1. The bytes are compressed to a text of a few kB in the body model, since
+most colours are never seen.
 """
 
 from __future__ import annotations
@@ -23,27 +24,27 @@ HAND, FOREARM, TORSO, HEAD, LEGS = range(len(PARTS))
 
 COLOR_STEPS, GREY_STEPS = 12, 32
 UNSEEN = 0.1
-"""Share of a histogram that is spread evenly over all colours, so that one that was never seen
-speaks neither for nor against a part."""
+"""Share of a histogram that is spread evenly over all colours, so that a colour never seen
+is neutral evidence."""
 
 _LARGEST = 255
-# Brightness is kept in steps of this many grey levels; a median of whole numbers fits exactly.
+# Brightness is stored in steps of this many grey levels, which are exact for medians of integers.
 _BRIGHTNESS_STEP = 1 / 256
 _CHANNELS = (1, 3)
 
 
 def bins_of(channels: int) -> int:
-    """Return how many bins a histogram of images with 1 or 3 channels has."""
+    """Return the number of bins of a histogram of images with 1 or 3 channels."""
     return GREY_STEPS if channels == 1 else COLOR_STEPS**3
 
 
 def steps_of_levels(brightness: FloatArray, learned: FloatArray) -> NDArray[np.int32]:
-    """Return which step each level 0 to 255 of each channel falls into, (channels, 256).
+    """Return the step of each level 0 to 255 in each channel, (channels, 256).
 
     Args:
-        brightness: of the torso in the image, (channels,).
-        learned: of the torso when the colours were learned, (channels,): levels are scaled so that
-            the image is as bright.
+        brightness: brightness of the torso in the image, (channels,).
+        learned: brightness of the torso when the colours were learned, (channels,); levels are
+            scaled by the ratio of both.
     """
     steps = GREY_STEPS if len(learned) == 1 else COLOR_STEPS
     gains = learned / np.maximum(brightness, 1.0)
@@ -56,8 +57,9 @@ class Appearance:
     """The colours of one person's parts in one light.
 
     Attributes:
-        levels: of each part of ``PARTS`` and each bin, (5, bins), uint8, see the module; the bin of
-            a colour is its step in the first channel, then the second and the third.
+        levels: stored probability of each part of ``PARTS`` and each bin, (5, bins), uint8, see the
+            module; bins are ordered by the step in the first channel, then the second and the
+            third.
         brightness: median of each channel over the torso, (channels,), 1 for grey images, 3 for
             bgr; grey levels.
 
@@ -96,7 +98,7 @@ class Appearance:
 
     @property
     def is_grey(self) -> bool:
-        """True if it was learned from images without colour."""
+        """Whether it was learned from grey images."""
         return len(self.brightness) == 1
 
     @property
@@ -107,39 +109,40 @@ class Appearance:
         return histograms
 
     def __eq__(self, other: object) -> bool:
-        """Two appearances are equal when every number is."""
+        """Return whether all numbers are equal."""
         if not isinstance(other, Appearance):
             return NotImplemented
         return self._bytes() == other._bytes()
 
     def __hash__(self) -> int:
-        """Hash of every number, in step with equality."""
+        """Return a hash of all numbers."""
         return hash(self._bytes())
 
     def __repr__(self) -> str:
-        """Return a short text; the numbers say nothing to a reader."""
+        """Return a short text without the numbers."""
         return f"Appearance({'grey' if self.is_grey else 'colour'})"
 
     def _bytes(self) -> bytes:
-        """Channels, brightness in steps, levels."""
+        """Return the number of channels, the brightness in steps, and the levels."""
         brightness = np.round(self.brightness / _BRIGHTNESS_STEP).astype("<u2")
         return bytes([len(brightness)]) + brightness.tobytes() + self.levels.tobytes()
 
     def to_text(self) -> str:
-        """Return it as base64 of compressed bytes."""
+        """Return a base64 text of the compressed bytes."""
         return base64.b64encode(zlib.compress(self._bytes(), 9)).decode("ascii")
 
     @classmethod
     def from_text(cls, text: str) -> Appearance:
-        """Read what :meth:`to_text` wrote; blanks and line ends do not matter.
+        """Parse the text of :meth:`to_text`; white space is ignored.
 
         Raises:
-            BodyModelError: it is damaged.
+            BodyModelError: the text is damaged.
         """
         most = 1 + 2 * max(_CHANNELS) + len(PARTS) * bins_of(max(_CHANNELS))
         try:
             packed = base64.b64decode("".join(text.split()), validate=True)
-            # One byte more than fits, so that whatever is too long is seen, but not all of it made.
+            # One byte more than the limit shows that a text is too long without unpacking all of
+            # it.
             raw = zlib.decompressobj().decompress(packed, most + 1)
         except (binascii.Error, zlib.error, ValueError):
             raw = b""

@@ -38,7 +38,7 @@ TORSO_PATCHES = slice(0, 7)
 LEFT_ARM_PATCHES = slice(7, 11)
 RIGHT_ARM_PATCHES = slice(11, 15)
 NECK_PATCHES = slice(15, 16)
-"""The patch of an extended model with a neck; none of the paper's 15."""
+"""Patch of an extended model with a neck, which is not one of the paper's 15."""
 
 
 class PartPatches(NamedTuple):
@@ -58,7 +58,7 @@ class PartPatches(NamedTuple):
 
 
 def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
-    """Return the patches of one or many bodies before any posture.
+    """Return the patches of one or many bodies in the frames of their parts.
 
     Args:
         sizes_m: shape (..., 18).
@@ -96,7 +96,7 @@ def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float =
 
 
 def patches_at(body: BodyModel, frames: BodyFrames, neck_to_head: float = 0.0) -> FloatArray:
-    """Return the corners of the patches of ``body`` whose parts are at ``frames``.
+    """Return the corners of the patches, given the frames of the parts of ``body``.
 
     See :func:`cardbox_patches`, which takes postures.
     """
@@ -115,7 +115,7 @@ def patches_at(body: BodyModel, frames: BodyFrames, neck_to_head: float = 0.0) -
 
 
 def _frontal(part: Part[FloatArray]) -> FloatArray:
-    """Trapezoid (..., 4, 3) in the plane of Y and Z, through the part's axis."""
+    """Return a trapezoid (..., 4, 3) in the plane of Y and Z through the part's axis."""
     below, above = part.bottom_width_m / 2, part.top_width_m / 2
     return _quadrilateral(
         [part.forward_m] * 4,
@@ -125,7 +125,7 @@ def _frontal(part: Part[FloatArray]) -> FloatArray:
 
 
 def _sagittal(part: Part[FloatArray]) -> FloatArray:
-    """Rectangle (..., 4, 3) in the plane of X and Z."""
+    """Return a rectangle (..., 4, 3) in the plane of X and Z."""
     half, forward = part.depth_m / 2, part.forward_m
     return _quadrilateral(
         [-half + forward, half + forward, half + forward, -half + forward],
@@ -135,17 +135,17 @@ def _sagittal(part: Part[FloatArray]) -> FloatArray:
 
 
 def _lid(part: Part[FloatArray]) -> FloatArray:
-    """Horizontal rectangle (..., 4, 3) at the part's top."""
+    """Return a horizontal rectangle (..., 4, 3) at the part's top."""
     x, y = part.depth_m / 2, part.top_width_m / 2
     return _quadrilateral([-x, x, x, -x], [-y, -y, y, y], [part.top_m] * 4)
 
 
 def _quadrilateral(x: list[FloatArray], y: list[FloatArray], z: list[FloatArray]) -> FloatArray:
-    """Corners (..., 4, 3) from four coordinates (...) each."""
+    """Return corners (..., 4, 3) from four coordinates (...) each."""
     return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-1)
 
 
 def _place(corners: FloatArray, rotation: FloatArray, origin: FloatArray) -> FloatArray:
-    """Turn ``corners`` (k, 4, 3) by ``rotation`` (..., 3, 3), move them to ``origin`` (..., 3)."""
+    """Rotate ``corners`` (k, 4, 3) by ``rotation`` (..., 3, 3) and add ``origin`` (..., 3)."""
     placed: FloatArray = np.einsum("...ij,kcj->...kci", rotation, corners)
     return placed + origin[..., None, None, :]

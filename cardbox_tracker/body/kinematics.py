@@ -41,7 +41,7 @@ class Arm(NamedTuple):
 
 
 class BodyFrames(NamedTuple):
-    """Where every part is, in the reference frame.
+    """Frames of all parts in the reference frame.
 
     ``hip`` (mid-hip), ``neck`` (middle of the torso's top) and ``head`` (its centre) have shape
     (..., 3), metres; ``torso_rotation`` has shape (..., 3, 3).
@@ -56,22 +56,22 @@ class BodyFrames(NamedTuple):
 
 
 def rotation_x(angle_rad: FloatArray) -> FloatArray:
-    """Rotation matrices (..., 3, 3) about X by ``angle_rad`` (...)."""
+    """Return rotation matrices (..., 3, 3) about X by ``angle_rad`` (...)."""
     return _rotation(angle_rad, 1, 2)
 
 
 def rotation_y(angle_rad: FloatArray) -> FloatArray:
-    """Rotation matrices (..., 3, 3) about Y by ``angle_rad`` (...)."""
+    """Return rotation matrices (..., 3, 3) about Y by ``angle_rad`` (...)."""
     return _rotation(angle_rad, 2, 0)
 
 
 def rotation_z(angle_rad: FloatArray) -> FloatArray:
-    """Rotation matrices (..., 3, 3) about Z by ``angle_rad`` (...)."""
+    """Return rotation matrices (..., 3, 3) about Z by ``angle_rad`` (...)."""
     return _rotation(angle_rad, 0, 1)
 
 
 def _rotation(angle_rad: FloatArray, i: int, j: int) -> FloatArray:
-    """Rotation in the plane of axes ``i`` and ``j``, turning ``i`` towards ``j``."""
+    """Return the rotation in the plane of axes ``i`` and ``j`` that turns ``i`` towards ``j``."""
     angle = np.asarray(angle_rad, dtype=np.float64)
     matrix = np.zeros((*angle.shape, 3, 3))
     matrix[..., 3 - i - j, 3 - i - j] = 1.0
@@ -82,7 +82,7 @@ def _rotation(angle_rad: FloatArray, i: int, j: int) -> FloatArray:
 
 
 def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
-    """Return where the parts of ``body`` are in each posture.
+    """Return the frames of the parts of ``body`` in each posture.
 
     Args:
         body: the measured person.
@@ -112,7 +112,7 @@ def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
 def _arm(
     parts: BodyParts[float], torso: FloatArray, hip: FloatArray, angles: FloatArray, side: float
 ) -> Arm:
-    """``side`` is +1 for the left arm, -1 for the right."""
+    """Return the frames of an arm; ``side`` is +1 for the left arm, -1 for the right."""
     upper_arm = torso @ rotation_x(side * angles[..., 0]) @ rotation_y(-angles[..., 1])
     forearm = upper_arm @ rotation_x(side * angles[..., 2]) @ rotation_y(-angles[..., 3])
     shoulder = hip + torso @ (0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m)
@@ -122,14 +122,14 @@ def _arm(
 
 
 def with_shoulders(frames: BodyFrames, shoulders_m: FloatArray) -> BodyFrames:
-    """Return ``frames`` with both arms moved, each with its shoulder where it is said to be.
+    """Return ``frames`` with both arms translated to the given shoulders.
 
-    The whole-body filter lifts the shoulder of a raised arm, which :func:`forward_kinematics`, as
-    the paper has it, does not.
+    The whole-body filter lifts the shoulder of a raised arm; :func:`forward_kinematics` does not,
+    as in the paper.
 
     Args:
-        frames: of one or many postures.
-        shoulders_m: left, then right, (..., 2, 3), metres in the reference frame.
+        frames: frames of one or many postures.
+        shoulders_m: left and right shoulder, (..., 2, 3), metres in the reference frame.
     """
     arms = [
         arm._replace(shoulder=place, elbow=arm.elbow + moved, hand=arm.hand + moved)

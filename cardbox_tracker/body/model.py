@@ -1,8 +1,8 @@
-"""A measured body: a person, where they stand, and how the camera looks (paper, section II-A).
+"""Body model: sizes and placement of a person, and pose of the camera (paper, section II-A).
 
-This is what a model file holds and what the topic ``body_model`` carries; all of it stays the same
-while the person is tracked. The parts are separate, since a second camera adds a pose, another
-place changes the placement, and neither changes the person.
+A model file and the topic ``body_model`` contain this model, which is constant while the person is
+tracked. Its parts are separate, since a second camera adds a pose and another place changes the
+placement, and neither changes the person.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CONSTANTS = {**PLACEMENT, **CAMERA_POSE}
 """Range, unit and meaning of the numbers of placement and camera pose, by name."""
 
 MEASURED, PROPORTIONS = SOURCES = ("measured", "proportions")
-"""Where the sizes are from: reference postures, or the proportions of people of a stature."""
+"""Origin of the sizes: reference postures, or the proportions of people of a stature."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,16 @@ class BodyModel:
 
     Attributes:
         person: the 18 sizes.
-        placement: where mid-hip is.
-        camera_pose: how the camera stands.
-        side_turn: the way the person turned for the side reference, ``left`` or ``right``.
+        placement: position of mid-hip.
+        camera_pose: pose of the camera.
+        side_turn: turn of the person for the side reference, ``left`` or ``right``.
         appearance: the colours of the person's parts; None if they were not learned.
-        source: one of ``SOURCES``; what is from proportions is less exact.
-        unknown: names of sizes and of ``PLACEMENT`` whose values here are mere guesses; a tracker
-            fits them to the first silhouette of a person.
+        source: one of ``SOURCES``; sizes from proportions are less exact.
+        unknown: names of sizes and of ``PLACEMENT`` whose values are guesses; a tracker fits them
+            to the first silhouette of a person.
 
     Raises:
-        BodyModelError: ``side_turn`` or ``source`` is none of those, or a name is not known.
+        BodyModelError: ``side_turn``, ``source`` or a name in ``unknown`` is not valid.
     """
 
     person: Person = field(default_factory=Person)
@@ -51,7 +51,7 @@ class BodyModel:
     unknown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the words; the parts check themselves."""
+        """Check the names; the parts check themselves."""
         if self.side_turn not in SIDE_TURNS:
             raise BodyModelError(
                 f"side_turn is {quoted(self.side_turn)}; expected one of {SIDE_TURNS}"
@@ -67,12 +67,12 @@ class BodyModel:
 
     @classmethod
     def of(cls, sizes: FloatArray | None = None, **values: Any) -> BodyModel:
-        """Make a model of plain numbers.
+        """Create a model from plain numbers.
 
         Args:
-            sizes: shape (18,), metres; the default sizes without it.
+            sizes: shape (18,), metres; None for the default sizes.
             values: any of ``CONSTANTS``, ``side_turn``, ``appearance``, ``source`` and
-                ``unknown``; what is left out has its default.
+                ``unknown``; missing values have their defaults.
 
         Raises:
             BodyModelError: a number is outside of its range; the text names it.
@@ -101,7 +101,7 @@ class BodyModel:
 
     @property
     def constants(self) -> dict[str, float]:
-        """The numbers of placement and camera pose by name, ordered as ``CONSTANTS``."""
+        """Numbers of placement and camera pose by name, ordered as ``CONSTANTS``."""
         return {**asdict(self.placement), "camera_pitch_rad": self.camera_pose.pitch_rad}
 
     @property
@@ -114,12 +114,12 @@ class BodyModel:
         return self.person.size(name)
 
     def __str__(self) -> str:
-        """Return one line a size, in centimetres; a last one if they were not measured."""
+        """Return a line per size, in centimetres, and a remark if they were not measured."""
         return f"{self.person}\n{self.doubt}" if self.doubt else str(self.person)
 
     @property
     def doubt(self) -> str:
-        """What a reader should know of sizes that were not measured; else empty."""
+        """Remark on sizes that were not measured; empty for measured ones."""
         if self.source == MEASURED:
             return ""
         text = "sizes from the proportions of people, not measured: less exact"

@@ -1,6 +1,6 @@
-"""The YAML file of a body: written atomically, validated on reading.
+"""Reads and writes the YAML file of a body model: atomic writing, validation on reading.
 
-The same text travels on the ``body_model`` topic, so a saved file and a message are one format.
+The topic ``body_model`` carries the same text.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_sm
 FORMAT = "cardbox_body_model/1"
 _UNITS = {"length": "m", "angle": "rad"}
 _TOP_KEYS = ("format", "units", *CONSTANTS, "side_turn", "sizes")
-# A file without it is complete: older ones have none, and neither have bodies given by hand.
+# This key is optional: older files and bodies given by hand do not have it.
 _APPEARANCE = "appearance"
-# A file without them is of a measured person, of whom everything is known.
+# Without these keys, the person was measured and all values are known.
 _SOURCE, _UNKNOWN = "source", "unknown"
 _HEADERS = {
     MEASURED: "# A person measured by cardbox_tracker: what does not change while they are "
@@ -57,7 +57,7 @@ def dumps_body_model(model: BodyModel) -> str:
 
 
 def _yaml_number(value: float) -> str:
-    """Every digit of ``value``, as YAML 1.1 reads a number: 1.0e-05, where 1e-05 is a text."""
+    """Return all digits of ``value`` as a YAML 1.1 number: 1.0e-05, since 1e-05 is a text."""
     mantissa, e, exponent = repr(float(value)).partition("e")
     return f"{mantissa}.0{e}{exponent}" if e and "." not in mantissa else mantissa + e + exponent
 
@@ -67,10 +67,10 @@ def loads_body_model(text: str, source: str = "body model") -> BodyModel:
 
     Args:
         text: YAML as :func:`dumps_body_model` writes it.
-        source: what to call it in an error, such as a path or a topic.
+        source: name of the text in errors, such as a path or a topic.
 
     Raises:
-        BodyModelError: the text is no body model; the error names the key at fault.
+        BodyModelError: the text is no body model; the error names the wrong key.
     """
     try:
         data = parse_small_yaml(text)
@@ -101,7 +101,7 @@ def load_body_model(path: str | os.PathLike[str]) -> BodyModel:
 
 
 def save_body_model(model: BodyModel, path: str | os.PathLike[str]) -> None:
-    """Write ``model`` to ``path`` atomically: a reader sees the old file or the new one, whole.
+    """Write ``model`` to ``path`` atomically: a reader sees either the old file or the new one.
 
     Raises:
         BodyModelError: the file cannot be written.

@@ -1,12 +1,12 @@
-"""The shapes of the body's parts and the places of its joints, from the 18 sizes: in one place.
+"""Computes the shapes of the body's parts and the places of its joints from the 18 sizes.
 
 Every part is a box or frustum in a frame of its own: X forwards, Y to the person's left, Z up,
 metres. Torso, waist, neck and head share the torso's frame, whose origin is the middle of the hips.
 The origin of an upper arm is the shoulder joint, that of a forearm the elbow joint; both hang down
 along -Z.
 
-What draws or describes a body takes its shapes from here: the patches, the boxes of the volumetric
-model, the URDFs, the simulated person and, through the patches, the compiled cost.
+All representations of a body use these shapes: the patches, the boxes of the volumetric model, the
+URDFs, the simulated person and, through the patches, the compiled cost.
 """
 
 from __future__ import annotations
@@ -26,35 +26,35 @@ class Part(NamedTuple, Generic[Length]):
     """Extent of one part in its frame, metres; it is symmetric to the plane of X and Z."""
 
     bottom_m: Length
-    """Where it begins along Z."""
+    """Z coordinate of its bottom."""
     height_m: Length
     bottom_width_m: Length
-    """Along Y, at its bottom."""
+    """Width along Y at its bottom."""
     top_width_m: Length
-    """Along Y, at its top."""
+    """Width along Y at its top."""
     depth_m: Length
-    """Along X."""
+    """Depth along X."""
     forward_m: Length
-    """Where its axis is along X."""
+    """X coordinate of its axis."""
 
     @property
     def top_m(self) -> Length:
-        """Where it ends along Z."""
+        """Z coordinate of its top."""
         return self.bottom_m + self.height_m
 
     @property
     def middle_m(self) -> Length:
-        """Height of its centre along Z."""
+        """Z coordinate of its centre."""
         return self.bottom_m + self.height_m / 2
 
     @property
     def mean_width_m(self) -> Length:
-        """Width where no trapezoid can be shown."""
+        """Mean width, for shapes that are not trapezoids."""
         return (self.top_width_m + self.bottom_width_m) / 2
 
 
 class BodyParts(NamedTuple, Generic[Length]):
-    """All parts, and where the arms are joined to the torso; both arms are alike.
+    """All parts and the places of the shoulder joints; both arms are alike.
 
     The middle of the torso's top is ``torso.top_m``, the chin ``head.bottom_m``, the crown
     ``head.top_m``; an arm's part ends at minus its ``height_m``.

@@ -1,4 +1,4 @@
-"""A person's measures: the 18 sizes of the cardbox model, wherever they stand."""
+"""Sizes of a person: the 18 sizes of the cardbox model, independent of place and camera."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cardbox_tracker.errors import BodyModelError
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """The sizes of one person; the same before any camera and in any place.
+    """Sizes of one person, independent of place and camera.
 
     Attributes:
         sizes: shape (18,), metres, ordered as ``SIZE_NAMES``; kept read-only.
@@ -46,17 +46,17 @@ class Person:
         return float(self.sizes[SIZE_INDEX[name]])
 
     def __eq__(self, other: object) -> bool:
-        """Two persons are equal when every size is."""
+        """Return whether all sizes are equal."""
         if not isinstance(other, Person):
             return NotImplemented
         return np.array_equal(self.sizes, other.sizes)
 
     def __hash__(self) -> int:
-        """Hash of every size, in step with equality."""
+        """Return a hash of all sizes."""
         return hash(self.sizes.tobytes())
 
     def __str__(self) -> str:
-        """Return one line a size, in centimetres."""
+        """Return a line per size, in centimetres."""
         return "\n".join(
             f"{name:20s} {100 * value:6.1f} cm"
             for name, value in zip(SIZE_NAMES, self.sizes, strict=True)

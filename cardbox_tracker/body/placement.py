@@ -1,4 +1,4 @@
-"""Where a person stands and how the camera looks: what a body model holds beside the sizes.
+"""Placement of a person and pose of the camera, the parts of a body model beside the sizes.
 
 Both are given in the reference frame: origin at the camera's centre, X towards the camera, Y to the
 right of the image, Z up; level, whatever the camera's pitch.
@@ -21,7 +21,7 @@ CAMERA_POSE = {"camera_pitch_rad": (-1.4, 1.4, "rad", "how far the camera looks 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where mid-hip is in the front reference posture, metres in the reference frame.
+    """Position of mid-hip in the front reference posture, metres in the reference frame.
 
     Attributes:
         distance_m: level distance from the camera: X is ``-distance_m``.
@@ -45,10 +45,10 @@ class Placement:
 
 @dataclass(frozen=True)
 class CameraPose:
-    """How the camera stands in the reference frame; its centre is that frame's origin.
+    """Pose of the camera in the reference frame, whose origin is the camera's centre.
 
     Attributes:
-        pitch_rad: how far it looks down.
+        pitch_rad: downward pitch, rad.
 
     Raises:
         BodyModelError: the pitch is not finite or outside of its range.

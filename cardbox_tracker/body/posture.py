@@ -1,11 +1,23 @@
-"""The 12 posture angles d1..d12, the place beside them, limits and reference postures.
+"""Posture vector d1..d12, position of the hips, limits and reference postures.
 
 The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
 rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
 reference frame, 0 on the optical axis.
 
-The paper keeps the person's distance and height as they were measured. Where they are estimated
-too, they are ``torso_x`` and ``torso_z``, which are no part of the posture (12,).
+In the paper the person's distance and height stay as measured. If they are estimated, they are
+called ``torso_x`` and ``torso_z``; they are not part of the posture (12,).
+
+The anatomical ranges are from the American Academy of Orthopaedic Surgeons, "Joint Motion: Method
+of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"), in
+degrees: thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
+abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
+45; elbow flexion 150, none backwards (10 are allowed for a straight arm).
+
+The torso reaches from the hips to the neck, so the ranges of hips and spine add up, rounded down to
+the range of a standing person. The two angles of a limb reach every direction twice: flexion beyond
+90 degrees equals less flexion with the abduction turned by half a circle. Flexion therefore ends at
+about 90 degrees, and abduction covers the rest. A forearm can point to either side, since the upper
+arm of this model does not turn about its axis.
 """
 
 from __future__ import annotations
@@ -34,20 +46,10 @@ TORSO = slice(0, 4)
 LEFT_ARM = slice(4, 8)
 RIGHT_ARM = slice(8, 12)
 
-# Source of the anatomical ranges: American Academy of Orthopaedic Surgeons, "Joint Motion: Method
-# of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"):
-# thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
-# abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
-# 45; elbow flexion 150, none backwards (10 left for what a straight arm is).
-# The torso's line goes from the hips to the neck, so hips and spine add up, rounded down to what a
-# standing person holds. A limb's two angles reach every direction twice: flexion beyond 90 degrees
-# is the same as less flexion with the abduction turned by half a circle. So flexion ends at about
-# 90, where it reaches each direction once, and abduction takes the rest; a forearm can point to
-# either side, since this model's upper arm does not turn about its axis.
 _TORSO_LIMITS_DEG = ((-45, 45), (-25, 90), (-60, 60))
 _ARM_LIMITS_DEG = ((-45, 180), (-60, 90), (-150, 150), (-10, 95))
 TORSO_Y_LIMIT_M = 3.0
-"""A fixed camera sees no person further aside than this."""
+"""Largest sideways distance at which a fixed camera sees a person, metres."""
 
 JOINT_LIMITS: FloatArray = np.vstack(
     [
@@ -62,17 +64,17 @@ JOINT_LIMITS.setflags(write=False)
 
 _TURN_DEG = 100.0
 TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
-"""Shape (12, 2): the limits of somebody who also turns with the feet, to walk or to look aside."""
+"""Shape (12, 2): limits of a person who also turns with the feet, to walk or to look aside."""
 TURNING_LIMITS[3] = np.radians([-_TURN_DEG, _TURN_DEG])
 TURNING_LIMITS.setflags(write=False)
 
 PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
-"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
+"""Displacement of the hips towards the camera and upwards since the measurement, metres."""
 
 TORSO_X_LIMIT_M = 0.9
-"""A step or two to the camera or away from it; beyond that, measure with another distance."""
+"""Range of ``torso_x``, a step or two; beyond it, measure the person at another distance."""
 TORSO_Z_LIMIT_M = 0.3
-"""Hips move so far up and down between standing on tiptoe and bent knees."""
+"""Range of ``torso_z`` between standing on tiptoe and bent knees."""
 
 PLACE_LIMITS: FloatArray = np.array(
     [[-TORSO_X_LIMIT_M, TORSO_X_LIMIT_M], [-TORSO_Z_LIMIT_M, TORSO_Z_LIMIT_M]]
@@ -88,7 +90,7 @@ _STRETCHED_ABDUCTION_RAD = np.radians(80.0)
 
 
 def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
-    """Return the reference posture d_ref of that name.
+    """Return the reference posture d_ref with the given name.
 
     Args:
         name: ``front`` (facing the camera, arms 20 degrees away from the body), ``side`` (the same,
@@ -100,7 +102,7 @@ def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
         Shape (12,), rad and metres; ``torso_y`` is 0.
 
     Raises:
-        ValueError: ``name`` or ``side_turn`` is none of those.
+        ValueError: ``name`` or ``side_turn`` is unknown.
     """
     if name not in REFERENCE_NAMES:
         raise ValueError(f"reference posture {name!r} is unknown; it is one of {REFERENCE_NAMES}")
@@ -115,5 +117,5 @@ def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
 
 
 def clip_to_limits(postures: FloatArray) -> FloatArray:
-    """Return ``postures`` (..., 12) with every joint moved into its limits."""
+    """Return ``postures`` (..., 12) with every joint clipped to its limits."""
     return np.clip(postures, JOINT_LIMITS[:, 0], JOINT_LIMITS[:, 1])

@@ -1,11 +1,11 @@
-"""A body that nobody measured: the sizes that people of a stature have on average.
+"""Estimates a body from the stature: the mean sizes of people of that stature.
 
-Every size is a fraction of the stature, as in ``DEFAULT_SIZES``. Arm and trunk so have the lengths
-of Drillis & Contini, "Body Segment Parameters", 1966 (also in Winter,
-"Biomechanics and Motor Control of Human Movement"), with joint centres as de Leva, "Adjustments to
-Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996, puts them; breadths and depths are from
-ANSUR II, 2012. Among people of one stature lengths scatter by about 6 % and breadths by about 20 %,
-before clothes: such a body is less exact than a measured one.
+Every size is a fraction of the stature, as in ``DEFAULT_SIZES``. The lengths of arm and trunk are
+from Drillis & Contini, "Body Segment Parameters", 1966 (also in Winter, "Biomechanics and Motor
+Control of Human Movement"), with the joint centres of de Leva, "Adjustments to
+Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996. Breadths and depths are from ANSUR II,
+2012. Among people of one stature lengths vary by about 6 % and breadths by about 20 %, so such a
+body is less exact than a measured one.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from cardbox_tracker.body.ranges import check_range
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, FloatArray
 
 STATURE_M = 1.72
-"""The stature that ``DEFAULT_SIZES`` belongs to."""
+"""Stature that ``DEFAULT_SIZES`` belongs to, metres."""
 
 STATURE_LIMITS_M = (1.1, 2.2)
-"""A child of six, and a very tall adult."""
+"""Range of the stature, metres: a child of six to a very tall adult."""
 
 BREADTHS: tuple[str, ...] = (
     "shoulder_breadth",
@@ -29,7 +29,7 @@ BREADTHS: tuple[str, ...] = (
     "upper_arm_width",
     "forearm_width",
 )
-"""Sizes that the stature hardly tells, and the outline from the front shows."""
+"""Sizes that depend little on the stature and that the outline from the front shows."""
 
 
 def sizes_of_stature(stature_m: float) -> FloatArray:
@@ -45,14 +45,14 @@ def body_from_proportions(
     hip_height_m: float | None = None,
     camera_pitch_rad: float = 0.0,
 ) -> BodyModel:
-    """Return somebody of a stature; what is not given is unknown in the model.
+    """Return a body of the given stature; values that are not given are marked as unknown.
 
     Args:
         stature_m: height of the person, crown to floor.
         distance_m: level distance from the camera.
-        shoulder_breadth_m: between the shoulder joints.
-        hip_height_m: of the middle of the hips above the camera's centre.
-        camera_pitch_rad: how far the camera looks down.
+        shoulder_breadth_m: distance between the shoulder joints.
+        hip_height_m: height of the middle of the hips above the camera's centre.
+        camera_pitch_rad: downward pitch of the camera.
 
     Raises:
         BodyModelError: a number is outside of its range; the text names it.

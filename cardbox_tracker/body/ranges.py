@@ -1,4 +1,4 @@
-"""The check that every number of a body passes."""
+"""Range check for the numbers of a body model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ def check_range(name: str, value: float, lowest: float, highest: float, unit: st
     """Refuse a value that is not finite or lies outside ``lowest`` to ``highest``.
 
     Raises:
-        BodyModelError: the text gives name, value, unit and range, and guesses a wrong unit.
+        BodyModelError: the value is refused; the text gives name, value, unit, range and a likely
+            wrong unit.
     """
     if not math.isfinite(value):
         raise BodyModelError(f"{name} is {value}; expected a finite number of {unit}")

@@ -25,9 +25,7 @@ class Size(NamedTuple):
     description: str
 
 
-# The defaults are rounded means of adults of about 1.72 m (segment lengths after Drillis & Contini,
-# "Body Segment Parameters", 1966; breadths and depths after the ANSUR II summary statistics, 2012).
-# The ranges are wide enough for a child of ten years and for a very large adult.
+# Rounded means of adults; the ranges include a child of ten years and a very large adult.
 SIZES: tuple[Size, ...] = (
     Size("torso_top_width", 0.34, 0.10, 0.70, "width of the torso at its top"),
     Size("torso_bottom_width", 0.30, 0.10, 0.80, "width of the torso at its bottom"),

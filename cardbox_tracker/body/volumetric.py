@@ -1,4 +1,4 @@
-"""The 3D volumetric model of the paper's comparison: each part a box of six faces.
+"""Volumetric model of the paper's comparison: each part is a box with six faces.
 
 The boxes span the same sizes as the cardbox patches, so both models cover the same person; the
 volumetric one has 6 x 7 = 42 planes to draw where the cardbox has 15.
@@ -27,7 +27,7 @@ TRUNK_FACES = slice(0, 18)
 LEFT_ARM_FACES = slice(18, 30)
 RIGHT_ARM_FACES = slice(30, 42)
 
-# Corners of a box: 0-3 around its bottom, 4-7 around its top, in the same order.
+# Faces by corners of a box: 0-3 around its bottom, 4-7 around its top, in the same order.
 _FACES = np.array(
     [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 )
@@ -63,7 +63,7 @@ def volumetric_faces(body: BodyModel, postures: FloatArray) -> FloatArray:
 
 
 def _box(part: Part[float]) -> FloatArray:
-    """Corners (8, 3) of a part in its frame."""
+    """Return the corners (8, 3) of a part in its frame."""
     corners = []
     x, forward = part.depth_m / 2, part.forward_m
     for width_m, z in ((part.bottom_width_m, part.bottom_m), (part.top_width_m, part.top_m)):

@@ -1,1 +1,1 @@
-"""The ``cardbox`` command: one module per subcommand, and what they share."""
+"""The ``cardbox`` command: one module per subcommand, and shared modules."""

@@ -1,4 +1,4 @@
-"""Argument types and options that several subcommands share."""
+"""Argument types and options of several subcommands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,17 @@ REFERENCES = {
     "side": "stands the same, turned by 90 degrees",
     "arms": "faces the camera, both arms stretched sideways, hands open",
 }
-"""Names of the reference postures, and what the person does in them."""
+"""Reference postures by name, with the description for the person."""
+
+
+def add_retired(parser: argparse.ArgumentParser, flag: str, instead: str) -> None:
+    """Refuse the option ``flag`` of a former version; ``instead`` says what to do or expect."""
+
+    class Refuse(argparse.Action):
+        def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+            parser.error(f"{flag} was removed: {instead}")
+
+    parser.add_argument(flag, action=Refuse, nargs="?", help=argparse.SUPPRESS)
 
 
 def add_recording(
@@ -66,13 +76,13 @@ def add_depth(parser: argparse.ArgumentParser) -> None:
 
 
 def background_of(options: argparse.Namespace) -> TimeSpan | Within:
-    """Return what tells the person from the scene.
+    """Return the source of the silhouettes: the span of the empty scene, or a depth limit.
 
     Raises:
-        CardboxError: nothing does, or two things do.
+        CardboxError: neither or both are given.
     """
-    from cardbox_tracker.recordings.cameras import STEREO
     from cardbox_tracker.recordings.depth_silhouettes import Within
+    from cardbox_tracker.recordings.recording import STEREO
 
     if (options.within is None) == (options.background is None):
         raise CardboxError(
@@ -108,7 +118,7 @@ def add_references(parser: argparse.ArgumentParser) -> None:
 
 
 def print_remarks(source: SilhouetteSource, more: Iterable[str] = ()) -> None:
-    """Tell what is odd about a recording on the standard error, and ``more``."""
+    """Print the remarks on a recording, and ``more``, on the standard error."""
     for remark in (*source.remarks, *more):
         print(f"cardbox: {remark}", file=sys.stderr)
 
@@ -146,12 +156,12 @@ def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add ``--seed``; ``what`` says which random numbers it determines."""
+    """Add ``--seed``; ``what`` names the random numbers that it determines."""
     parser.add_argument("--seed", type=seed, default=0, help=f"random seed of {what}")
 
 
 def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
-    """Add ``--cameras`` with how many there are; ``several`` says what more than one are for."""
+    """Add ``--cameras``, a number; ``several`` describes the purpose of more than one."""
     parser.add_argument(
         "--cameras",
         type=int,
@@ -174,10 +184,10 @@ def add_camera_pitch(parser: argparse.ArgumentParser) -> None:
 
 
 def span(text: str) -> TimeSpan:
-    """Return the span that ``T0:T1`` means, in seconds from the start of the recording.
+    """Parse a span ``T0:T1``, seconds from the start of the recording.
 
     Raises:
-        argparse.ArgumentTypeError: it is not two such times, the first before the second.
+        argparse.ArgumentTypeError: the text is not two times, the first before the second.
     """
     from cardbox_tracker.recordings.silhouettes import TimeSpan
 
@@ -191,10 +201,10 @@ def span(text: str) -> TimeSpan:
 
 
 def time(text: str) -> float:
-    """Return a time in seconds from the start of the recording.
+    """Parse a time in seconds from the start of the recording.
 
     Raises:
-        argparse.ArgumentTypeError: it is not a finite number, or it is negative.
+        argparse.ArgumentTypeError: the text is no finite number, or it is negative.
     """
     try:
         value = float(text)
@@ -208,27 +218,27 @@ def time(text: str) -> float:
 
 
 def seed(text: str) -> int:
-    """Return a seed: a whole number of 0 or more."""
+    """Parse a seed, an integer of 0 or more."""
     return _integer(text, 0)
 
 
 def particle_count(text: str) -> int:
-    """Return a number of particles: 2 or more."""
+    """Parse a number of particles, 2 or more."""
     return _integer(text, 2)
 
 
 def run_count(text: str) -> int:
-    """Return a number of runs: 2 or more, so that there is a spread."""
+    """Parse a number of runs, 2 or more, so that their deviation is defined."""
     return _integer(text, 2)
 
 
 def seed_count(text: str) -> int:
-    """Return a number of seeds: 1 or more."""
+    """Parse a number of seeds, 1 or more."""
     return _integer(text, 1)
 
 
 def process_count(text: str) -> int:
-    """Return a number of processes: 1 or more."""
+    """Parse a number of processes, 1 or more."""
     return _integer(text, 1)
 
 

@@ -1,12 +1,14 @@
-"""``cardbox benchmark``: the speed on this machine."""
+"""``cardbox benchmark``: the speed on this machine, measured by ``benchmarks/`` of a checkout."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from cardbox_tracker.commands.checkout import from_checkout
+
 NAME = "benchmark"
-HELP = "measure how fast the tracker is on this machine"
+HELP = "measure how fast the tracker is on this machine (in a checkout)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,9 +21,8 @@ def run(options: argparse.Namespace) -> None:
     """Measure, write the results and print a short table.
 
     Raises:
-        CardboxError: the results cannot be written.
+        CardboxError: this is no checkout, or the results cannot be written.
     """
-    from cardbox_tracker.benchmarks.run import run_benchmark, short_table
-
-    print(short_table(run_benchmark(options.json, options.report)))
+    benchmark = from_checkout("benchmarks.run", "benchmark")
+    print(benchmark.short_table(benchmark.run_benchmark(options.json, options.report)))
     print(f"wrote {options.json}" + (f" and {options.report}" if options.report else ""))

@@ -1,4 +1,4 @@
-"""``cardbox body``: somebody of a stature, from the proportions of people."""
+"""``cardbox body``: makes a body model from a stature and the proportions of people."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cardbox calibrate-extrinsics``: where the cameras of a recording stand."""
+"""``cardbox calibrate-extrinsics``: estimates the extrinsics of a recording's cameras."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Find the poses, write them and print how sure they are.
+    """Estimate the extrinsics, write them and print their uncertainty.
 
     Raises:
         CardboxError: the recording or a span cannot be used, no pose fits, or the file cannot be
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_outputs((options.output,), options.force, inputs=(options.recording,))
     pitch_rad = math.radians(options.camera_pitch_deg)
-    # An impossible distance or pitch is refused by its own name.
+    # The body model refuses an impossible distance or pitch by name.
     BodyModel.of(distance_m=options.distance, camera_pitch_rad=pitch_rad)
     config = InitializationConfig(
         distance_m=options.distance,

@@ -1,4 +1,4 @@
-"""``cardbox call``: a service of the running nodes."""
+"""``cardbox call``: calls a service of the running nodes."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def run(options: argparse.Namespace) -> None:
     """Call the service and print its answer.
 
     Raises:
-        RosMissingError: there is no rclpy.
-        CardboxError: the service is missing, or it answered that it failed.
+        RosMissingError: rclpy is not installed.
+        CardboxError: the service is missing, or its answer reports a failure.
     """
     try:
         from cardbox_tracker.ros.runtime.call import call_service
@@ -33,6 +33,6 @@ def run(options: argparse.Namespace) -> None:
         print(text, flush=True)
 
     answer = call_service(options.service, say)
-    # Some answers are a node's last status, too.
+    # Some answers repeat the last status of a node.
     if answer != said[-1]:
         print(answer)

@@ -1,4 +1,4 @@
-"""What a subcommand of ``cardbox`` consists of."""
+"""Interface of a subcommand of ``cardbox``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import Protocol
 class Command(Protocol):
     """A subcommand; each is a module of this folder with these four names.
 
-    A module imports what is slow to load inside ``add_arguments`` and ``run``, so that
-    ``cardbox --help`` stays fast.
+    Slow imports are inside ``add_arguments`` and ``run``, so that ``cardbox --help`` is fast.
 
     Attributes:
-        NAME: as it is typed after ``cardbox``.
+        NAME: name that is typed after ``cardbox``.
         HELP: one line for ``cardbox --help``, without a capital letter or a full stop.
     """
 
@@ -21,11 +20,11 @@ class Command(Protocol):
     HELP: str
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add the subcommand's arguments to its own ``parser``."""
+        """Add the arguments of the subcommand to its ``parser``."""
 
     def run(self, options: argparse.Namespace) -> None:
         """Do the work and print the result.
 
         Raises:
-            CardboxError: the user can put it right; ``cardbox`` prints the text and returns 1.
+            CardboxError: the user can correct the cause; ``cardbox`` prints the text and returns 1.
         """

@@ -1,4 +1,4 @@
-"""``cardbox demo``: the whole chain on a synthetic recording."""
+"""``cardbox demo``: runs the whole chain on a synthetic recording."""
 
 from __future__ import annotations
 

@@ -1,8 +1,12 @@
-"""``cardbox evaluate``: the paper's experiments, or recorded sessions with ground truth."""
+"""``cardbox evaluate``: recorded sessions with ground truth, or the paper's experiments.
+
+``experiments/`` of a checkout has the experiments.
+"""
 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
@@ -12,10 +16,13 @@ from cardbox_tracker.commands.arguments import (
     run_count,
     seed_count,
 )
+from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "evaluate"
-HELP = "repeat the paper's experiments, or compare recorded sessions with their truth"
+HELP = (
+    "compare recorded sessions with their truth, or (in a checkout) repeat the paper's experiments"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,25 +82,24 @@ def run(options: argparse.Namespace) -> None:
     """Run the experiments and write report, plots and numbers.
 
     Raises:
-        CardboxError: a session cannot be read, or the results cannot be written.
+        CardboxError: a session cannot be read, the results cannot be written, or the experiments
+            are not there.
     """
     name = "sessions.md" if options.sessions else "report.md"
     inputs = options.sessions or ([options.session] if options.session else [])
     check_outputs((), options.force, inputs=inputs, results=(options.output / name,))
 
-    from cardbox_tracker.evaluation.paper.evaluate import evaluate
-    from cardbox_tracker.evaluation.paper.runner import default_jobs
-
+    jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.sessions:
-        _sessions(options, options.jobs or default_jobs())
+        _sessions(options, jobs)
         return
-    evaluate(
+    from_checkout("experiments.evaluate", "experiments").evaluate(
         options.output,
         options.runs,
         options.seed,
         options.quick,
         options.session,
-        options.jobs or default_jobs(),
+        jobs,
     )
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
 

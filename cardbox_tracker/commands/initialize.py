@@ -1,4 +1,4 @@
-"""``cardbox initialize``: the body of the person in a recording."""
+"""``cardbox initialize``: measures the person in a recording."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cardbox_tracker.errors import CardboxError
 NAME = "initialize"
 HELP = "measure the person in a recording"
 
-# Where the search for the distance begins when depth images or two cameras measure it.
+# Initial distance of the search where depth images or two cameras measure it.
 _GUESSED_M = 2.0
 
 
@@ -53,23 +53,23 @@ def run(options: argparse.Namespace) -> None:
     """Measure the person, write the body model and print its sizes.
 
     Raises:
-        CardboxError: the recording cannot be read, its references show other postures than they
-            should or give no body, or the model cannot be written.
+        CardboxError: the recording cannot be read, its references show wrong postures or give no
+            body, or the model cannot be written.
     """
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.cameras import CameraSources, open_recording
     from cardbox_tracker.recordings.initialize import (
         describe,
         initialize_from_cameras,
         initialize_from_recording,
         initialize_with_depth,
     )
+    from cardbox_tracker.recordings.recording import open_recording
 
     pitch_rad = math.radians(options.camera_pitch_deg)
-    # An impossible distance or pitch is refused by its own name, before anything follows from it.
+    # The body model refuses an impossible distance or pitch by name, before they are used.
     if options.distance is None and options.depth is None and len(options.cameras) < 2:
         raise CardboxError(
             "one camera does not show how far away the person is; give --distance M, --depth "
@@ -101,9 +101,9 @@ def run(options: argparse.Namespace) -> None:
         ) as source,
         progress_bar("initialize") as show,
     ):
-        if options.distance is not None or not isinstance(source, CameraSources):
+        if options.distance is not None:
             result = initialize_from_recording(source.first, spans, config, show)
-        elif options.depth is not None:
+        elif source.measures_depth:
             result = initialize_with_depth(source, spans, config, show)
         else:
             result = initialize_from_cameras(source, spans, config, show)

@@ -1,13 +1,14 @@
-"""The ``cardbox`` command: its subcommands, and what it does when one of them fails."""
+"""The ``cardbox`` command: parses the arguments, runs a subcommand and reports its errors."""
 
 from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Container, Sequence
 
-from cardbox_tracker import __version__
+from cardbox_tracker import __version__, interrupts
 from cardbox_tracker.commands import (
     benchmark,
     body,
@@ -24,11 +25,9 @@ from cardbox_tracker.commands import (
     view,
 )
 from cardbox_tracker.commands.command import Command
-from cardbox_tracker.commands.signals import Terminated, ended_by_signals
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.interrupts import INTERRUPTED, were_received
 
-# In the order of 'cardbox --help'.
+# The order is that of 'cardbox --help'.
 COMMANDS: tuple[Command, ...] = (
     demo,
     synthesize,
@@ -44,7 +43,7 @@ COMMANDS: tuple[Command, ...] = (
     call,
     evaluate,
 )
-# Subcommands of former versions, and what replaces each.
+# Replacements of the subcommands of former versions.
 RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
@@ -64,7 +63,7 @@ Times are seconds from the start of the recording.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``cardbox``; return its exit code: 0, or 1 after an error told in words.
+    """Run ``cardbox``; return its exit code: 0, 1 after an error, 128 + N after the signal N.
 
     Raises:
         SystemExit: the arguments are wrong (code 2), or they ask for help or the version (code 0).
@@ -72,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     try:
-        with ended_by_signals():
+        with interrupts.raised():
             parser = build_parser(words)
             if name in RETIRED:
                 parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
@@ -82,21 +81,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CardboxError as error:
         print(f"cardbox {name}: {error}", file=sys.stderr)
         return 1
-    except Terminated as end:
-        print(f"cardbox {name}: terminated", file=sys.stderr)
-        return 128 + end.signal
     except KeyboardInterrupt:
         return _interrupted(name)
     except BrokenPipeError:
-        # As in 'cardbox urdf MODEL.yaml | head': the reader has closed the pipe, which is no error.
+        # The reader has closed the pipe, as in 'cardbox urdf MODEL.yaml | head', which is no error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
-        if were_received():
-            # What a signal interrupts may fail in its own way: ROS, an import.
+        if interrupts.received():
+            # An interrupted import or call of ROS raises errors of its own.
             return _interrupted(name)
         if not isinstance(error, OSError):
             raise
-        # Such as a full disk. Files are written under another name first: none is left half done.
+        # This may be a full disk. Outputs are written atomically, so none is left incomplete.
         where = f"{error.filename}: " if error.filename else ""
         print(f"cardbox {name}: {where}{error.strerror or error}", file=sys.stderr)
         return 1
@@ -104,16 +100,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupted(name: str) -> int:
-    print(f"cardbox {name}: interrupted", file=sys.stderr)
-    return INTERRUPTED
+    number = interrupts.received() or signal.SIGINT
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    print(f"cardbox {name}: {word}", file=sys.stderr)
+    return 128 + number
 
 
 def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentParser:
     """Return the parser of ``cardbox``.
 
     Args:
-        words: what was typed. Only a subcommand among them gets its arguments, for their choices
-            may need slow imports. Without ``words``, all subcommands get theirs.
+        words: arguments of the command line. Only the subcommand among them gets its arguments,
+            since their choices may need slow imports; if None, all subcommands get theirs.
     """
     parser = argparse.ArgumentParser(
         prog="cardbox", formatter_class=_Formatter, description=_DESCRIPTION, epilog=_EPILOG
@@ -136,7 +134,7 @@ def build_parser(words: Container[str] = _EVERY_COMMAND) -> argparse.ArgumentPar
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
-    """Mentions a default only where there is one."""
+    """Help formatter that shows a default only if there is one."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=26)

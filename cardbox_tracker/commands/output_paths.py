@@ -1,4 +1,4 @@
-"""What the subcommands that write something ask of their outputs, before they begin."""
+"""Checks the outputs of subcommands before the work begins."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def check_outputs(
     inputs: Sequence[Path | None] = (),
     results: Iterable[Path] = (),
 ) -> None:
-    """Refuse what could not be written, or would destroy something, before any work is done.
+    """Refuse outputs that cannot be written or would overwrite something, before any work is done.
 
     Args:
-        outputs: files to write; None are left out.
+        outputs: files to write; None is ignored.
         force: whether files that exist may be replaced.
-        inputs: files and recordings that are read; they are never replaced. None are left out.
-        results: files and folders that are written in ways of their own: only ``force`` and
-            ``inputs`` are looked at.
+        inputs: files and recordings that are read, which are never replaced; None is ignored.
+        results: files and folders that other code writes; only ``force`` and ``inputs`` are
+            checked.
 
     Raises:
         CardboxError: an output exists, is an input, is named twice, or cannot be written.
@@ -54,7 +54,7 @@ def check_outputs(
 
 
 def _is_something(path: Path) -> bool:
-    """Whether there is a file, or a folder with anything in it, that would be lost."""
+    """Return whether there is a file, or a folder with content, that would be lost."""
     if path.is_dir():
         return any(path.iterdir())
     return path.exists() and not is_written_in_place(path)
@@ -66,7 +66,7 @@ def _files_of(inputs: Iterable[Path | None]) -> Iterator[Path]:
             continue
         yield path
         if path.is_dir():
-            # A session's folder has its recording in a folder of its own.
+            # The recording of a session is in a subfolder.
             yield from path.glob("*")
             yield from (path / "bag").glob("*")
 

@@ -1,4 +1,4 @@
-"""``cardbox retarget``: a robot arm follows a person's arm."""
+"""``cardbox retarget``: moves a robot arm as a person's arm."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Move the robot through a recording and write what was asked for.
+    """Retarget a recording to the robot and write the results.
 
     Raises:
         CardboxError: the bag, the robot or the map cannot be read, or a result cannot be written.

@@ -1,4 +1,4 @@
-"""``cardbox rula``: the RULA score of a recording, with its uncertainty."""
+"""``cardbox rula``: computes the RULA score of a recording, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person, score every image, and say for how long the score was high.
+    """Track the person, score every image, and print the time at each level.
 
     Raises:
         CardboxError: the recording or the body model cannot be read, a setting is out of range, or

@@ -1,4 +1,4 @@
-"""``cardbox synthesize``: a recording of a synthetic person."""
+"""``cardbox synthesize``: records a synthetic person."""
 
 from __future__ import annotations
 

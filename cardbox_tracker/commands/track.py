@@ -12,6 +12,7 @@ from cardbox_tracker.commands.arguments import (
     add_depth,
     add_preset,
     add_recording,
+    add_retired,
     add_seed,
     background_of,
     particle_count,
@@ -87,11 +88,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
         metavar="N",
         help="particles of each of the three filters; without it, the preset's",
     )
-    parser.add_argument(
-        "--refine-sizes",
-        action="store_true",
-        help="refine the breadths while tracking, slowly and near the model's",
-    )
+    add_retired(parser, "--refine-sizes", "breadths stay as they were measured")
     add_seed(parser, "the filters")
 
 
@@ -136,7 +133,7 @@ def track_inputs(
     """
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.cameras import open_recording
+    from cardbox_tracker.recordings.recording import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
     from cardbox_tracker.recordings.track import track_recording
 
@@ -184,13 +181,10 @@ def track_inputs(
 def _config(options: argparse.Namespace) -> TrackerConfig:
     """Return the preset with what the options change in it."""
     from cardbox_tracker.estimation.config import PRESETS
-    from cardbox_tracker.estimation.cost.depth import Depth
 
-    config = replace(
-        PRESETS[options.preset](), strategy=options.strategy, refine_sizes=options.refine_sizes
-    )
+    config = replace(PRESETS[options.preset](), strategy=options.strategy)
     if options.depth is not None:
-        config = replace(config, terms=(*config.terms, Depth()))
+        config = config.with_depth()
     if options.particles is None:
         return config
     try:

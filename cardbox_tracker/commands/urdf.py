@@ -1,4 +1,4 @@
-"""``cardbox urdf``: the robot description of a measured person."""
+"""``cardbox urdf``: prints the robot description of a measured person."""
 
 from __future__ import annotations
 

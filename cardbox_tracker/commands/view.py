@@ -1,4 +1,4 @@
-"""``cardbox view``: results in the viewer Rerun, without ROS, or of running nodes."""
+"""``cardbox view``: shows results in the viewer Rerun, from a recording or from running nodes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
     """Show a bag of results, a recording that is tracked meanwhile, or the running nodes.
 
     Raises:
-        CardboxError: rerun-sdk is not installed, or what is to be shown cannot be read.
+        CardboxError: rerun-sdk is not installed, or the input cannot be read.
     """
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")

@@ -10,6 +10,7 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
@@ -26,7 +27,6 @@ from cardbox_tracker.ros.messages.measurement import mean_iou_of
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 # The same topics as in the bag of 'cardbox track --bag'; /tf is derived from two of them.
@@ -82,7 +82,7 @@ class Client:
         self._stamp_ns = 0
         rclpy.init(args=[])
         self._node = rclpy.create_node("cardbox_demo", enable_rosout=False)
-        self._executor = make_executor()
+        self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         for topic, (kind, profile) in topics_of(cameras).items():
             self._node.create_subscription(

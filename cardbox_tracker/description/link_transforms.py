@@ -1,7 +1,7 @@
-"""Where every link of a robot description is beside its parent: what TF says of it.
+"""Transforms from every link of a robot description to its parent, as published on TF.
 
-They are read from the URDF itself, so that TF and URDF cannot disagree; robot_state_publisher does
-the same from ``robot_description`` and ``joint_states``.
+They are computed from the URDF itself, so that TF and URDF agree; robot_state_publisher does the
+same from ``robot_description`` and ``joint_states``.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from xml.etree import ElementTree as Xml
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-"""x, y, z, w."""
+"""Unit quaternion x, y, z, w."""
 
 _TURNING = ("revolute", "continuous")
 
 
 class LinkTransform(NamedTuple):
-    """The frame of ``child`` seen from ``parent``: metres, and a unit quaternion x, y, z, w."""
+    """Pose of the frame ``child`` in ``parent``: metres, and a unit quaternion x, y, z, w."""
 
     parent: str
     child: str
@@ -28,7 +28,7 @@ class LinkTransform(NamedTuple):
 
 
 class _Joint(NamedTuple):
-    """A joint; ``at_zero`` is its transform while its value is 0."""
+    """A joint; ``at_zero`` is its transform at the value 0."""
 
     name: str
     kind: str
@@ -51,11 +51,11 @@ class LinkTransforms:
     """The transforms of a URDF with fixed, revolute, continuous and prismatic joints.
 
     Attributes:
-        joint_names: of the joints that move, in the order of the URDF.
+        joint_names: names of the movable joints, in the order of the URDF.
     """
 
     def __init__(self, urdf: str) -> None:
-        """Read the joints of ``urdf``, XML text of :mod:`.urdf` or of another program."""
+        """Parse the joints of ``urdf``, the XML text of a URDF."""
         joints = [_joint(element) for element in Xml.fromstring(urdf).findall("joint")]
         self._fixed = [joint.at_zero for joint in joints if joint.kind == "fixed"]
         self._movable = [joint for joint in joints if joint.kind != "fixed"]
@@ -65,7 +65,7 @@ class LinkTransforms:
         """Return the transform of every link but the root, at ``positions``, rad and metres.
 
         Raises:
-            ValueError: a joint that moves has no position.
+            ValueError: a movable joint has no position.
         """
         missing = [name for name in self.joint_names if name not in positions]
         if missing:

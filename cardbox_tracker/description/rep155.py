@@ -1,12 +1,12 @@
-"""The posture in the joints of REP-155, the ROS convention for people around robots.
+"""Converts postures to the joints of REP-155, the ROS convention for people around robots.
 
-Its reference model (package human_description) has a shoulder of three joints and an elbow of one:
-with s = 1 on the left and -1 on the right,
+The reference model (package human_description) has three joints in a shoulder and one in an elbow.
+With s = 1 on the left and -1 on the right,
 
     R_upper_arm = R_torso Rz(-s y) Rx(s p) Rz(s r),    R_forearm = R_upper_arm Ry(-e)
 
-so p says how far the arm is raised, y to which side (0: outwards, 90 degrees: forwards), r turns
-the upper arm about its own axis and e bends the elbow. If the arm hangs (p = 0), y is undefined; if
+so p raises the arm, y gives the direction (0: outwards, 90 degrees: forwards), r turns the upper
+arm about its own axis and e bends the elbow. If the arm hangs (p = 0), y is undefined; if
 it is straight (e = 0), r is undefined; at rest both are. Also, two pairs of angles describe each
 direction: (y, p) and (y + 180 degrees, -p), likewise (r, e). If the positive values were always
 taken, the joints would jump by half a turn when an arm swings through rest. :class:`Rep155Joints`
@@ -38,14 +38,14 @@ REP155_JOINTS: tuple[str, ...] = (
 )
 """Joint names without the suffix ``_<id>``; the first four are d1..d4, in their order."""
 REP155_PLACE: tuple[str, ...] = ("x_body", "z_body")
-"""The same of ``torso_x`` and ``torso_z``, which follow the others."""
+"""Joint names of ``torso_x`` and ``torso_z``, which follow the others."""
 
 LOWEST_RAISE_RAD = -np.pi / 3
-"""An arm swings so far through rest before its other pair of angles is taken."""
+"""Lowest p: an arm that swings further through rest gets its other pair of angles, rad."""
 LOWEST_BEND_RAD = -np.pi / 6
-"""The same of the elbow, which REP-155 bends in one direction only."""
+"""Lowest e of the elbow, which REP-155 bends in one direction only, rad."""
 
-# Nearer to the singular direction the other angle is kept: less than a millimetre of an arm.
+# Nearer than this to the singular direction the other angle is kept.
 _MEANINGLESS_RAD = 1e-3
 
 
@@ -56,7 +56,7 @@ def joint_names(body_id: str, torso_place: bool = True) -> list[str]:
 
 
 class Rep155Joints:
-    """Converts one person's postures, one after the other."""
+    """Converts the postures of one person in order of time."""
 
     def __init__(self) -> None:
         """Start with all angles 0."""
@@ -72,7 +72,7 @@ class Rep155Joints:
         upper_arm = rotation_x(side * angles[0]) @ rotation_y(-angles[1])
         forearm = upper_arm @ rotation_x(side * angles[2]) @ rotation_y(-angles[3])
         last = self._last[side]
-        # Where the limbs point to, mirrored to the left.
+        # Directions of the limbs, mirrored to the left side.
         mirror = np.array([1.0, side, 1.0])
         upper, lower = -upper_arm[:, 2] * mirror, -forearm[:, 2] * mirror
         # upper = (sin y sin p, cos y sin p, -cos p)
@@ -89,7 +89,7 @@ def _angles(
 ) -> tuple[float, float]:
     """Return turn and tilt with (sine, cosine) = sin(tilt) (sin, cos)(turn) and up = cos(tilt).
 
-    Of the two solutions it is the one nearer to the last, if its tilt is not below ``lowest``.
+    The solution that is nearer to the last one is returned if its tilt is not below ``lowest``.
     """
     tilt = float(np.arctan2(np.hypot(sine, cosine), up))
     sign = 1.0 if last_tilt >= 0 else -1.0
@@ -102,6 +102,6 @@ def _angles(
 
 
 def _near(angle: float, last: float) -> float:
-    """``angle`` plus the whole turns that bring it nearest to ``last``; stays within two turns."""
+    """Return ``angle`` plus the whole turns that bring it nearest to ``last``, within two turns."""
     near = last + np.remainder(angle - last + np.pi, 2 * np.pi) - np.pi
     return float(near if abs(near) <= 2 * np.pi else np.remainder(near + np.pi, 2 * np.pi) - np.pi)

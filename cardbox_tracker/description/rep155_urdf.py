@@ -43,7 +43,7 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
         body: the measured person.
         body_id: ending of all link and joint names; letters, digits and underscores.
         optical_frame: frame of the camera, the root of the tree.
-        torso_place: also have the joints of the person's place, as the joint states must then.
+        torso_place: add the joints of the person's place, which the joint states then must contain.
     """
     robot = add_robot(f"human_{body_id}")
     end = f"_{body_id}"
@@ -88,7 +88,7 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
 def _arm(
     robot: Xml.Element, parts: BodyParts[float], prefix: str, material: str, side: float, end: str
 ) -> None:
-    """``side`` is +1 for the left arm, -1 for the right."""
+    """Add an arm; ``side`` is +1 for the left arm, -1 for the right."""
     parent, origin = "torso" + end, (0.0, side * parts.shoulder_aside_m, 0.0)
     for joint, child, axis, limits in (
         ("y_shoulder", "y_shoulder", (0, 0, -side), _FULL),
@@ -123,7 +123,7 @@ def _up(height_m: float) -> tuple[float, float, float]:
 def _seen_from_camera(
     body: BodyModel,
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Where the middle of the hips is in the optical frame when d1 is 0, as URDF has it."""
+    """Return the URDF origin of the middle of the hips in the optical frame while d1 is 0."""
     down = body.camera_pose.pitch_rad
     # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
     rotation = np.array(
@@ -138,7 +138,7 @@ def _seen_from_camera(
 
 
 def _rpy(rotation: FloatArray) -> tuple[float, float, float]:
-    """Roll, pitch, yaw with Rz(yaw) Ry(pitch) Rx(roll) = ``rotation`` (3, 3)."""
+    """Return roll, pitch and yaw with Rz(yaw) Ry(pitch) Rx(roll) = ``rotation`` (3, 3)."""
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], level)
     if level < 1e-9:  # straight up or down: roll and yaw turn about the same axis

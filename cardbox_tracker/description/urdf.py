@@ -1,4 +1,4 @@
-"""A robot description (URDF) of a measured person.
+"""Robot description (URDF) of a measured person.
 
 Its movable joints are those of the joint states, by the same names and signs: the posture's 12, and
 ``torso_x`` and ``torso_z``. So robot_state_publisher and RViz show the person from them alone:
@@ -52,17 +52,17 @@ def urdf_from_body(
 
     Args:
         body: the measured person.
-        optical_frame: if given, also add the camera's optical frame of that name, pitched as the
-            body model says, so that markers and keypoints show up in the same tree.
+        optical_frame: name of the camera's optical frame; if given, it is added with the camera's
+            pitch, so that markers and keypoints are in the same tree.
         name: name of the robot.
-        torso_place: also have the joints ``torso_x`` and ``torso_z``; the joint states must then
-            have them too, or there is no transform beyond the hips.
+        torso_place: add the joints ``torso_x`` and ``torso_z``; the joint states then must contain
+            them, or the transforms beyond the hips are missing.
     """
     robot = add_robot(name)
     add_link(robot, ROOT_LINK)
     if optical_frame:
         add_link(robot, optical_frame)
-        # Level optical axes seen from REP-103 axes, then turned down by the pitch about X.
+        # Optical axes in the axes of REP-103, then rotated down by the pitch about X.
         rpy = (-math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2)
         add_joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
     add_link(robot, "hips")
@@ -76,7 +76,7 @@ def urdf_from_body(
 
 
 def _place(robot: Xml.Element) -> str:
-    """Add the joints of the place behind the hips and return their last link."""
+    """Add the joints of the place below the hips and return their last link."""
     parent = "hips"
     for joint, axis in zip(PLACE_NAMES, ((1, 0, 0), (0, 0, 1)), strict=True):
         child = f"{joint}_link"
@@ -110,7 +110,7 @@ def _trunk(robot: Xml.Element, parts: BodyParts[float], parent: str) -> None:
 
 
 def _arm(robot: Xml.Element, parts: BodyParts[float], name: str, side: float) -> None:
-    """``side`` is +1 for the left arm, -1 for the right: abduction is mirrored, flexion is not."""
+    """Add an arm; ``side``, +1 left and -1 right, mirrors the abduction but not the flexion."""
     shoulder = (0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m)
     parent, origin = "torso", shoulder
     for joint, limb, part in (

@@ -1,4 +1,4 @@
-"""The elements of a URDF: links, visible boxes, joints."""
+"""Builds the elements of a URDF: links, visible boxes, joints."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from cardbox_tracker.body.parts import Part
 Vector = Sequence[float]
 
 PATCH_THICKNESS_M = 0.004
-"""A patch is shown as a box of this thickness."""
+"""Thickness of the boxes that show patches, metres."""
 
 COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.85 0.45 0.2 0.9"}
 """Colour of each material."""
-# URDF requires both; the values do not describe a person.
+# URDF requires both values, but nothing uses them.
 _FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
 
 
 def add_robot(name: str) -> Xml.Element:
-    """Return a robot of that name with the materials of ``COLORS``."""
+    """Return a robot named ``name`` with the materials of ``COLORS``."""
     robot = Xml.Element("robot", name=name)
     for material, rgba in COLORS.items():
         Xml.SubElement(Xml.SubElement(robot, "material", name=material), "color", rgba=rgba)
@@ -32,7 +32,7 @@ def add_link(robot: Xml.Element, name: str) -> Xml.Element:
 
 
 def add_box(link: Xml.Element, material: str, extent_m: Vector, centre_m: Vector) -> None:
-    """Add a box of that extent, along the axes of ``link``."""
+    """Add a visible box along the axes of ``link``, extents in metres."""
     visual = Xml.SubElement(link, "visual")
     Xml.SubElement(visual, "origin", xyz=_text(centre_m), rpy="0 0 0")
     Xml.SubElement(Xml.SubElement(visual, "geometry"), "box", size=_text(extent_m))
@@ -60,7 +60,7 @@ def add_joint(
     axis: Vector | None = None,
     limits: Vector = (0.0, 0.0),
 ) -> None:
-    """Add a joint of that ``kind``; a movable one has an axis, and limits in rad or metres."""
+    """Add a joint of type ``kind``; a movable one has an axis, and limits in rad or metres."""
     joint = Xml.SubElement(robot, "joint", name=name, type=kind)
     Xml.SubElement(joint, "parent", link=parent)
     Xml.SubElement(joint, "child", link=child)

@@ -1,1 +1,1 @@
-"""Images and shapes for people to look at: overlay, guidance, markers, video."""
+"""Draws results for people: overlay, guidance, markers, video."""

@@ -1,4 +1,4 @@
-"""Draw instructions that are read from two metres away: an outline, few words, a big number."""
+"""Draws instructions that are readable from two metres: an outline, few words, a big number."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from cardbox_tracker.vision.rasterisation import in_front
 Bgr = tuple[int, int, int]
 
 FIT_BGR: dict[str, Bgr] = {"far": (60, 60, 255), "nearly": (0, 190, 255), "fits": (70, 220, 70)}
-"""Colour of the outline, red, amber or green, by how well the person fits into it."""
+"""Colour of the outline by the fit of the person: red, amber or green."""
 MOOD_BGR: dict[str, Bgr] = {"ask": (50, 40, 30), "good": (50, 120, 30), "bad": (30, 60, 170)}
-"""Ground of the words, by whether they ask for something, praise or refuse."""
+"""Background of the words by their mood: a request, praise or a refusal."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
-# Fractions of the image's height, and of its width.
+# Fractions of the image's height and width.
 _BAND, _LINE_HEIGHT, _NUMBER_HEIGHT = 0.30, 0.095, 0.24
 _WIDTH = 0.94
 _LINES = 2
-# As fractions of the image's width.
+# Fractions of the image's width.
 _OUTLINE, _ARROW = 1 / 110, 1 / 45
 _NOSE_M, _NOSE_HALF_M = 0.08, 0.045
-# Somebody whose face points more to the side than this, of 1, is drawn with nose and arrow.
+# Sideways component of the facing direction above which nose and arrow are drawn.
 _SIDEWAYS = 0.5
 
 
 class Asked(NamedTuple):
-    """The posture that a person is to take.
+    """The posture that a person is asked to take.
 
     Attributes:
-        body: of about the person's size, where they stand.
-        camera: working camera, pitched as the body model says.
+        body: a body of about the person's size, at their place.
+        camera: camera at the working resolution, with the pitch of the body model.
         posture: (12,), rad and metres.
-        fit: how well they are in it: ``far``, ``nearly`` or ``fits``.
+        fit: fit of the person to the posture: ``far``, ``nearly`` or ``fits``.
     """
 
     body: BodyModel
@@ -61,16 +61,16 @@ def draw_guidance(
     scale: int = 1,
     mirror: bool = False,
 ) -> ImageArray:
-    """Return a colour image of what a person is to do, with the words in a band above it.
+    """Return a colour image with instructions for a person and the words in a band above it.
 
     Args:
         image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
-        words: a few; they are written in two lines at most.
+        words: a few words, which are written in at most two lines.
         mood: colour of the band: ``ask``, ``good`` or ``bad``.
-        number: seconds left, beside the head; None for none.
-        asked: outline to stand in, with nose and arrow if it looks aside; None for none.
+        number: seconds left, beside the head; None for no number.
+        asked: outline to stand in, with nose and arrow if it looks aside; None for no outline.
         scale: enlargement of the result.
-        mirror: swap left and right of the image, not of words and number, as in a mirror.
+        mirror: mirror the image, but not words and number.
 
     Returns:
         (1.3 scale H, scale W, 3) bgr.
@@ -111,7 +111,7 @@ def _draw_nose(
     depth_m: float,
     colour: Bgr,
 ) -> None:
-    """Draw the nose of somebody who looks in the direction ``forward``."""
+    """Draw the nose of a person who looks in the direction ``forward``."""
     face, up = head_m + 0.5 * depth_m * forward, np.array([0.0, 0.0, _NOSE_HALF_M])
     points = view.reference_to_optical(np.array([face + up, face + _NOSE_M * forward, face - up]))
     if not in_front(points).all():
@@ -130,7 +130,7 @@ def _draw_turn(canvas: ImageArray, view: Camera, hip_m: FloatArray, side: int) -
         return
     column = float(np.clip(view.project(hip)[0], 0.25 * width, 0.75 * width))
     row, wide, high = 0.74 * height, 0.2 * width, 0.1 * height
-    # From the viewer's side, at the bottom of the ellipse, to where the face will point.
+    # The arrow leads from the bottom of the ellipse to the direction in which the face will point.
     turned = np.radians(np.linspace(115.0, 8.0, 24))
     points = np.stack([column + side * wide * np.cos(turned), row + high * np.sin(turned)], axis=1)
     tip = points[-1] + (0.0, -0.16 * height)
@@ -146,7 +146,7 @@ def _draw_turn(canvas: ImageArray, view: Camera, hip_m: FloatArray, side: int) -
 
 
 def _draw_number(canvas: ImageArray, text: str) -> None:
-    """Write in the upper left corner: beside the head of a person in the middle."""
+    """Write the number in the upper left corner, beside the head of a person in the middle."""
     height, width = canvas.shape[:2]
     size = _size_of_height(_NUMBER_HEIGHT * height)
     thickness = _thickness(size)
@@ -156,7 +156,7 @@ def _draw_number(canvas: ImageArray, text: str) -> None:
 
 
 def _draw_tick(canvas: ImageArray) -> None:
-    """Tick in the upper right corner, for those who cannot tell red from green."""
+    """Draw a tick in the upper right corner, for people who cannot tell red from green."""
     height, width = canvas.shape[:2]
     tall = _NUMBER_HEIGHT * height
     corner = np.array([0.96 * width - 1.1 * tall, 0.05 * height])
@@ -168,7 +168,7 @@ def _draw_tick(canvas: ImageArray) -> None:
 
 
 def _band(words: str, mood: str, width: int, height: int) -> ImageArray:
-    """Return the words on their ground, ``width`` px wide, for an image of ``height`` px."""
+    """Return a band with the words, ``width`` px wide, for an image of ``height`` px."""
     tall = round(_BAND * height)
     band = np.full((tall, width, 3), MOOD_BGR[mood], np.uint8)
     lines = _two_lines(words)
@@ -183,7 +183,7 @@ def _band(words: str, mood: str, width: int, height: int) -> ImageArray:
 
 
 def _two_lines(words: str) -> list[str]:
-    """Return the words in two lines as equally long as they can be, a few words in one."""
+    """Return few words in one line, or else two lines of lengths as equal as possible."""
     if len(words) <= 16:
         return [words] if words else []
     for width in range(len(words) // _LINES, len(words) + 1):
@@ -206,7 +206,7 @@ def _size_of_height(height_px: float) -> float:
 
 
 def _size_of_width(text: str, width_px: int) -> float:
-    # Bold letters are wider than thin ones, so their width is taken at the thickness drawn.
+    # Bold letters are wider, so the width is measured at the thickness that is drawn.
     size = _size_of_height(_LINE_HEIGHT * width_px * 0.75)
     drawn_px = cv2.getTextSize(text, _FONT, size, _thickness(size))[0][0]
     return size * _WIDTH * width_px / max(drawn_px, 1)

@@ -1,4 +1,4 @@
-"""What a person who is to be measured sees: themselves, the posture asked for, and words."""
+"""Draws the guidance of the measurement: the person, the posture to take, and words."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cardbox_tracker.vision.camera import Camera
 Silhouette = NDArray[np.uint8]
 
 _SCALE = 2
-# What is not the person is so much darker.
+# Factor of the brightness outside the person.
 _DARKER = 2
 
 
@@ -27,12 +27,12 @@ class Guide:
     """Draws prompts of the guidance for one camera.
 
     Attributes:
-        camera: the working camera.
-        config: distance and turn of the person, pitch of the camera.
+        camera: camera at the working resolution.
+        config: settings with distance and turn of the person and pitch of the camera.
     """
 
     def __init__(self, camera: Camera, config: InitializationConfig) -> None:
-        """Draw for people before ``camera`` as ``config`` says."""
+        """Prepare the guidance for a person before ``camera``."""
         self.camera, self.config = camera, config
         self._fit = LiveFit(camera, config)
 
@@ -44,8 +44,8 @@ class Guide:
         Args:
             prompt: what to do.
             silhouette: (H, W), 0 or 255, of the camera's size.
-            image: what it is cut out of, (H, W) or (H, W, 3) bgr; without it, the silhouette.
-            mirror: show it as a mirror would.
+            image: image of the silhouette, (H, W) or (H, W, 3) bgr; None to show the silhouette.
+            mirror: show a mirror image.
         """
         picture = silhouette
         if image is not None:
@@ -57,7 +57,7 @@ class Guide:
         )
 
     def _asked(self, name: str, silhouette: Silhouette) -> Asked:
-        """Return the outline of somebody of mean size where the person stands, or in the middle."""
+        """Return the outline of a person of mean size, at the person's place or in the middle."""
         config = self.config
         body = BodyModel.of(
             distance_m=config.distance_m,

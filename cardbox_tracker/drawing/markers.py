@@ -1,4 +1,4 @@
-"""What the markers of a posture look like; the same live and in a recording, without rclpy."""
+"""Shapes of the markers of a posture, without rclpy, for nodes and recordings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cardbox_tracker.vision.camera import Camera
 
 Rgba = tuple[float, float, float, float]
 
-# As visualization_msgs/Marker numbers them.
+# Constants of visualization_msgs/Marker.
 LINE_LIST, TRIANGLE_LIST = 5, 11
 
 _SKELETON_WIDTH_M = 0.02
@@ -25,16 +25,16 @@ _TRIANGLES = (0, 1, 2, 0, 2, 3)
 
 
 class MarkerShape(NamedTuple):
-    """One marker.
+    """Shape of one marker.
 
     Attributes:
-        namespace: what it shows, ``patches`` or ``skeleton``.
+        namespace: content of the marker, ``patches`` or ``skeleton``.
         kind: ``TRIANGLE_LIST`` or ``LINE_LIST``.
-        scale: of a marker: 1 for triangles, the width in metres for lines.
+        scale: 1 for triangles, the width in metres for lines.
         points_m: (n, 3), three corners per triangle or both ends of each line, metres in the
             optical frame.
-        rgba: colour of the whole, where ``colors`` is empty.
-        colors: colour of each point, or none.
+        rgba: colour of the whole marker, used if ``colors`` is empty.
+        colors: colour of each point, or empty.
     """
 
     namespace: str
@@ -50,7 +50,7 @@ def marker_shapes(
 ) -> tuple[MarkerShape, MarkerShape]:
     """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``.
 
-    The shoulders are those of ``keypoints_m`` (6, 3), metres in the optical frame, if given.
+    If ``keypoints_m`` (6, 3), metres in the optical frame, are given, they place the shoulders.
     """
     frames = model_frames(body, camera, posture, keypoints_m)
     corners = camera.reference_to_optical(patches_at(body, frames))

@@ -1,4 +1,4 @@
-"""Where the parts of a tracked person are, for everything that draws them."""
+"""Frames of the parts of a tracked person, for drawing."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "rig
 def model_frames(
     body: BodyModel, camera: Camera, posture: FloatArray, keypoints_m: FloatArray | None
 ) -> BodyFrames:
-    """Return where the parts of ``body`` are, with the shoulders where they were found.
+    """Return the frames of the parts of ``body``, with the estimated shoulders.
 
     Args:
-        body: the person, where they are.
-        camera: pitched as the body model says.
+        body: the person at their present place.
+        camera: camera with the pitch of the body model.
         posture: (12,), rad and metres.
-        keypoints_m: (6, 3), metres in the optical frame; None for shoulders that nothing lifts.
+        keypoints_m: (6, 3), metres in the optical frame; None for the shoulders of the posture.
     """
     frames = forward_kinematics(body, posture)
     if keypoints_m is None:

@@ -1,4 +1,4 @@
-"""Draw the model over an image: parts, outline, skeleton, and how well it fits."""
+"""Draws the model over an image: parts, outline, skeleton, and the fit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OUTLINE_BGR = (60, 220, 60)
 SKELETON_BGR = (0, 140, 255)
 JOINT_BGR = (255, 255, 255)
 TEXT_BGR = (255, 255, 255)
-# The colours of the markers and of the URDF: torso, left, right.
+# Colours of the markers and of the URDF: torso, left, right.
 _PART_BGR = {"left": (102, 179, 51), "right": (51, 115, 217)}
 _TORSO_BGR = (191, 115, 64)
 _FILL = 0.4
@@ -39,7 +39,7 @@ OUTLINE_SHIFT = 1
 
 
 class Drawable(Protocol):
-    """What an overlay shows of an estimate."""
+    """The attributes of an estimate that an overlay shows."""
 
     @property
     def state(self) -> str:
@@ -55,14 +55,14 @@ class Drawable(Protocol):
 
     @property
     def cost_px(self) -> int | None:
-        """Equation (2), or None."""
+        """Cost of equation (2), px, or None."""
 
     @property
     def iou(self) -> float | None:
-        """Fit, or None."""
+        """Fit (intersection over union), or None."""
 
     def placed(self, body: BodyModel) -> BodyModel:
-        """Return ``body`` where the estimate finds it."""
+        """Return ``body`` at the estimated place."""
 
 
 def draw_overlay(
@@ -73,9 +73,9 @@ def draw_overlay(
     Args:
         image: (H, W) grey or silhouette, or (H, W, 3) bgr, of the camera's size.
         body: the measured person.
-        camera: working camera, pitched as the body model says.
-        estimate: what to draw; without a posture only its state is written, and where the posture
-            may be wrong, outline and state are amber.
+        camera: camera at the working resolution, with the pitch of the body model.
+        estimate: the estimate to draw; without a posture only its state is written, and if the
+            posture may be wrong, outline and state are amber.
         scale: enlargement of the result, so that thin lines and text stay readable.
 
     Returns:
@@ -110,13 +110,13 @@ def draw_model(
 ) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
-    Tinted patches by side, the outline of them all in ``outline_bgr``, and the skeleton; with the
-    shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if there are any.
+    Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. The skeleton
+    has the shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if given.
     """
     frames = model_frames(body, camera, posture, keypoints_m)
     patches = patches_at(body, frames)
     tint = canvas.copy()
-    # The torso first, so that an arm in front of it stays visible.
+    # The torso is drawn first, so that an arm in front of it stays visible.
     parts = sorted(_polygons(camera, patches), key=lambda part: part[0] in _PART_BGR)
     for name, polygon in parts:
         colour = _PART_BGR.get(name, _TORSO_BGR)
@@ -136,7 +136,7 @@ def draw_outline(
 ) -> None:
     """Draw the common outline of ``patches`` (15, 4, 3) into ``canvas`` (H, W, 3), in place.
 
-    ``thickness`` is in pixels; without it the line suits the canvas.
+    ``thickness`` is in px; by default it depends on the size of the canvas.
     """
     width = thickness or max(1, round(camera.width / 200))
     outlines = outlines_of(camera, patches)
@@ -166,13 +166,13 @@ def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thick
 def draw_text(
     canvas: ImageArray, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
 ) -> None:
-    """Write ``text`` into the upper left corner of ``canvas``, in place; ``line`` counts down."""
+    """Write ``text`` into the upper left corner of ``canvas``, in place; lines count downwards."""
     scale = canvas.shape[1] / 700
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
     (width, height), below = cv2.getTextSize(text, font, size, thickness)
     margin = round(8 * scale)
     left, bottom = margin, margin + height + line * (height + below + margin)
-    # On a dark background the text is readable in front of any wall.
+    # A dark background makes the text readable before any wall.
     corner = (left + width + margin // 2, bottom + below)
     cv2.rectangle(
         canvas, (left - margin // 2, bottom - height - margin // 2), corner, (0, 0, 0), -1
@@ -190,12 +190,12 @@ def _polygons(camera: Camera, patches: FloatArray) -> Iterator[tuple[str, FloatA
 
 
 def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
-    """Return the outlines of all patches together, px with ``OUTLINE_SHIFT`` fractional bits."""
+    """Return the common outlines of all patches, px with ``OUTLINE_SHIFT`` fractional bits."""
     fine = camera.scaled(*(size << OUTLINE_SHIFT for size in (camera.width, camera.height)))
     model = np.zeros((fine.height, fine.width), np.uint8)
     for _, polygon in _polygons(fine, patches):
         cv2.fillConvexPoly(model, _subpixels(polygon), 255, cv2.LINE_8, _SHIFT)
-    # A patch seen edge-on is a thin line that does not show where the part ends.
+    # A patch seen edge-on is a thin line that does not show the extent of the part.
     whisker = max(3, fine.width // 128)
     opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
     found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -203,14 +203,14 @@ def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
 
 
 def enlarged(image: ImageArray, scale: int) -> ImageArray:
-    """Return a copy of (H, W) or (H, W, 3) as (scale H, scale W, 3), bgr."""
+    """Return an enlarged bgr copy, (scale H, scale W, 3), of an image (H, W) or (H, W, 3)."""
     height, width = image.shape[:2]
     size = (scale * width, scale * height)
     return np.array(cv2.resize(_bgr(image), size, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def _subpixels(pixels: FloatArray) -> NDArray[np.int32]:
-    """Pixel coordinates as OpenCV's drawing takes them, with ``_SHIFT`` fractional bits."""
+    """Return pixel coordinates in OpenCV's fixed-point format with ``_SHIFT`` fractional bits."""
     clipped = np.clip(pixels, -30_000, 30_000)
     return np.asarray(np.round(clipped * (1 << _SHIFT)), dtype=np.int32)
 

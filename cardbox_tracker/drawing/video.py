@@ -1,4 +1,4 @@
-"""Write a video file, completely or not at all."""
+"""Writes a video file completely or not at all."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cardbox_tracker.files import atomic_path
 def video_file(
     path: str | os.PathLike[str], size: tuple[int, int], fps: float
 ) -> Iterator[Callable[[NDArray[np.uint8]], object]]:
-    """Yield a function that takes the images (H, W, 3), bgr, of a video.
+    """Yield a function that adds an image (H, W, 3), bgr uint8, to a video.
 
     Args:
         path: file to write, .mp4 or .avi.
@@ -26,7 +26,7 @@ def video_file(
         fps: frames a second.
 
     Raises:
-        CardboxError: the file cannot be written, or its kind is unknown.
+        CardboxError: the file cannot be written, or its suffix is not .mp4 or .avi.
     """
     name = os.fspath(path)
     if not name.endswith((".mp4", ".avi")):

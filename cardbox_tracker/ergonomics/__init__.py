@@ -1,1 +1,1 @@
-"""What a posture means for the body's strain: scores of the work sciences; no ROS."""
+"""Ergonomic scores of postures, without ROS."""

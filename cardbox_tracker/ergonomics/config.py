@@ -1,4 +1,4 @@
-"""What RULA asks and an outline of the upper body cannot show, and what the paper leaves open."""
+"""Settings of RULA: inputs that an outline does not show, and limits that the paper leaves open."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _DECLARED = "declared, since it is not measured"
 
 @dataclass(frozen=True)
 class RulaConfig:
-    """Settings of the score; the first ones describe the task, the last ones draw lines.
+    """Settings of the score: inputs that describe the task, then limits of angles.
 
     Raises:
         ValueError: a value is out of its range; the text names it.

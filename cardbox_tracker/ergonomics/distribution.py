@@ -1,4 +1,4 @@
-"""The score of an uncertain posture: how likely each value is."""
+"""Probability distribution of the score of an uncertain posture."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from cardbox_tracker.ergonomics.rula import rula_scores
 from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
 
 SAMPLES = 500
-"""Postures of a distribution: a chance of a half is then known to 0.02."""
+"""Samples of a distribution; the standard error of a probability of 0.5 is then 0.02."""
 
 _SCORES = np.arange(1, HIGHEST + 1)
 
 
 class ScoreDistribution(NamedTuple):
-    """Chances (7,) of the grand scores 1 to 7, each adding up to 1.
+    """Probabilities (7,) of the grand scores 1 to 7; each array adds up to 1.
 
     Attributes:
-        grand: of the worse arm.
-        left: of the left arm.
-        right: of the right arm.
+        grand: probabilities for the worse arm.
+        left: probabilities for the left arm.
+        right: probabilities for the right arm.
     """
 
     grand: FloatArray
@@ -38,23 +38,23 @@ class ScoreDistribution(NamedTuple):
 
     @property
     def likeliest(self) -> int:
-        """Grand score with the largest chance; of equal ones the lowest."""
+        """Most probable grand score; the lowest of equally probable ones."""
         return int(np.argmax(self.grand)) + 1
 
     def chance_above(self, score: int) -> float:
-        """Return the chance that the grand score is higher than ``score``."""
+        """Return the probability that the grand score is higher than ``score``."""
         return float(self.grand[score:].sum())
 
 
 def expected(chances: FloatArray) -> float:
-    """Return the expected score of chances (7,)."""
+    """Return the expected score of probabilities (7,)."""
     return float(chances @ _SCORES)
 
 
 def score_distribution(
     body: BodyModel, postures: FloatArray, config: RulaConfig
 ) -> ScoreDistribution:
-    """Return how likely each score is, given equally likely postures (n, 12) of ``body``."""
+    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``."""
     scores = rula_scores(body, postures, config)
     return ScoreDistribution(*map(_chances, (scores.grand, scores.left.grand, scores.right.grand)))
 

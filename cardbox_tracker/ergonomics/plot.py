@@ -1,4 +1,4 @@
-"""The scores of a recording as a picture."""
+"""Plots the scores of a recording."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DPI = 80
 
 
 def plot_scores(rows: Sequence[RulaRow], path: Path) -> None:
-    """Write a PNG: how likely each score is over time, the expected score, and above ``ABOVE``.
+    """Write a PNG with the probability of each score, the expected score and the limit ``ABOVE``.
 
     Raises:
         CardboxError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""RULA over a recording: a row for each image, and how long the score was how high."""
+"""RULA of a recording: a row per image and the time spent at each score."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cardbox_tracker.ergonomics.tables import ACTION_LEVELS, HIGHEST
 from cardbox_tracker.files import stamp_text, write_table
 
 ABOVE = 5
-"""The score above which time is counted: work has to be changed soon, or at once."""
+"""Score above which time is counted, since work has to be changed soon or at once."""
 
 CSV_HEADER = (
     *("stamp", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
@@ -22,7 +22,7 @@ CSV_HEADER = (
     *("left_score", "right_score"),
 )
 
-# An image counts until the next one, but not over a gap.
+# An image counts until the next one, for at most this multiple of the usual interval.
 _LONGEST_STEP = 3.0
 
 
@@ -40,10 +40,10 @@ class RulaSummary:
     """Expected times, s.
 
     Attributes:
-        measured_s: with a posture.
-        above_s: with a score above ``ABOVE``.
-        by_level_s: at each of ``ACTION_LEVELS``.
-        mean: expected score over that time; nan without any.
+        measured_s: time with a posture.
+        above_s: time with a score above ``ABOVE``.
+        by_level_s: time at each of ``ACTION_LEVELS``.
+        mean: expected score over the measured time; nan without any.
     """
 
     measured_s: float
@@ -53,7 +53,7 @@ class RulaSummary:
 
 
 def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
-    """Return how long the score was how high."""
+    """Return the expected time spent at each score."""
     measured = np.array([row.scores is not None for row in rows], dtype=bool)
     durations_s = _durations_s(np.array([row.stamp_ns for row in rows], np.int64))[measured]
     chances = np.array([row.scores.grand for row in rows if row.scores is not None])
@@ -77,7 +77,7 @@ def _durations_s(stamps_ns: np.typing.NDArray[np.int64]) -> FloatArray:
 
 
 def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
-    """Write ``CSV_HEADER`` and a row for each image; what is not known is left empty.
+    """Write ``CSV_HEADER`` and a row per image; unknown values are left empty.
 
     Raises:
         CardboxError: the file cannot be written.

@@ -1,9 +1,9 @@
-"""RULA scores of postures: angles to scores of the parts, and these through the tables.
+"""Computes RULA scores of postures: angles give scores of the parts, tables combine these.
 
 The parts are scored as in the figures of the paper (:mod:`.tables` names it):
 
-- upper arm: how far it is raised from hanging along the trunk, in whatever direction: 1 to 20
-  degrees, 2 to 45 and for more than 20 backwards, 3 to 90, 4 beyond; abducted adds 1;
+- upper arm: angle from hanging along the trunk, in any direction: 1 to 20
+degrees, 2 to 45 and for more than 20 backwards, 3 to 90, 4 beyond; abducted adds 1;
 - lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2; a hand beyond
   the middle of the body, or a forearm that points outside, adds 1;
 - trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards; bent aside adds 1.
@@ -30,7 +30,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class ArmScores(NamedTuple):
-    """Scores (...) of one arm: its parts, and the grand score with this arm."""
+    """Scores (...) of one arm: its parts, and the grand score computed with this arm."""
 
     upper_arm: ScoreArray
     lower_arm: ScoreArray
@@ -60,7 +60,7 @@ def rula_scores(body: BodyModel, postures: FloatArray, config: RulaConfig) -> Ru
 
 
 def grand_score(arm: ScoreArray, rest: ScoreArray) -> ScoreArray:
-    """Return table C for the scores of arm and wrist, and of neck, trunk and legs."""
+    """Look up table C with the scores of arm and wrist, and of neck, trunk and legs."""
     found: ScoreArray = TABLE_C[np.minimum(arm, 8) - 1, np.minimum(rest, 7) - 1]
     return found
 
@@ -76,7 +76,7 @@ def upper_arm_score(direction: FloatArray, side: float, config: RulaConfig) -> S
     """Return the score of upper arms along the unit vectors (..., 3) in the trunk's frame.
 
     Args:
-        direction: X forwards, Y to the left, Z up, along the trunk.
+        direction: X forwards, Y to the left, Z up along the trunk.
         side: +1 for the left arm, -1 for the right.
         config: settings.
     """
@@ -97,7 +97,7 @@ def lower_arm_score(
 
     Args:
         bend_rad: angle of the elbow, 0 for a straight arm.
-        outwards: how far the unit vector along it points away from the body's middle, -1 to 1.
+        outwards: component of its unit vector away from the body's middle, -1 to 1.
         is_across: whether the hand is beyond that middle.
         config: settings.
     """
@@ -129,6 +129,6 @@ def _step(angle_deg: FloatArray, first: float, second: float, third: float) -> S
 
 
 def _aside_deg(outwards: FloatArray) -> FloatArray:
-    """Angle between a unit vector and the plane of the body's middle."""
+    """Return the angle between a unit vector and the plane of the body's middle, degrees."""
     angle: FloatArray = np.degrees(np.arcsin(np.clip(outwards, -1.0, 1.0)))
     return angle

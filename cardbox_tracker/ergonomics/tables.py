@@ -61,7 +61,7 @@ TABLE_C: ScoreArray = _table(
 """Grand score: wrist and arm (8 or more), neck, trunk and legs (7 or more)."""
 
 HIGHEST = 7
-"""The highest grand score."""
+"""Highest grand score."""
 
 ACTION_LEVELS: tuple[tuple[int, int, str], ...] = (
     (1, 2, "acceptable unless it is held or repeated for long"),
@@ -69,4 +69,4 @@ ACTION_LEVELS: tuple[tuple[int, int, str], ...] = (
     (5, 6, "investigate and change soon"),
     (7, 7, "investigate and change immediately"),
 )
-"""Lowest and highest grand score of each action level, and what the paper says of it."""
+"""Lowest and highest grand score of each action level, and its meaning in the paper."""

@@ -19,6 +19,7 @@ from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -145,7 +146,7 @@ def _tracked(
     tracker = Tracker(body, first, default_preset(), np.random.default_rng(seed), others=[other])
     found, ious = [], []
     for silhouettes, images in moving:
-        estimate = tracker.track_views(silhouettes, images)
+        estimate = tracker.track(list(map(Observation, silhouettes, images)))
         if estimate.posture is None or estimate.offset_m is None or estimate.iou is None:
             continue
         state = np.concatenate([estimate.posture, estimate.offset_m])

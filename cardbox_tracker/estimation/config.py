@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
+from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import NoEffectError, changed, check, setting
 
 FILTERS = ("hierarchical", "whole_body")
 """Every name that ``filter`` may have."""
+
+# Settings of one filter, with those that do similar work in the other one.
+_OF_HIERARCHICAL = MappingProxyType(
+    {
+        "torso.particles": "effort",
+        "arm.particles": "effort",
+        "torso.survival_rate": "survivors",
+        "arm.survival_rate": "survivors",
+        "torso.rotation_noise_rad": "roll_noise_rad, pitch_noise_rad and yaw_noise_rad",
+        "arm.rotation_noise_rad": "arm_noise_rad",
+        "torso.translation_noise_m": "y_noise_m",
+        "torso": "effort",
+        "arm": "effort",
+        "strategy": "survivors",
+        "cycles": "effort",
+        "average": "average",
+        "torso_beside_arms": "effort",
+    }
+)
+_OF_WHOLE_BODY = MappingProxyType(
+    {"survivors": "torso.survival_rate and arm.survival_rate", "average": "average"}
+)
 
 
 @dataclass(frozen=True)
@@ -69,7 +94,7 @@ class TrackerConfig:
         whole_body: settings of the filter ``whole_body``.
 
     The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
-    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``refine_sizes`` and
+    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``lost_iou`` and
     ``lost_frames``.
     """
 
@@ -87,9 +112,6 @@ class TrackerConfig:
         "drs", "resampling strategy of the filters", choices=tuple(STRATEGIES), restarts=True
     )
     cycles: int = setting(1, "estimation cycles an image", limits=(1, 100))
-    noise_decay: float = setting(
-        1.0, "factor on the noise from one cycle of an image to the next", limits=(0.0, 1.0)
-    )
     terms: tuple[TermSettings, ...] = ()
     whole_body: WholeBodyConfig = WholeBodyConfig()
     average: int = setting(
@@ -98,24 +120,11 @@ class TrackerConfig:
         limits=(1, 1_000_000),
         restarts=True,
     )
-    explore: float = setting(
-        0.0,
-        "fraction of the arms' particles drawn from anywhere within the joint limits, so that an "
-        "arm that was lost is found again",
-        limits=(0.0, 0.9),
-    )
     # Rated alone, the torso leans forward to cover the upper arms.
     torso_beside_arms: bool = setting(
         True,
         "rate a torso beside the arms found last, where they are in the image, so that the whole "
         "model is drawn as in equation (2)",
-        restarts=True,
-    )
-    # With fewer, waking the other thread costs more than it saves.
-    parallel_from: int | None = setting(
-        500,
-        "arms of this many particles or more are estimated in two threads; None: never",
-        limits=(0, 1_000_000),
         restarts=True,
     )
     relocalize: bool = setting(
@@ -125,12 +134,6 @@ class TrackerConfig:
         False,
         "only the parts of the silhouette count that can be the person, not a door, a chair or "
         "somebody who passes by",
-        restarts=True,
-    )
-    refine_sizes: bool = setting(
-        False,
-        "breadths of trunk, arms and head are refined while tracking, slowly and near the measured "
-        "ones; with the filter whole_body and one camera",
         restarts=True,
     )
     lost_iou: float = setting(
@@ -158,6 +161,47 @@ class TrackerConfig:
         if self.average > fewest:
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")
 
+    def with_depth(self) -> TrackerConfig:
+        """Return the same settings with the term of a measured depth."""
+        return replace(self, terms=(*self.terms, Depth()))
+
+    def changed(self, given: Mapping[str, Any]) -> TrackerConfig:
+        """Return the settings with other values, all of which act in the filter that is chosen.
+
+        Args:
+            given: values by name, nested ones as mappings: ``{"whole_body": {"effort": 0.5}}``.
+
+        Raises:
+            NoEffectError: one of them would change nothing.
+            ValueError: a name is unknown, a value has the wrong type or is out of range.
+        """
+        config = changed(self, given)
+        for name in _names(given):
+            config._check_effect(name)
+        return config
+
+    def _check_effect(self, name: str) -> None:
+        """Raise NoEffectError if the setting of this dotted name changes nothing."""
+        first, _, last = name.rpartition(".")
+        if self.filter == "whole_body":
+            instead = _OF_HIERARCHICAL.get(name) or _OF_HIERARCHICAL.get(first)
+            if instead is not None:
+                raise NoEffectError(name, "with the filter whole_body", f"whole_body.{instead}")
+            is_corrected = self.whole_body.corrector != "none"
+            if last in ("output_smoothing_s", "learned_deviations") and not is_corrected:
+                raise NoEffectError(name, "without a corrector", "whole_body.corrector")
+            return
+        if name.startswith("whole_body"):
+            instead = _OF_WHOLE_BODY.get(last, "torso.particles and arm.particles")
+            raise NoEffectError(name, "with the filter hierarchical", instead)
+        if last == "sigma_gamma_px" and self.strategy == "drs":
+            raise NoEffectError(name, "with the strategy drs", f"{first}.survival_rate")
+        if last == "survival_rate" and self.strategy != "drs":
+            text = f"with the strategy {self.strategy}"
+            raise NoEffectError(name, text, f"{first}.sigma_gamma_px")
+        if last == "translation_noise_m" and first == "arm":
+            raise NoEffectError(name, "of arms, which have no place", "arm.rotation_noise_rad")
+
     def with_particles(self, particles: int) -> TrackerConfig:
         """Return the same settings with N = ``particles`` in each of the three filters."""
         return replace(
@@ -166,6 +210,15 @@ class TrackerConfig:
             arm=replace(self.arm, particles=particles),
             average=min(self.average, particles),
         )
+
+
+def _names(given: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    """Yield the dotted names of all values."""
+    for name, value in given.items():
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}"
 
 
 def paper_preset() -> TrackerConfig:

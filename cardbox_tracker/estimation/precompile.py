@@ -16,6 +16,7 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation import person_region
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import background
 from cardbox_tracker.vision.camera import Camera
@@ -44,8 +45,7 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
                 person = body.with_values(appearance=looks)
                 tracker = Tracker(person, camera, config, others=others)
                 for _ in range(2):
-                    views = 1 + len(others)
-                    tracker.track_views([silhouette] * views, [image] * views)
+                    tracker.track([Observation(silhouette, image)] * (1 + len(others)))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from itertools import zip_longest
 from types import MappingProxyType
 
 import numpy as np
@@ -15,13 +15,7 @@ from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import (
-    USUAL_INTERVAL_S,
-    DepthImage,
-    Image,
-    Silhouette,
-    Term,
-)
+from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.estimate import (
     LOST,
@@ -31,15 +25,13 @@ from cardbox_tracker.estimation.estimate import (
     Estimate,
 )
 from cardbox_tracker.estimation.filtering.cycles import Cycles
-from cardbox_tracker.estimation.filtering.multi_view import MultiViewFilter
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Sight
+from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
-from cardbox_tracker.estimation.further_camera import FurtherCamera
-from cardbox_tracker.estimation.person_region import PersonRegion
+from cardbox_tracker.estimation.observation import Observation, Observations, stamp_of
 from cardbox_tracker.estimation.sampling import likely_postures
-from cardbox_tracker.estimation.size_refinement import SizeRefinement
+from cardbox_tracker.estimation.tracked_camera import TrackedCamera
 from cardbox_tracker.settings import restarts
 from cardbox_tracker.vision.camera import Camera
 
@@ -69,15 +61,14 @@ class Tracker:
         """Set up for ``body``; the camera is pitched as the body model says.
 
         Args:
-            body: the person. What is unknown of them is fitted while tracking, and with
-                ``refine_sizes`` their breadths are refined; either replaces the attribute
-                ``body``. Until what is unknown is known, no estimate is better than ``uncertain``.
+            body: the person. What is unknown of them is fitted while tracking, which replaces
+                the attribute ``body``. Until then, no estimate is better than ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
             silhouette: another implementation of the silhouette's term, for comparison.
             make_filter: another filter than that of the settings.
-            others: further cameras, for :meth:`track_views`; they need the filter ``whole_body``.
+            others: further cameras; they need the filter ``whole_body``.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
@@ -99,44 +90,22 @@ class Tracker:
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next silhouette on."""
         self.body, self._silhouette = body, silhouette
-        self._refinement: SizeRefinement | None = None
-        self._terms = self._built(self.config)
-        self._further = [
-            FurtherCamera(body, self.camera, other, self.config) for other in self._others
+        self._cameras = [
+            TrackedCamera(body, self.camera, self.config, other) for other in (None, *self._others)
         ]
-        views = [further.view for further in self._further]
+        views = self.views
         self.agreement = CameraAgreement(body, self.camera, views) if views else None
         self.reset()
-
-    def _refine(self) -> None:
-        """Let the last frame, which was sure, say what it does of the sizes."""
-        if self._refinement is None or not isinstance(self._filter, WholeBodyFilter):
-            return
-        if (body := self._refinement.add(*self._filter.best())) is not None:
-            self.body, self._silhouette = body, CompiledSilhouette(body, self.camera)
-            self._terms = self._built(self.config)
-            self._filter.use_body(self._silhouette)
-
-    def _built(self, config: TrackerConfig) -> list[Term]:
-        return [settings.build(self.body, self.camera) for settings in config.terms]
 
     def reset(self) -> None:
         """Forget the posture: the next silhouette is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
-        if self._further:
-            make_filter = partial(MultiViewFilter, self._further)
-        for further in self._further:
-            further.reset(self.config)
-        self._filter = make_filter(self.config, self._silhouette, self._rng.spawn(1)[0])
-        self._region = PersonRegion(self.body, self.camera) if self.config.select_person else None
-        is_refined = self.config.refine_sizes and not (self._others or self.body.unknown)
-        if not is_refined:
-            self._refinement = None
-        elif self._refinement is None and isinstance(self._filter, WholeBodyFilter):
-            cost = self.config.whole_body.cost
-            self._refinement = SizeRefinement(self.body, self.camera, cost)
+        for camera in self._cameras:
+            camera.reset(self.config)
+        rng = self._rng.spawn(1)[0]
+        self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._poor_frames = 0
-        self._stamp_ns: int | None = None
+        self._last_ns: int | None = None
         self._particles: Particles | None = None
         # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
         self._before: FloatArray | None = None
@@ -152,9 +121,8 @@ class Tracker:
         """
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
-            self._terms = self._built(config)
-            for further in self._further:
-                further.configure(config)
+            for camera in self._cameras:
+                camera.configure(config)
         self.config = config
         if is_new_start:
             self.reset()
@@ -170,83 +138,72 @@ class Tracker:
     @property
     def views(self) -> tuple[View, ...]:
         """How the further cameras see the body."""
-        return tuple(further.view for further in self._further)
+        return tuple(camera.view for camera in self._cameras if camera.view is not None)
 
     def camera_ious(self) -> list[float | None]:
-        """Return how well the last estimate fits what each of several cameras saw.
+        """Return how well the last estimate fits what each camera saw.
 
         Returns:
-            IoU by camera, the first camera's first; None of one that saw nobody. Empty of one
-            camera, of which the estimate has it.
+            IoU by camera, the first camera's first; None of one that saw nobody.
         """
-        return self._filter.ious() if isinstance(self._filter, MultiViewFilter) else []
-
-    def _person_in(self, silhouette: Silhouette, image: Image | None) -> Silhouette:
-        """Return what of a silhouette can be the person; raises ValueError for a wrong size."""
-        if self._region is None:
-            return silhouette
-        self._silhouette.frame(silhouette, image)
-        return self._region.select(silhouette, self._before, self._poor_frames == 0, image)
+        return self._filter.ious()
 
     def track(
-        self, silhouette: Silhouette, image: Image | None = None, stamp_ns: int | None = None
-    ) -> Estimate:
-        """Estimate the posture behind a silhouette.
-
-        Args:
-            silhouette: (H, W), 0 or 255, of the camera's size.
-            image: (H, W) grey or (H, W, 3) bgr of the same frame, for terms that use it.
-            stamp_ns: when it was taken; None: 1/15 s after the one before.
-
-        Raises:
-            ValueError: silhouette or image has not the camera's size.
-        """
-        return self.track_views([silhouette], [image], stamp_ns=stamp_ns)
-
-    def track_views(
         self,
-        silhouettes: Sequence[Silhouette | None],
-        images: Sequence[Image | None],
-        depth_m: DepthImage | None = None,
+        observations: Observations | Observation | Silhouette,
+        image: Image | None = None,
         stamp_ns: int | None = None,
     ) -> Estimate:
-        """Estimate the posture behind what all cameras see at one time.
+        """Estimate the posture behind what the cameras saw at one time.
 
         Args:
-            silhouettes: of the first camera, then of ``others``, each as for :meth:`track`; None
-                of a camera that has none for this time. It is left out, and so is one that sees
-                nobody. Without any for the last cameras they may be missing.
-            images: of the same cameras.
-            depth_m: (H, W) of the first camera, metres along its optical axis, for the term
-                ``Depth``; not finite or 0 where it is not known.
-            stamp_ns: as for :meth:`track`.
+            observations: of the first camera, then of ``others``; None, or an observation without
+                a silhouette, of a camera that is silent, and it may be missing at the end. One
+                observation is that of the first camera, and so is a silhouette (H, W), 0 or 255.
+            image: of the same time as a bare silhouette, (H, W) grey or (H, W, 3) bgr.
+            stamp_ns: of a bare silhouette. Without a stamp, a frame is 1/15 s after the one
+                before.
 
         Raises:
-            ValueError: a silhouette or an image has not its camera's size.
+            ValueError: a silhouette or an image has not its camera's size, there are more
+                observations than cameras, or ``image`` or ``stamp_ns`` beside observations, which
+                have their own.
         """
-        is_sure, missing = self._poor_frames == 0, [None] * len(self._further)
-        self._others_now = tuple(
-            further.frame(seen, picture, self._before, is_sure)
-            for further, seen, picture in zip(
-                self._further, [*silhouettes[1:], *missing], [*images[1:], *missing], strict=False
+        if isinstance(observations, np.ndarray):
+            observations = Observation(observations, image, stamp_ns=stamp_ns)
+        elif image is not None or stamp_ns is not None:
+            raise ValueError("give image and stamp_ns in the observations, not beside them")
+        if isinstance(observations, Observation):
+            observations = (observations,)
+        if not 1 <= len(observations) <= len(self._cameras):
+            raise ValueError(
+                f"there are {len(observations)} observations; expected one for each of "
+                f"{len(self._cameras)} cameras"
             )
-        )
-        self._depth_m = depth_m
-        before_ns, self._stamp_ns = self._stamp_ns, stamp_ns
-        self._interval_s = USUAL_INTERVAL_S
+        return self._track(self._frames_of(observations))
+
+    def _frames_of(self, observations: Observations) -> list[Frame]:
+        """Return the frames of all cameras, one that shows nobody for each that is silent."""
+        stamp_ns, before_ns = stamp_of(observations), self._last_ns
+        self._last_ns, interval_s = stamp_ns, USUAL_INTERVAL_S
         if stamp_ns is not None and before_ns is not None and stamp_ns > before_ns:
-            self._interval_s = (stamp_ns - before_ns) / 1e9
-        silhouette, image = silhouettes[0], images[0]
-        if silhouette is None:
-            silhouette, image = np.zeros((self.camera.height, self.camera.width), np.uint8), None
-        else:
-            silhouette = self._person_in(silhouette, image)
+            interval_s = (stamp_ns - before_ns) / 1e9
+        is_sure = self._poor_frames == 0
+        return [
+            camera.frame(observation, self._before, is_sure, interval_s)
+            for camera, observation in zip_longest(self._cameras, observations)
+        ]
+
+    def _track(self, frames: list[Frame]) -> Estimate:
         if self._fitting is None:
-            return self._track(silhouette, image)
+            return self._follow(frames)
+        silhouette, image = frames[0].silhouette, frames[0].image
         fitted = self._fitting.before(silhouette, image)
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
-        estimate = self._track(silhouette, image)
+            again = self._silhouette.frame(silhouette, image)
+            frames[0] = replace(again, depth_m=frames[0].depth_m, interval_s=frames[0].interval_s)
+        estimate = self._follow(frames)
         iou = None if estimate.iou is None else self._seen_iou
         self._fitting.after(estimate.state != NO_PERSON, iou)
         if estimate.posture is not None:
@@ -261,25 +218,18 @@ class Tracker:
         found = estimate.posture, estimate.posture_stddev, estimate.offset_m
         return likely_postures(*found, self._particles, count, rng)
 
-    def _track(self, silhouette: Silhouette, image: Image | None) -> Estimate:
-        frame = self._silhouette.frame(silhouette, image, self._before)
-        frame = replace(
-            frame,
-            others=self._others_now,
-            depth_m=self._depth_m,
-            interval_s=self._interval_s,
-        )
-        sight = self._filter.look(frame)
-        if sight is Sight.NOBODY:
+    def _follow(self, frames: Sequence[Frame]) -> Estimate:
+        presence = self._filter.look(frames)
+        if presence is Presence.NOBODY:
             self._before = None
             if self.config.relocalize:
                 # The person may come back elsewhere.
                 self._filter.forget()
             return Estimate(NO_PERSON)
-        if sight is Sight.TOO_MUCH:
+        if presence is Presence.TOO_MUCH:
             # A lamp goes on, a door opens: soon the person is where they were.
             return Estimate(LOST)
-        fit = self._filter.follow(self._terms)
+        fit = self._filter.follow(frames, [camera.terms for camera in self._cameras])
         self._particles = fit.particles
         if not fit.is_finite:
             # Particles that are not numbers would stay so for ever.
@@ -291,11 +241,9 @@ class Tracker:
             if self.config.relocalize:
                 self._filter.recover()
             return Estimate(LOST)
-        if not fit.is_uncertain and not fit.is_poor:
-            self._refine()
         if self.agreement is not None and fit.offset_m is not None:
-            seen = [other.silhouette for other in self._others_now]
-            self.agreement.see(self._before, frame.silhouette, seen)
+            first, *others = (frame.silhouette for frame in frames)
+            self.agreement.see(self._before, first, others)
         return Estimate(
             UNCERTAIN if fit.is_uncertain else TRACKING,
             fit.posture,

@@ -1,1 +1,1 @@
-"""How accurate the tracker is: error measures, ground truth, the paper's experiments."""
+"""Accuracy of the tracker: error measures, ground truth, recorded sessions."""

@@ -25,9 +25,9 @@ class TrueFrame:
     """One image with a person.
 
     Attributes:
-        segment: what the person does.
+        segment: name of the person's action.
         keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
-        posture: d1..d12 (12,), where the person has our model's joints.
+        posture: d1..d12 (12,), if the person has the model's joints.
         torso_rad: roll, pitch and yaw of the torso (3,), where they are known.
         is_in_sight: the neck is in the image, so that the person can be tracked.
     """
@@ -49,7 +49,7 @@ class GroundTruth:
         start_ns: stamp of the first image.
         distance_m: level distance to the person.
         pitch_deg: how far the camera looks down.
-        side_turn: the way the person turned for the side reference.
+        side_turn: direction in which the person turned for the side reference.
         cameras: namespaces of several cameras, the first camera's first; empty with one.
         is_rectified: the first two of them are a rectified pair.
         stature_m: height of the person; None where it is not known.

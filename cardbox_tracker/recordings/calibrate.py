@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.initialization.config import InitializationConfi
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.pairing import MOST_CAMERAS, side_by_side
 
@@ -107,7 +107,7 @@ def _part(progress: Callable[[float], None], done: float, parts: int, fraction: 
 
 
 def _moving(first: SilhouetteSource, other: SilhouetteSource, span: TimeSpan) -> list[MovingFrame]:
-    def stamp_ns(frame: Frame) -> int:
+    def stamp_ns(frame: RecordedFrame) -> int:
         return frame.stamp_ns
 
     moving = []

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
-from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, Frame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.background import brightness_of
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
@@ -56,10 +56,10 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"{most_m:g} m, between the person and the wall"
             )
         self._open(bag, size, camera)
-        self._within = within
+        self._within, self.depth_topic = within, within.topic
         self._without = 0
 
-    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self._images(), depths]
@@ -76,7 +76,9 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
-            yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image, measured[1])
+            yield RecordedFrame(
+                stamp_ns, time_s, brightness_of(image), silhouette, image, measured[1]
+            )
 
     @property
     def remarks(self) -> list[str]:

@@ -18,7 +18,7 @@ from cardbox_tracker.estimation.initialization.scale import (
     measured_with_depth,
     measured_with_second,
 )
-from cardbox_tracker.recordings.cameras import CameraSources
+from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.depth_image import median_depth
 
@@ -49,7 +49,7 @@ def initialize_from_recording(
 
 
 def initialize_from_cameras(
-    sources: CameraSources,
+    recording: Recording,
     spans: Mapping[str, TimeSpan],
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
@@ -63,7 +63,7 @@ def initialize_from_cameras(
         InitializationError: see :func:`initialize_from_recording`; or the silhouettes of the
             second camera do not fit the person.
     """
-    first, second = sources.sources[:2]
+    first, second = recording.sources[:2]
     references = {
         name: average_silhouette([frame.silhouette for frame in second.held(spans[name], name)])
         for name in SCALE_REFERENCES
@@ -72,11 +72,11 @@ def initialize_from_cameras(
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
         return initialize_from_recording(first, spans, at, progress if is_last else None)
 
-    return measured_with_second(measure, config, first.camera, sources.others[0], references)
+    return measured_with_second(measure, config, first.camera, recording.others[0], references)
 
 
 def initialize_with_depth(
-    sources: CameraSources,
+    recording: Recording,
     spans: Mapping[str, TimeSpan],
     config: InitializationConfig,
     progress: Callable[[float], None] | None = None,
@@ -90,17 +90,17 @@ def initialize_with_depth(
         InitializationError: as :func:`initialize_from_recording`, or the depth images do not show
             that person.
     """
-    references = {name: _depth_reference(sources, spans[name], name) for name in SCALE_REFERENCES}
+    references = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
 
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        return initialize_from_recording(sources.first, spans, at, progress if is_last else None)
+        return initialize_from_recording(recording.first, spans, at, progress if is_last else None)
 
-    return measured_with_depth(measure, config, sources.first.camera, references)
+    return measured_with_depth(measure, config, recording.first.camera, references)
 
 
-def _depth_reference(sources: CameraSources, span: TimeSpan, name: str) -> DepthReference:
+def _depth_reference(recording: Recording, span: TimeSpan, name: str) -> DepthReference:
     silhouettes, depths_m = [], []
-    for taken in sources.frames(span.start_s):
+    for taken in recording.frames(span.start_s):
         if taken.time_s > span.end_s:
             break
         if taken.frames[0] is not None and taken.depth_m is not None:

@@ -27,7 +27,7 @@ from cardbox_tracker.outputs import (
 from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 _LATCHED = ("/body_model", "/robot_description")
 
@@ -73,7 +73,7 @@ class ResultBag:
         if self._writer is not None:
             self._writer.__exit__(kind, error, trace)
 
-    def add(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def add(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Write the outputs of one image."""
         if self._writer is None or self._transforms is None:
             return
@@ -83,7 +83,7 @@ class ResultBag:
         self,
         bag: BagWriter,
         transforms: BagTransforms,
-        frame: Frame,
+        frame: RecordedFrame,
         estimate: Estimate,
         tracker: Tracker,
     ) -> None:

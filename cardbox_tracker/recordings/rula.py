@@ -9,7 +9,7 @@ from cardbox_tracker.ergonomics.distribution import SAMPLES, score_distribution
 from cardbox_tracker.ergonomics.recording import RulaRow
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 # A separate random stream leaves the tracker's random numbers unchanged.
 _STREAM = 0x52756C61
@@ -28,7 +28,7 @@ class RulaObserver:
         self._rng = np.random.default_rng([seed, _STREAM])
         self.rows: list[RulaRow] = []
 
-    def __call__(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Append the row of one image."""
         scores = None
         if estimate.posture is not None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +18,8 @@ from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
 
+# Images of which the period is taken.
+_PERIOD_IMAGES = 60
 # Longer than any image is on its way.
 _OTHER_CLOCK_NS = 10_000_000_000
 
@@ -53,7 +57,7 @@ class TimeSpan(NamedTuple):
         return f"{self.start_s:g}:{self.end_s:g}"
 
 
-class Frame(NamedTuple):
+class RecordedFrame(NamedTuple):
     """One image of a recording and the silhouette in it.
 
     Attributes:
@@ -80,12 +84,15 @@ class Frame(NamedTuple):
 
 
 class SilhouetteSource:
-    """The images of one bag at the working resolution, after learning its background.
+    """One camera of a recording: its silhouettes, at the working resolution.
 
     Attributes:
         frame_id: name of the camera's optical frame.
         camera: the camera of what :meth:`frames` yields.
+        depth_topic: of the depth images that cut out the silhouettes; None if a background does.
     """
+
+    depth_topic: str | None = None
 
     def __init__(
         self,
@@ -143,9 +150,9 @@ class SilhouetteSource:
         self.camera = self._pipeline.camera
 
     @property
-    def first(self) -> SilhouetteSource:
-        """Itself: of one camera it is the first."""
-        return self
+    def path(self) -> Path:
+        """The recording."""
+        return self._bag.path
 
     @property
     def start_ns(self) -> int:
@@ -157,7 +164,7 @@ class SilhouetteSource:
         """Seconds from the first to the last message of the recording."""
         return self._bag.duration_s
 
-    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[Frame]:
+    def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
         # From the first image on, so that a frame does not depend on where the span begins.
         self._pipeline.restart()
@@ -166,9 +173,9 @@ class SilhouetteSource:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
-                yield Frame(stamp_ns, time_s, brightness_of(image), silhouette, image)
+                yield RecordedFrame(stamp_ns, time_s, brightness_of(image), silhouette, image)
 
-    def held(self, span: TimeSpan, what: str) -> list[Frame]:
+    def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
 
         Raises:
@@ -181,6 +188,18 @@ class SilhouetteSource:
                 f"{self._bag.duration_s:.1f} s; give seconds from the bag's start"
             )
         return found
+
+    def period_ns(self) -> int:
+        """Return the median time between images, ns.
+
+        Raises:
+            BagError: there are fewer than two images.
+        """
+        images = islice(self._bag.images(self._topic), _PERIOD_IMAGES)
+        stamps_ns = [image.stamp_ns for image in images]
+        if len(stamps_ns) < 2:
+            raise BagError(f"{self.path} has fewer than two images on {self._topic}")
+        return int(np.median(np.diff(stamps_ns)))
 
     @property
     def remarks(self) -> list[str]:

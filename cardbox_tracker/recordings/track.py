@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +20,9 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path, stamp_text
-from cardbox_tracker.outputs import FIGURES, JOINT_STATE_NAMES, joint_values
-from cardbox_tracker.recordings.cameras import CameraSources
-from cardbox_tracker.recordings.silhouettes import Frame, SilhouetteSource
+from cardbox_tracker.outputs import JOINT_STATE_NAMES, METRICS, joint_values
+from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 # Scripts read the columns by their place: further joints follow the last of them.
 CSV_HEADER = (
@@ -30,11 +30,11 @@ CSV_HEADER = (
     "state",
     *JOINT_STATE_NAMES[:N_JOINTS],
     *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
-    *(figure.name for figure in FIGURES),
+    *(metric.name for metric in METRICS),
     *JOINT_STATE_NAMES[N_JOINTS:],
 )
 
-Observer = Callable[[Frame, Estimate, Tracker], None]
+Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Is told of each image and what was found in it."""
 
 _VIDEO_SCALE = 2
@@ -57,7 +57,7 @@ class TrackSummary:
 
 
 def track_recording(
-    source: SilhouetteSource | CameraSources,
+    recording: Recording,
     body: BodyModel,
     config: TrackerConfig,
     seed: int,
@@ -70,7 +70,7 @@ def track_recording(
     """Track every image from ``start_s`` on; write one CSV row for each.
 
     Args:
-        source: the recording, or several cameras of it.
+        recording: with its cameras.
         body: the measured person.
         config: settings of the tracker.
         seed: the same recording and seed give the same bytes.
@@ -83,9 +83,8 @@ def track_recording(
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
     """
-    others = source.others if isinstance(source, CameraSources) else ()
     rng = np.random.default_rng(seed)
-    tracker = Tracker(body, source.first.camera, config, rng, others=others)
+    tracker = Tracker(body, recording.first.camera, config, rng, others=recording.others)
     costs: list[int] = []
     ious: list[float] = []
     frames = frames_uncertain = 0
@@ -101,7 +100,8 @@ def track_recording(
         if video_path is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
             draw = stack.enter_context(video_file(video_path, size, fps))
-        for frame, estimate in _estimates(source, tracker, start_s):
+        for taken in recording.frames(start_s):
+            estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
             if rows is not None:
@@ -125,28 +125,10 @@ def track_recording(
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks: list[str] = []
-    if isinstance(source, CameraSources) and tracker.agreement is not None:
+    if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
-        remarks = tracker.agreement.remarks(source.cameras[1:])
+        remarks = tracker.agreement.remarks(recording.names[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
-
-
-def _estimates(
-    source: SilhouetteSource | CameraSources, tracker: Tracker, start_s: float
-) -> Iterator[tuple[Frame, Estimate]]:
-    if isinstance(source, SilhouetteSource):
-        for frame in source.frames(start_s):
-            yield frame, tracker.track(frame.silhouette, frame.image, frame.stamp_ns)
-        return
-    nothing = np.zeros((tracker.camera.height, tracker.camera.width), np.uint8)
-    for stamp_ns, time_s, frames, depth_m in source.frames(start_s):
-        estimate = tracker.track_views(
-            [frame and frame.silhouette for frame in frames],
-            [frame and frame.image for frame in frames],
-            depth_m,
-            stamp_ns,
-        )
-        yield frames[0] or Frame(stamp_ns, time_s, nothing, nothing), estimate
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
@@ -161,6 +143,6 @@ def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
         estimate.state,
         *values[:N_JOINTS],
         *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
-        *(figure.text(estimate) for figure in FIGURES),
+        *(metric.text(estimate) for metric in METRICS),
         *values[N_JOINTS:],
     ]

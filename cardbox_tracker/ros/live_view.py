@@ -1,4 +1,4 @@
-"""``cardbox view --live``: what the running nodes publish, in the viewer."""
+"""``cardbox view --live``: the results of the running nodes in the viewer."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Shows what was found in the viewer Rerun, which is an optional library; no ROS."""
+"""Shows results in the viewer Rerun, an optional library, without ROS."""

@@ -1,4 +1,4 @@
-"""How the viewer arranges what :mod:`.scene` logs: image and 3D beside plots."""
+"""Arranges the views of the entities that :mod:`.scene` logs: image and 3D beside plots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ IMAGE, JOINTS, ERROR, STATE = "image", "joints", "error", "state"
 _FLAT = (IMAGE, JOINTS, ERROR, STATE)
 
 ROOT_FRAME = f"person/{ROOT_LINK}"
-"""Frame in which all of the 3D view is shown."""
+"""Frame of the 3D view."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "left_arm": tuple(name for name in JOINT_NAMES if name.startswith("left")),
@@ -26,15 +26,15 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 
 SPREAD = "within_two_deviations"
-"""Where the uncertainty of the joints of a plot is; it comes after their names."""
+"""Entity below a plot that contains the uncertainty of its joints."""
 
 
-# Beside the camera, looking at a person two metres before it.
+# The viewpoint is beside the camera and looks at a person two metres before it.
 _EYE_M, _TARGET_M = (0.1, -1.1, 0.5), (2.0, 0.35, -0.1)
 
 
 def plot_of(joint: str) -> tuple[str, int]:
-    """Return the plot in which a joint is shown, and its number there."""
+    """Return the plot of a joint, and the joint's index in it."""
     for group, joints in GROUPS.items():
         if joint in joints:
             return group, joints.index(joint)
@@ -42,7 +42,7 @@ def plot_of(joint: str) -> tuple[str, int]:
 
 
 def layout() -> Any:
-    """Return the arrangement of the views.
+    """Return the blueprint of the views.
 
     Raises:
         CardboxError: rerun-sdk is not installed.

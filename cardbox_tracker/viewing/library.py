@@ -1,4 +1,4 @@
-"""The library rerun-sdk, which is installed only by those who want the viewer."""
+"""Loads the optional library rerun-sdk and opens its recordings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def rerun() -> Any:
     """Return the module rerun.
 
     Raises:
-        CardboxError: it is not installed; the text says how to.
+        CardboxError: the library is not installed; the text gives the command.
     """
     try:
         import rerun as module
@@ -38,12 +38,12 @@ def rerun() -> Any:
 
 @contextmanager
 def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[Any, str]]:
-    """Context of a stream to a file, to a browser, or without either to a window.
+    """Context of a stream to a file, to a browser, or by default to a window.
 
     Args:
-        blueprint: how the views are arranged.
-        save: .rrd file to write; it appears, whole, at the end.
-        web: serve the viewer to a browser, as long as the context lasts.
+        blueprint: arrangement of the views.
+        save: .rrd file, which is written atomically at the end.
+        web: serve the viewer to a browser while the context lasts.
 
     Yields:
         The stream, and the address for a browser, which is empty without ``web``.
@@ -59,7 +59,7 @@ def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[An
             "FILE.rrd to look at it elsewhere with 'rerun FILE.rrd'"
         )
     with ExitStack() as stack:
-        # A name that does not change, so that the same bag gives the same recording.
+        # A constant name makes the recordings of one bag identical.
         stream = rr.RecordingStream(APPLICATION, recording_id=APPLICATION)
         path = None if save is None else stack.enter_context(atomic_path(save))
         address = ""

@@ -1,4 +1,4 @@
-"""A bag of results: of ``cardbox track --bag``, or recorded from running nodes."""
+"""Shows a bag of results, from ``cardbox track --bag`` or recorded from running nodes."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _ROBOT, _JOINTS = "/robot_description", "/joint_states"
 def show_results(
     bag: BagReader, feed: Feed, progress: Callable[[float], None] = lambda _: None
 ) -> int:
-    """Show every message of a bag of results; return how many images it has joints of.
+    """Show every message of a bag of results; return the number of images with joints.
 
     Args:
         bag: an open recording.
-        feed: where to show it.
-        progress: told the finished fraction.
+        feed: receiver of the results.
+        progress: called with the finished fraction, 0 to 1.
 
     Raises:
         BagError: the bag has no results of the tracker, or is damaged.
@@ -41,7 +41,7 @@ def show_results(
         try:
             handlers[message.topic](message, content)
         except (AttributeError, TypeError, ValueError) as error:
-            # Recordings bring definitions of their types along.
+            # A recording contains the definitions of its types.
             raise BagError(
                 f"{message.topic} of {bag.path} is not what it should be: {error}"
             ) from None
@@ -54,7 +54,7 @@ Handler = Callable[[BagMessage, Any], None]
 
 
 def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
-    """What is done with the topics of the tracker in the namespace ``space``."""
+    """Return the handlers of the tracker's topics in the namespace ``space``."""
     return {
         space + MODEL: lambda m, c: feed.model(str(c.data), f"{m.topic} of {bag.path}"),
         space + "/tracking_state": lambda m, c: feed.state(m.time_ns, str(c.data)),
@@ -66,7 +66,7 @@ def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
 
 
 def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
-    """The same of robots: each has its description and joint states in a namespace of its own."""
+    """Return the handlers of robots, each with description and joint states in its namespace."""
     handlers: dict[str, Handler] = {}
     for topic in bag.topics:
         if not topic.endswith(_ROBOT) or topic == space + _ROBOT:

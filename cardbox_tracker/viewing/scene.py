@@ -1,4 +1,4 @@
-"""What the viewer is shown of one image after the other, as entities of a Rerun recording."""
+"""Logs the results of each image as entities of a Rerun recording."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from cardbox_tracker.viewing.library import rerun
 _COLOURS = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
 _MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
 _SPREAD = 2.0
-"""Standard deviations between which nine in ten errors lie."""
+"""Standard deviations of an interval with 90 % of the errors."""
 _HALF_TURN = (0.0, 0.0, 1.0, 0.0)
 _ARMS = ((0, 1, 2), (3, 4, 5))
 _RADIUS_M = 0.018
@@ -38,10 +38,10 @@ _JPEG_QUALITY = 80
 
 
 class Scene:
-    """Logs to a Rerun stream. :meth:`at` says of which image; the rest may come in any order."""
+    """Logs to a Rerun stream; :meth:`at` selects the image, and other calls may have any order."""
 
     def __init__(self, stream: Any) -> None:
-        """Begin with nothing; ``stream`` is a rerun.RecordingStream."""
+        """Start an empty scene; ``stream`` is a rerun.RecordingStream."""
         self._rr = rerun()
         self._stream = stream
         self._first_ns: int | None = None
@@ -52,7 +52,7 @@ class Scene:
         self._body: BodyModel | None = None
 
     def at(self, stamp_ns: int) -> None:
-        """Say to which image belongs what follows."""
+        """Select the image that the following calls belong to, by its stamp, ns."""
         if self._first_ns is None:
             self._first_ns = stamp_ns
         self._stream.set_time("time", duration=(stamp_ns - self._first_ns) / 1e9)
@@ -67,7 +67,7 @@ class Scene:
         self._robot("person", urdf_from_body(body))
 
     def robot(self, name: str, urdf: str, place_m: Sequence[float]) -> None:
-        """Also show a robot that faces the camera, its root at ``place_m`` of the level frame."""
+        """Show a robot that faces the camera, with its root at ``place_m`` in the level frame."""
         root = self._robot(name, urdf)
         put = self._rr.Transform3D(
             translation=place_m,
@@ -95,7 +95,7 @@ class Scene:
                 )
                 tree.log_urdf_to_recording(self._stream)
             except Exception as error:
-                # The library passes on whatever its parsers raise.
+                # The library does not wrap the errors of its parsers.
                 reason = cut(" ".join(str(error).split()))
                 raise CardboxError(f"the viewer cannot show the robot {name}: {reason}") from None
         self._trees[name] = {
@@ -109,7 +109,7 @@ class Scene:
         self._stream.log(IMAGE, shown.compress(jpeg_quality=_JPEG_QUALITY))
 
     def state(self, text: str) -> None:
-        """Say the tracking state; only changes are logged."""
+        """Log the tracking state if it has changed."""
         if text != self._state:
             self._stream.log(STATE, self._rr.TextLog(text))
         self._state = text
@@ -122,7 +122,7 @@ class Scene:
             self._plot(f"{JOINTS}/{group}/{name}", name, value, number, 2.0)
 
     def uncertain_joints(self, joints: JointValues, deviations: JointValues) -> None:
-        """Plot how far the joints may be off; both name the same joints."""
+        """Plot the uncertainty of the joints; both mappings have the same names."""
         spread = _shown(deviations)
         for name, value in _shown(joints).items():
             group, number = plot_of(name)
@@ -132,7 +132,7 @@ class Scene:
                 self._plot(entity, f"{name} {which}", reach, number, 0.5)
 
     def move(self, robot: str, joints: JointValues) -> None:
-        """Move ``person`` or a robot that was shown before; other joints are passed over."""
+        """Move ``person`` or a robot that was shown before; unknown joints are ignored."""
         known = self._trees.get(robot, {})
         for name, value in zip(joints.names, joints.values.tolist(), strict=True):
             if name in known:
@@ -140,7 +140,7 @@ class Scene:
                 self._stream.log(f"{robot}/joints/{name}", turned)
 
     def keypoints(self, points_m: FloatArray, truth_m: FloatArray | None = None) -> None:
-        """Show keypoints (6, 3), metres in the optical frame, and plot how far they are off."""
+        """Show keypoints (6, 3), metres in the optical frame, and plot their errors."""
         self._arms("keypoints", points_m, _MEASURED_RGB)
         if truth_m is None:
             return
@@ -150,7 +150,7 @@ class Scene:
 
     def _arms(self, entity: str, points_m: FloatArray, rgb: tuple[int, int, int]) -> None:
         if self._pitch_rad is None:
-            return  # nobody has said how the camera looks
+            return  # the camera's pitch is still unknown
         points = level_points(points_m, self._pitch_rad)
         strips = [points[list(arm)] for arm in _ARMS]
         bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
@@ -165,7 +165,7 @@ class Scene:
         self._stream.log(entity, self._rr.Scalars(value))
 
     def _once(self, entity: str, what: Any) -> None:
-        """Log what never changes, the first time."""
+        """Log a constant entity once."""
         if entity not in self._styled:
             self._stream.log(entity, what, static=True)
         self._styled.add(entity)
@@ -181,7 +181,7 @@ def _shown(joints: JointValues) -> Mapping[str, float]:
 
 
 def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
-    """Return how far keypoints (6, 3) are from the true ones: mean, and without the shoulders'."""
+    """Return mean errors, cm, of keypoints (6, 3): with and without the error of the shoulders."""
     difference = 100 * (points_m - truth_m)
     return {
         "absolute": float(np.linalg.norm(difference, axis=1).mean()),
@@ -190,11 +190,11 @@ def errors_cm(points_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
 
 
 def level_points(points_m: FloatArray, pitch_rad: float) -> FloatArray:
-    """Return optical points (n, 3) in the level frame of the URDF's root: X ahead, Y left, Z up.
+    """Transform optical points (n, 3) to the level frame of the URDF's root: X ahead, Y left, Z up.
 
     Args:
-        points_m: x to the right, y down, z ahead, of a camera that looks down by ``pitch_rad``.
-        pitch_rad: positive downwards.
+        points_m: points in the optical frame, metres: x to the right, y down, z ahead.
+        pitch_rad: downward pitch of the camera.
     """
     x, y, z = np.asarray(points_m).T
     c, s = np.cos(pitch_rad), np.sin(pitch_rad)

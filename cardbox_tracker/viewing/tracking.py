@@ -1,4 +1,4 @@
-"""A recording that is tracked while it is shown."""
+"""Shows a recording while it is tracked."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_deviations, joint_values
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.viewing.feed import Feed
 
 _SCALE = 2
 
 
 class ShownTracking:
-    """Shows each image; an observer of :func:`~cardbox_tracker.recordings.track.track_recording`.
+    """Observer of :func:`~cardbox_tracker.recordings.track.track_recording` that shows each image.
 
     Attributes:
-        count: images that have a posture.
+        count: number of images with a posture.
     """
 
     def __init__(self, feed: Feed) -> None:
-        """Begin."""
+        """Start with no images."""
         self._feed = feed
         self._described: object = None
         self.count = 0
 
-    def __call__(self, frame: Frame, estimate: Estimate, tracker: Tracker) -> None:
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Show one image."""
         feed, stamp_ns = self._feed, frame.stamp_ns
         if tracker.body is not self._described:

@@ -1,9 +1,9 @@
-"""Finds what was moved and stays, such as a door left open, so that it becomes background.
+"""Absorbs objects that were moved and stay, such as a door left open, into the background.
 
-Whoever stands before a camera sways: means over fifteen images differ along every edge of the body.
-Of a thing, or of the place that one was taken from, they do not. A region of the silhouette is a
-thing if hardly any pixel in it or near it has changed for many images. Somebody who touches it in
-the image keeps all of it foreground.
+A standing person sways, so means over fifteen images differ along the edges of the body. They do
+not differ along an object, nor at the place from which one was removed. A region of the silhouette
+is therefore taken as an object if hardly any pixel in it or near it has changed for many images. A
+region that a person touches in the image stays foreground.
 """
 
 from __future__ import annotations
@@ -21,31 +21,29 @@ FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
-# Motion is looked for at a quarter of the pixels, the noise of which is halved.
+# Motion is detected at half the resolution, where averaging halves the noise.
 _SCALE = 2
 _SMOOTHING_PX = 0.8
 _LEAST_LEVEL = 1e-3
-# A pixel has changed by so many times the noise: chance does that to one in some thousand.
+# A pixel has changed if it differs by more than this multiple of the noise.
 _TIMES_NOISE = 4.0
-# Images that a mean is made of: a second at 15 Hz, so that noise is a quarter of an image's.
+# Images a mean is computed from; this many reduce the noise to a quarter.
 _BLOCK = 15
-# Images that follow each other more closely, as at more than 20 Hz, do not all count.
+# Images that follow the last one used in less time are skipped, since nobody sways that fast.
 _SPACING_NS = 50_000_000
-# A region is still if no larger share of it with what is near, and of its outline, has changed
-# in so many images. In 300 of them, of things 0.5 % changes, and up to 9 % where hands pass by; of
-# people of eleven sessions, who sway by 3 mm, 54 % or more, of one who stands for a minute 38 %,
-# of one who sways by 1 mm in strong noise 25 % (docs/evaluation/silhouettes.md).
+# A region is still if at most this share of it, its surroundings and its outline has changed;
+# docs/evaluation/silhouettes.md has the shares of objects and people.
 STILL = 0.08
 _NEAR_PX = 8
-# An edge is blurred by the smoothing, and colours are compared at half the resolution.
+# Smoothing blurs an edge, and colours are compared at half the resolution.
 _EDGE_PX = 5
 
 
 class StillRegions:
-    """Tells which regions of the silhouettes have stayed perfectly still, one image at a time."""
+    """Detects regions of the silhouettes that do not move at all, one image at a time."""
 
     def __init__(self, images: int) -> None:
-        """Start with nothing seen; what stays still for so many ``images`` is a thing."""
+        """Start without images; a region that stays still for ``images`` images is an object."""
         self._blocks = max(2, -(-images // _BLOCK))
         self._count = 0
         self._sum = np.zeros((0, 0), np.float32)
@@ -54,10 +52,10 @@ class StillRegions:
         self._still = np.zeros((0, 0), np.int32)
 
     def add(self, brightness: ImageArray, silhouette: ImageArray, level: float) -> Mask | None:
-        """Look at an image and its silhouette, both (H, W), in a light ``level`` times the first.
+        """Add an image and its silhouette, both (H, W) uint8; ``level`` is the light's factor.
 
         Returns:
-            Every fifteenth time, the pixels (H, W) of things that stay; None in between.
+            Every fifteenth time, a mask (H, W) of the objects that stay; None in between.
         """
         height, width = brightness.shape
         size = max(width // _SCALE, 1), max(height // _SCALE, 1)
@@ -92,10 +90,10 @@ class StillRegions:
         return things
 
     def regions(self) -> Iterator[tuple[Mask, float]]:
-        """Yield the regions of the last fifteen silhouettes, and how much of each moves.
+        """Yield each region of the last fifteen silhouettes and the share of it that moves.
 
-        Regions are (H / 2, W / 2), shares from 0 to 1. What is near a region is part of it, so that
-        a head is not left alone where the neck has the colour of the wall.
+        Regions are masks (H / 2, W / 2), shares are 0 to 1. The surroundings of a region count as
+        part of it, so that a head is not separated where the neck has the colour of the wall.
         """
         moves = (self._still < self._blocks).astype(np.uint8)
         joined = cv2.dilate(self._seen, _disk(_NEAR_PX // _SCALE))
@@ -108,10 +106,10 @@ class StillRegions:
 
 
 class Absorber:
-    """Learns what things that stay look like, to become background."""
+    """Learns the appearance of objects that stay, to add them to the background."""
 
     def __init__(self, images: int) -> None:
-        """Start with nothing seen; what stays still for so many ``images`` is learned."""
+        """Start without images; a region that stays still for ``images`` images is learned."""
         self._images = images
         self.restart()
 
@@ -131,18 +129,19 @@ class Absorber:
         level: float,
         stamp_ns: int = 0,
     ) -> tuple[Mask, BackgroundModel] | None:
-        """Look at an image, grey (H, W) or bgr (H, W, 3), and its silhouette (H, W).
+        """Add an image, grey (H, W) or bgr (H, W, 3), and its silhouette (H, W).
 
         Args:
-            image: as the extractor got it.
-            brightness: of it, (H, W).
-            silhouette: 0 or 255.
-            level: of the light, as a factor of what was learned.
-            stamp_ns: of the image, 0 if unknown; nobody sways in images that follow too closely, so
-                those are left out.
+            image: the image that the extractor got.
+            brightness: the brightness of the image, (H, W).
+            silhouette: the silhouette, 0 or 255.
+            level: brightness of the scene relative to the learned background.
+            stamp_ns: stamp of the image, 0 if unknown; an image less than 50 ms after the last one
+                is skipped.
 
         Returns:
-            Pixels (H, W) that have become background, and what they look like now; mostly None.
+            A mask (H, W) of pixels that have become background and a model of their present
+            appearance; None if there are no such pixels.
         """
         if self._is_too_soon(stamp_ns):
             return None
@@ -165,7 +164,7 @@ class Absorber:
         return absorbed
 
     def _is_too_soon(self, stamp_ns: int) -> bool:
-        """Whether an image follows the last one that counted too closely."""
+        """Return whether an image follows the last one used too closely."""
         last_ns = self._last_ns
         if stamp_ns and last_ns is not None and 0 <= stamp_ns - last_ns < _SPACING_NS:
             return True

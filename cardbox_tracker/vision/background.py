@@ -5,10 +5,10 @@ of the empty scene. A pixel of a later image I_t is foreground where
 
     |I_B - I_t| >= threshold * sigma_B
 
-with a threshold of 2. A pixel that happened to be free of noise while learning has a sigma near 0
-and would fire on a single grey level, so sigma_B has a floor. The rule alone flags one noisy pixel
-in twenty; a clean-up follows, which can be turned off. Images in colour add a comparison of their
-chroma, and soft shadows are told from dark clothes.
+with a threshold of 2. A pixel that was free of noise while learning would have a sigma_B near 0 and
+respond to a single grey level, so sigma_B has a lower bound. The rule alone marks one noisy pixel
+in twenty as foreground; a clean-up, which can be turned off, removes those. Colour images are also
+compared by chroma, and soft shadows are distinguished from dark clothes.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ __all__ = [
 
 ImageArray = NDArray[np.uint8]
 
-# Pixels whose median says how bright the scene is: its error is about 4 % of their spread.
+# Number of pixels whose median estimates the brightness of the scene.
 _BRIGHTNESS_SAMPLES = 1000
-# Around foreground, so that all around it is background, and for a hand that only its colour shows.
+# Margins around the foreground, and around the part that is compared by colour.
 _MARGIN_PX, _COLOR_MARGIN_PX = 2, 8
-# Images from one that is compared by colour everywhere to the next.
+# One image in this many is compared by colour everywhere, not only near the foreground.
 _WHOLE_EVERY = 8
-# A fraction of a darker brightness than this is all noise, grey levels.
+# Relative differences are noise where the background is darker than this, grey levels.
 _DARKEST = 8.0
 _LEAST_LIGHT = np.float32(1e-3)
 
@@ -63,7 +63,7 @@ class SilhouetteExtractor:
         self.gain = 1.0
         step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
-        # As far as three standard deviations; OpenCV's own choice is wider and takes longer.
+        # The kernel covers three standard deviations; OpenCV's default is wider and slower.
         size = 2 * math.ceil(3 * config.smoothing_px) + 1
         self._kernel_size = (size, size)
         self._light: LightFollower | None = None
@@ -74,9 +74,9 @@ class SilhouetteExtractor:
             chroma = None if model.chroma is None else model.chroma.mean
             self._light = LightFollower(model.mean, chroma)
         self._absorber = Absorber(config.absorb_after) if config.absorb_after else None
-        # The last silhouette's, and how many images were compared by colour.
+        # Window of the last silhouette, and number of images compared by colour.
         self._last, self._images = Window(0, 0, 0, 0), 0
-        # Allocated once: new memory for each image takes longer than the arithmetic on it.
+        # Scratch memory is allocated once, since allocation takes longer than the arithmetic.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
     def _use(self, model: BackgroundModel) -> None:
@@ -107,7 +107,7 @@ class SilhouetteExtractor:
     def _absorb(
         self, image: ImageArray, brightness: ImageArray, silhouette: ImageArray, stamp_ns: int
     ) -> None:
-        """Let what was moved and stays become background."""
+        """Add objects that were moved and stay to the background."""
         if self._absorber is None:
             return
         absorbed = self._absorber.add(image, brightness, silhouette, self.gain, stamp_ns)
@@ -125,8 +125,8 @@ class SilhouetteExtractor:
         """Return the silhouette (H, W) of an image: 255 for the person, else 0.
 
         Args:
-            image: brightness (H, W), or bgr (H, W, 3).
-            stamp_ns: of the image; 0 if unknown.
+            image: brightness (H, W), or bgr (H, W, 3), uint8.
+            stamp_ns: stamp of the image; 0 if unknown.
 
         Raises:
             ValueError: the image's size is not the background's.
@@ -147,7 +147,7 @@ class SilhouetteExtractor:
         else:
             expected, factor = self._light.follow(brightness)
             self.gain = self._light.level
-            # In more light contrasts are larger, too: the limits are those of the learned light.
+            # More light increases contrasts, and the limits belong to the learned light.
             shares = 1.0 / max(self.gain, 1.0), -factor / max(self.gain, 1.0)
         cv2.addWeighted(
             brightness, shares[0], expected, shares[1], 0.0, dst=signed, dtype=cv2.CV_32F
@@ -200,7 +200,7 @@ class SilhouetteExtractor:
         return near, near
 
     def restart(self) -> None:
-        """Forget what was followed and absorbed: the next image is not the one after the last."""
+        """Forget the light and the absorbed objects: the next image is not the successor."""
         self._last, self._images = Window(0, 0, 0, 0), 0
         if self._light is not None:
             self._light.restart()
@@ -210,12 +210,12 @@ class SilhouetteExtractor:
             self._use(self._learned)
 
     def expect_other_light(self) -> None:
-        """Say that the next image may be in another light than what was learned."""
+        """Expect that the light of the next image differs from that of the learned background."""
         if self._light is not None:
             self._light.expect_step()
 
     def _scene_gain(self, brightness: ImageArray) -> float:
-        """How much brighter the whole scene is now: the person covers less than half of it."""
+        """Return the brightness relative to the background: a median, since the person is small."""
         if self.config.flicker <= 0:
             return 1.0
         ratios = (brightness[self._grid] / self._grid_mean).ravel()
@@ -227,7 +227,7 @@ class SilhouetteExtractor:
 
 
 def warm_up() -> None:
-    """Cut one silhouette, so that no live image waits for the compiler."""
+    """Extract one silhouette, so that the kernels are compiled before the first live image."""
     learner = BackgroundLearner()
     for _ in range(2):
         learner.add(np.full((16, 16, 3), 90, np.uint8))

@@ -9,7 +9,7 @@ from cardbox_tracker.settings import check, setting
 
 @dataclass(frozen=True)
 class BackgroundConfig:
-    """How the scene is learned and how a silhouette is cut out of it."""
+    """Settings of the background model and of the silhouette extraction."""
 
     learn_images: int = setting(30, "images of the empty scene to learn from", limits=(2, 10000))
     threshold: float = setting(
@@ -73,7 +73,7 @@ class BackgroundConfig:
         "6 px, because JPEG smears colours over an outline",
         limits=(0.0, 1.0),
     )
-    # Smoothing spreads a strong contrast beyond the outline.
+    # Smoothing spreads a strong contrast beyond the outline, which ``edge`` reverses.
     edge: float = setting(
         0.35,
         "a pixel is dropped if its difference is less than this fraction of the largest among its "

@@ -1,8 +1,8 @@
-"""A learned background in a file, so that a restarted program need not see the scene empty again.
+"""Saves and loads a learned background, so that a restart does not need an empty scene.
 
 The file is a NumPy archive without pickled objects: the format's name, mean and standard deviation
-of the brightness and of the colours, and the calibration of the camera. What is read is bounded by
-the working size that is expected, before any of it is unpacked.
+of the brightness and of the colours, and the calibration of the camera. The size of every entry is
+checked against the expected working size before it is unpacked.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ _CHROMA_MEAN, _CHROMA_STDDEV = "chroma_mean", "chroma_stddev"
 _SIZE, _K, _DISTORTION, _DISTORTION_MODEL = "size", "k", "distortion", "distortion_model"
 _NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
 _COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
-# Longest text and longest list of numbers, and the overhead of one entry of the archive.
+# Longest text and longest list of numbers of an entry.
 _LONGEST_TEXT, _MOST_NUMBERS, _OVERHEAD = 64, 32, 4096
 _BRIGHTEST = 255.0
 
 
 class StoredBackground(NamedTuple):
-    """A background and the camera it was learned with.
+    """A background and the calibration of the camera that it was learned with.
 
     Attributes:
         model: the learned scene.
-        calibration: of the images it was learned from.
+        calibration: calibration of the images that the scene was learned from.
     """
 
     model: BackgroundModel
     calibration: Calibration
 
     def check_camera(self, calibration: Calibration, name: str) -> None:
-        """Check that ``calibration`` is that of the camera it was learned with.
+        """Check that ``calibration`` belongs to the camera of this background.
 
         Raises:
-            BackgroundFileError: it is another one; the text calls the file ``name``.
+            BackgroundFileError: the calibration differs; the text calls the file ``name``.
         """
         if not self.calibration.is_same(calibration):
             raise BackgroundFileError(
@@ -90,7 +90,7 @@ def background_path(name: str) -> Path | None:
 
 
 def save_background(stored: StoredBackground, path: str | os.PathLike[str]) -> None:
-    """Write a background: a reader sees the old file or the new one, whole.
+    """Write a background atomically: a reader sees either the old file or the new one.
 
     Raises:
         BackgroundFileError: the file cannot be written.
@@ -136,7 +136,7 @@ def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> Stor
             f"cannot read the background {name}: {error.strerror or error}; give the file that the "
             "background node wrote"
         ) from None
-    # What zipfile and numpy raise for damaged archives.
+    # These are the errors of zipfile and numpy for damaged archives.
     except (
         ValueError,
         KeyError,

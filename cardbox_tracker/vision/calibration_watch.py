@@ -1,4 +1,4 @@
-"""Follows a change of the camera's calibration that lasts; what is brief or invalid is ignored.
+"""Follows lasting changes of a camera's calibration and ignores brief or invalid ones.
 
 A single wrong CameraInfo, or a second camera on the same topic, must not discard what was learned
 with the right one.
@@ -13,24 +13,24 @@ from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
 
 LASTING = 30
-"""A change is followed once so many calibrations in a row say the same: one or two seconds."""
+"""A change is accepted after this many equal calibrations in a row, one or two seconds."""
 
-# A remark on what was ignored stays for so many good ones.
+# A remark is removed after this many valid calibrations.
 _REMEMBERED = 150
 
 
 class CalibrationWatch:
-    """Decides which calibration of those that arrive is the camera's.
+    """Selects the calibration of the camera from the CameraInfo messages that arrive.
 
     Attributes:
-        current: the one in use; None before the first valid one.
+        current: calibration in use; None before the first valid one.
         seen: True once any CameraInfo arrived, valid or not.
-        ignored: how many others were ignored.
-        remark: what was ignored lately, in words; empty if nothing was.
+        ignored: number of messages that were ignored.
+        remark: description of a recently ignored message; empty if there is none.
     """
 
     def __init__(self, topic: str, image_topic: str) -> None:
-        """``topic`` is where calibrations of ``image_topic`` come from, for the texts."""
+        """Watch the calibrations on ``topic``, which belong to the images on ``image_topic``."""
         self.current: Calibration | None = None
         self.seen = False
         self.ignored = 0
@@ -42,10 +42,10 @@ class CalibrationWatch:
         self._good = 0
 
     def see(self, message: Any) -> bool:
-        """Take a sensor_msgs/CameraInfo; return whether the calibration in use has changed.
+        """Process a sensor_msgs/CameraInfo; return whether the calibration in use has changed.
 
         Raises:
-            CameraError: it is invalid, and there is no valid one yet.
+            CameraError: the message is invalid and no valid one has arrived yet.
         """
         self.seen = True
         try:

@@ -17,7 +17,7 @@ from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_prob
 FloatArray = NDArray[np.float64]
 
 DISTORTION_MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
-# What images of JPEG can have; a CameraInfo may hold any number, a file one of any length.
+# Largest side of a JPEG image; a CameraInfo and a file may contain any number.
 _MOST_SIDE_PX = 65535
 
 
@@ -32,7 +32,7 @@ class Camera:
         fy: vertical focal length, px.
         cx: principal point, px; (0, 0) is the centre of the first pixel.
         cy: principal point, px.
-        pitch_rad: how far the camera looks down; the reference frame stays level.
+        pitch_rad: downward pitch of the camera, rad; the reference frame stays level.
     """
 
     width: int
@@ -62,7 +62,7 @@ class Camera:
         return replace(self, pitch_rad=pitch_rad)
 
     def reference_to_optical_rotation(self) -> FloatArray:
-        """Rotation (3, 3) from the reference frame into the optical frame."""
+        """Return the rotation (3, 3) from the reference frame into the optical frame."""
         # Level camera: x_optical = Y, y_optical = -Z, z_optical = -X of the reference frame.
         level = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
         c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
@@ -71,17 +71,17 @@ class Camera:
         return rotation
 
     def reference_to_optical(self, points_m: FloatArray) -> FloatArray:
-        """Turn points (..., 3) from the reference frame (level) into the optical frame, metres."""
+        """Rotate points (..., 3), metres, from the level reference frame into the optical frame."""
         turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation().T
         return turned
 
     def optical_to_reference(self, points_m: FloatArray) -> FloatArray:
-        """Turn points (..., 3) from the optical frame into the reference frame (level), metres."""
+        """Rotate points (..., 3), metres, from the optical frame into the level reference frame."""
         turned: FloatArray = np.asarray(points_m) @ self.reference_to_optical_rotation()
         return turned
 
     def project(self, points_m: FloatArray) -> FloatArray:
-        """Project points (..., 3) of the optical frame, z > 0, to pixels (..., 2)."""
+        """Project points (..., 3), metres, of the optical frame, z > 0, to pixels (..., 2)."""
         points = np.asarray(points_m, dtype=np.float64)
         z = points[..., 2]
         return np.stack(
@@ -91,7 +91,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a CameraInfo message or a camera_calibration file says of a real camera.
+    """Calibration of a real camera, from a CameraInfo message or a camera_calibration file.
 
     Attributes:
         width: calibrated image width, px.
@@ -111,16 +111,16 @@ class Calibration:
 
     @property
     def is_calibrated(self) -> bool:
-        """False for the all-zero matrix of an uncalibrated camera, and where K is no matrix."""
+        """Whether K is a possible matrix; it is all zero for an uncalibrated camera."""
         return not matrix_problem(self.k, self.width, self.height)
 
     @property
     def is_distorted(self) -> bool:
-        """True if the lens bends straight lines."""
+        """Whether any distortion coefficient is not zero."""
         return bool(np.any(self.distortion != 0))
 
     def is_same(self, other: Calibration) -> bool:
-        """Return whether ``other`` describes the same camera, whatever its frame is called."""
+        """Return whether ``other`` has the same intrinsics; the names of the frames may differ."""
         return (
             (self.width, self.height) == (other.width, other.height)
             and np.array_equal(self.k, other.k)
@@ -128,11 +128,11 @@ class Calibration:
         )
 
     def _lens(self) -> tuple[Any, ...]:
-        """Model and coefficients of the distortion; all lenses without any are alike."""
+        """Return model and coefficients of the distortion; empty without distortion."""
         return (self.distortion_model, *self.distortion) if self.is_distorted else ()
 
     def __str__(self) -> str:
-        """Return size, focal length and lens in short."""
+        """Return a short description with size, focal length and lens."""
         lens = self.distortion_model if self.is_distorted else "no distortion"
         return f"{self.width}x{self.height}, f {self.k[0, 0]:g} px, {lens}"
 
@@ -148,7 +148,7 @@ class Calibration:
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:
-        """Return what undistorts an image of that working resolution; None without distortion.
+        """Return a rectifier for images of ``width`` x ``height`` px; None without distortion.
 
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
@@ -212,7 +212,7 @@ class Rectifier:
     def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return ``image`` (H, W) or (H, W, 3) undistorted.
 
-        Pixels that the lens never saw repeat the border, so that they stay background.
+        Pixels outside the lens's view repeat the border, so that they stay background.
         """
         rectified = cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(rectified, dtype=np.uint8)
@@ -222,7 +222,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a YAML file as camera_calibration writes it.
 
     Raises:
-        CameraError: the file cannot be read or lacks something; the text names the key.
+        CameraError: the file cannot be read or lacks a key; the text names the key.
     """
     name = os.fspath(path)
     try:

@@ -1,4 +1,4 @@
-"""What can be wrong with the matrix and the distortion of a calibration, in words."""
+"""Checks of the intrinsic matrix and the distortion coefficients of a calibration."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# A focal length of a fiftieth of the image's width would see 177 degrees, one of a thousand widths
-# a twentieth of a degree.
+# Limits of the focal length as multiples of the image's width: fields of view from 177 degrees down
+# to a twentieth of a degree.
 _SHORTEST, _LONGEST = 0.02, 1000.0
-# The principal point lies outside of the image where a driver cuts a region out of it.
+# The principal point lies outside the image if a driver crops a region of interest.
 _FARTHEST = 100.0
 
 
 def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
-    """Say what is wrong with a matrix K (3, 3) for images of a size in px, if anything.
+    """Return the problem of a matrix K (3, 3) for images of a size in px; empty if there is none.
 
-    The text goes behind the name of the matrix: "is all zero", "has values that are ...".
+    The text continues a sentence whose subject is the matrix, such as "is all zero".
     """
     values = np.asarray(k, dtype=np.float64)
     if not values.any():
@@ -42,7 +42,7 @@ def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
 
 
 def distortion_problem(distortion: NDArray[Any]) -> str:
-    """Say what is wrong with the values of distortion coefficients (n,), if anything."""
+    """Return the problem of distortion coefficients (n,); empty if there is none."""
     values = np.asarray(distortion, dtype=np.float64)
     if np.isfinite(values).all():
         return ""

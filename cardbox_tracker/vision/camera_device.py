@@ -1,4 +1,4 @@
-"""Cameras as OpenCV opens them: devices, video files, what a device offers, manual exposure."""
+"""Opens devices and video files with OpenCV, lists a device's modes and locks its exposure."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def open_device(device: str) -> cv2.VideoCapture:
     """Open a V4L2 device such as ``/dev/video0`` or ``0``.
 
     Raises:
-        CameraError: it does not exist or cannot be opened.
+        CameraError: the device does not exist or cannot be opened.
     """
     path = Path(f"/dev/video{device}" if device.isdigit() else device)
     if not path.exists():
@@ -40,7 +40,7 @@ def open_video(name: str) -> cv2.VideoCapture:
     """Open a video file.
 
     Raises:
-        CameraError: it does not exist, or OpenCV cannot read it.
+        CameraError: the file does not exist, or OpenCV cannot read it.
     """
     path = Path(name).expanduser()
     if not path.is_file():
@@ -55,10 +55,10 @@ def open_video(name: str) -> cv2.VideoCapture:
 
 
 def lock_exposure(capture: cv2.VideoCapture) -> dict[str, bool]:
-    """Set exposure and white balance to manual, at their present values.
+    """Set exposure and white balance to manual and keep their present values.
 
     Returns:
-        For ``exposure`` and ``white balance`` whether the device allowed it.
+        Whether the device accepted this, by ``exposure`` and ``white balance``.
     """
     exposure = capture.get(cv2.CAP_PROP_EXPOSURE)
     fixed = capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, _V4L2_MANUAL)
@@ -69,7 +69,7 @@ def lock_exposure(capture: cv2.VideoCapture) -> dict[str, bool]:
 
 
 def describe_devices(devices: Path = _DEVICES, names: Path = _NAMES) -> str:
-    """Return what every camera offers, as text for a person.
+    """Return a readable list of the cameras and their modes.
 
     Args:
         devices: folder of the devices ``video0``, ``video1``, ...
@@ -92,7 +92,7 @@ def _offer(path: Path) -> str:
     try:
         capture = open_device(str(path))
     except CameraError:
-        # A camera has further devices beside the one that delivers images.
+        # A camera also has devices that deliver no images.
         return "delivers no images, or is in use"
     try:
         return describe_capture(capture)
@@ -101,7 +101,7 @@ def _offer(path: Path) -> str:
 
 
 def describe_capture(capture: cv2.VideoCapture) -> str:
-    """Return the sizes and rates of an open device, and what can be set to manual.
+    """Return the sizes and rates of an open device and which controls can be set to manual.
 
     Exposure and white balance are automatic afterwards.
     """

@@ -1,4 +1,4 @@
-"""The calibration in a CameraInfo, of rclpy or of a recording: only its fields are read."""
+"""Converts a CameraInfo message of rclpy or of a recording; only its fields are read."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from cardbox_tracker.vision.camera_checks import matrix_problem
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
     """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 
-    A region of interest and binning are taken into the matrix.
+    The matrix is adapted to the region of interest and to binning. R and P are not used.
 
     Raises:
-        CameraError: the camera is not calibrated, or K has values that no camera has; the text
-            names both topics. R and P are not used.
+        CameraError: the camera is not calibrated, or K has impossible values; the text names both
+            topics.
     """
     k = np.array(message.k, dtype=np.float64).reshape(3, 3)
     width, height = int(message.width), int(message.height)
-    # Without a size, that is what has to be said.
+    # Without a size, K cannot be checked; the size itself is refused later.
     problem = matrix_problem(k, width, height) if width > 0 < height else ""
     if problem:
         raise CameraError(

@@ -1,10 +1,10 @@
-"""How far the colours of an image are from those of the empty scene, whatever its brightness.
+"""Compares the chroma of an image with that of the empty scene, independent of brightness.
 
-A shadow darkens all channels alike: the chroma (Cr, Cb) shrinks in proportion to the brightness.
-What is left after that proportion is a difference that no shadow makes, and clothes as bright as
-the wall still have it. JPEG stores chroma at half the resolution and smears it over blocks, so it
-is compared at half the resolution, and its outline is put where it falls to a fraction of its
-highest value nearby: halfway down a smeared edge is where the edge was.
+A shadow darkens all channels alike, so the chroma (Cr, Cb) shrinks in proportion to the brightness.
+A difference that remains after this proportion is removed is not a shadow, and it shows clothes
+that are as bright as the wall. JPEG stores chroma at half the resolution and smears it over blocks.
+Chroma is therefore compared at half the resolution, and the outline is put where the difference
+falls to a fraction of its maximum nearby.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from cardbox_tracker.vision.window import Window
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-# Mean over so many pixels, at half the resolution.
+# Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
-# How far around a pixel the highest difference is looked for: half of a JPEG chroma block.
+# Radius within which the highest difference is searched: half of a JPEG chroma block.
 _REACH_PX = 3
 _WINDOW = np.ones((2 * _REACH_PX + 1, 2 * _REACH_PX + 1), np.uint8)
 _NEUTRAL = 128.0
-# Dark pixels have hardly any colour: the proportion below this brightness is not trusted.
+# Dark pixels have hardly any colour, so brightness ratios are limited below this brightness.
 _DARKEST = 8.0
 _RATIOS = (0.2, 1.6)
-# A channel that the camera cuts off at 255 changes the colour: it is expected from here on.
+# A channel above this may be saturated, which changes the colour.
 _CUT_OFF = 245.0
-# Pixels whose medians say how the white balance has changed, and the strongest change.
+# Number of pixels whose medians estimate the white balance, and its largest change.
 _SAMPLES = 1200
 _STRONGEST_CAST = 0.2
 
@@ -53,7 +53,7 @@ def chroma_planes(image: ImageArray) -> ImageArray:
 
 
 def _small(image: ImageArray) -> ImageArray:
-    """Return the same as pixels (h, w, 3)."""
+    """Return brightness, Cr and Cb (h, w, 3) uint8, smoothed, at half the resolution."""
     height, width = image.shape[:2]
     size = (max(width // 2, 1), max(height // 2, 1))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
@@ -61,7 +61,7 @@ def _small(image: ImageArray) -> ImageArray:
 
 
 def bgr_of(planes: FloatImage) -> FloatImage:
-    """Return blue, green, red (3, h, w), not cut off, of brightness, Cr and Cb (3, h, w)."""
+    """Convert brightness, Cr and Cb (3, h, w) to blue, green and red (3, h, w), not clipped."""
     brightness, red_part, blue_part = planes[0], planes[1] - _NEUTRAL, planes[2] - _NEUTRAL
     red = brightness + 1.403 * red_part
     blue = brightness + 1.773 * blue_part
@@ -85,16 +85,16 @@ class ChromaScore:
 
         Args:
             model: the empty scene.
-            threshold: standard deviations from which on a difference counts.
+            threshold: smallest difference that counts, in standard deviations.
             min_contrast: smallest difference that counts, grey levels.
-            edge: fraction of the highest score nearby that the outline is put at.
-            follow: allow for a white balance that has changed.
-            before: what compared the images so far, whose white balance still holds.
+            edge: fraction of the highest score nearby at which the outline is put.
+            follow: compensate a change of the white balance.
+            before: the previous score, whose estimate of the white balance is kept.
         """
         self._mean = model.mean
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
         self._weights = np.asarray(1.0 / limits, np.float32)
-        # Beside a bright place, averaged pixels have something of it.
+        # Averaging mixes a bright place into its neighbours.
         highest = cv2.dilate(bgr_of(model.mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))
         self._brightest = np.asarray(highest, np.float32).reshape(model.mean.shape[1:])
         self._edge = np.float32(edge)
@@ -108,12 +108,12 @@ class ChromaScore:
             self._cast = before._cast
 
     def __call__(self, image: ImageArray, window: Window | None = None) -> FloatImage:
-        """Return a margin for a bgr image (H, W, 3): not negative where it is foreground.
+        """Return a margin for a bgr image (H, W, 3) uint8, which is >= 0 in the foreground.
 
         Args:
-            image: of the size of those learned.
-            window: where the margin is wanted, its edges at even places. Without it all of the
-                image is looked at, also for its white balance.
+            image: an image of the size of the learned ones.
+            window: part that is compared, with even edges. Without it the whole image is compared
+            and its white balance is estimated.
 
         Returns:
             (H, W), or of the window's size.
@@ -129,14 +129,14 @@ class ChromaScore:
         return np.asarray(cv2.resize(score, part.shape[1::-1]), np.float32)
 
     def without_cast(self, model: ChromaModel) -> ChromaModel:
-        """Return colours seen now, in the white balance that the scene was learned in."""
+        """Convert colours of the present white balance to that of the learned scene."""
         cast = np.array([0.0, *self._cast], np.float32)[:, None, None]
         return ChromaModel(model.mean - cast * model.mean[0], model.stddev)
 
     def _see_cast(self, colors: ImageArray) -> None:
-        """Find Cr and Cb that the white balance has added, as shares of the brightness.
+        """Estimate the Cr and Cb that the white balance has added, as shares of the brightness.
 
-        Medians over the image: the person covers less than half of it.
+        Medians over the image are used, since the person covers less than half of it.
         """
         _collect_shares(np.ascontiguousarray(colors[self._grid]), self._known, self._shares)
         middle = self._shares.shape[1] // 2
@@ -147,7 +147,7 @@ class ChromaScore:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _collect_shares(colors: Any, known: Any, shares: Any) -> None:
-    """Write by how much Cr and Cb of each sample differ from what is known, over its brightness."""
+    """Write the differences of Cr and Cb from the known values, divided by the brightness."""
     neutral, darkest = np.float32(_NEUTRAL), np.float32(_DARKEST)
     count = 0
     for v in range(known.shape[1]):
@@ -165,9 +165,9 @@ def _collect_shares(colors: Any, known: Any, shares: Any) -> None:
 def _score(
     colors: Any, mean: Any, brightest: Any, weights: Any, cast: Any, place: Any, score: Any
 ) -> None:
-    """Distance of each pixel's chroma from the background's, in units of its limit.
+    """Write the distance of each pixel's chroma from the background's, in units of its limit.
 
-    The colours are those of a part that begins at the row and column ``place`` of the model.
+    The colours belong to a part that begins at row and column ``place`` of the model.
     """
     neutral = np.float32(_NEUTRAL)
     darkest = np.float32(_DARKEST)
@@ -192,7 +192,7 @@ def _score(
 
 @njit(cache=True, nogil=True)
 def _margin(score: Any, highest: Any, edge: Any) -> None:
-    """Turn the score into how far it is above 1 and above its part of the highest nearby."""
+    """Subtract 1, or the fraction ``edge`` of the highest score nearby if that is more."""
     one = np.float32(1)
     height, width = score.shape
     for v in range(height):

@@ -1,6 +1,6 @@
-"""Depth images as ROS has them (REP 118): 16UC1 in millimetres, 32FC1 in metres.
+"""Decodes the depth images of REP 118: 16UC1 in millimetres, 32FC1 in metres.
 
-Or packed, as image_transport's plugin ``compressedDepth`` sends them.
+Both may be packed by the plugin ``compressedDepth`` of image_transport.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from cardbox_tracker.vision.encodings import image_parts
 DepthImage = NDArray[np.float32]
 
 _LONGEST_PX = 32_766
-# What is before the PNG of a compressedDepth message: a number of the format, and two parameters of
-# inverse depths, in which 32FC1 is packed.
+# Header before the PNG of a compressedDepth message: the number of the format and the two
+# parameters of the inverse depths in which 32FC1 is packed.
 _PACKED = struct.Struct("<iff")
 _PNG = b"\x89PNG"
 _KINDS = {"16UC1": ("u2", 0.001), "mono16": ("u2", 0.001), "32FC1": ("f4", 1.0)}
@@ -33,7 +33,7 @@ def decode_depth(
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
     Raises:
-        EncodingError: it is no depth image, or the bytes do not fit it.
+        EncodingError: the encoding is not that of a depth image, or the bytes do not fit it.
     """
     if encoding not in _KINDS:
         raise EncodingError(
@@ -56,14 +56,14 @@ def decode_depth(
 def unpack_depth(data: Any, encoding: str) -> DepthImage:
     """Return the depth image (H, W), metres, in the bytes of a ``compressedDepth`` message.
 
-    Metres of 32FC1 are packed as whole numbers n = a / z + b; 0 is unknown.
+    32FC1 packs a depth of z metres as the whole number n = a / z + b; 0 is unknown.
 
     Args:
-        data: of the message.
-        encoding: its ``format``, such as ``16UC1; compressedDepth png``.
+        data: the data of the message.
+        encoding: the ``format`` of the message, such as ``16UC1; compressedDepth png``.
 
     Raises:
-        EncodingError: it is none, or packed in another way than as PNG.
+        EncodingError: the message is no depth image or not packed as PNG.
     """
     kind, _, how = encoding.partition(";")
     raw = bytes(data)
@@ -86,7 +86,7 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
 
 
 def depth_from_image(message: Any) -> DepthImage:
-    """Return the depth (H, W), metres, in a message, of rclpy or of a recording.
+    """Return the depth (H, W), metres, in a message of rclpy or of a recording.
 
     Args:
         message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
@@ -100,7 +100,7 @@ def depth_from_image(message: Any) -> DepthImage:
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
-    """Return a depth image of that size; each pixel is one that was measured, not a mean."""
+    """Resize a depth image by picking pixels, so that each value is measured and no mean."""
     if depth_m.shape == (height, width):
         return depth_m
     resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
@@ -108,24 +108,24 @@ def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
 
 
 def median_depth(depths_m: Sequence[DepthImage]) -> DepthImage:
-    """Return the median (H, W) of depth images of one size, each pixel of where it is known."""
+    """Return the median (H, W) over depth images of one size; unknown values are left out."""
     stack = np.array(depths_m, np.float32)
     stack[~(np.isfinite(stack) & (stack > 0))] = np.nan
-    # Where nothing is known in any of them.
+    # nanmedian warns where a pixel is unknown in all images.
     stack[:, np.isnan(stack).all(axis=0)] = 0.0
     return np.asarray(np.nanmedian(stack, axis=0), np.float32)
 
 
 def as_seen_by(depth_m: DepthImage, own: Camera, camera: Camera) -> DepthImage:
-    """Return a depth image as another pinhole camera at the same place has it; 0 beside its view.
+    """Resample a depth image for another pinhole camera at the same place; 0 outside the view.
 
     Args:
-        depth_m: (H, W), of any size with the proportions of ``own``.
+        depth_m: (H, W), metres, with the aspect ratio of ``own``.
         own: the camera that measured it.
         camera: the camera whose pixels the result has.
 
     Raises:
-        EncodingError: the image is longer than OpenCV can turn.
+        EncodingError: the image is longer than OpenCV can remap.
     """
     height, width = depth_m.shape
     if max(height, width) > _LONGEST_PX:

@@ -1,4 +1,4 @@
-"""Silhouettes from depth images: of whoever is nearer than a limit. Nothing has to be learned.
+"""Extracts silhouettes from depth images by a distance limit; nothing has to be learned.
 
 The person has to stand free of the wall, with nothing else nearer than the limit but the floor
 below the hips, which does not count.
@@ -15,10 +15,10 @@ from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.regions import clean_silhouette
 
 WITHIN_LIMITS_M = 0.3, 20.0
-"""What the limit may be."""
+"""Range of the limit, metres."""
 
-# Beside a person a depth camera does not see what only one of its eyes sees, and at edges often
-# nothing: pixels of unknown depth between near ones are theirs. About 5 px at a width of 320.
+# Unknown pixels between near ones belong to the person: a depth camera measures nothing at edges
+# and where only one of its eyes sees.
 _GAP = 1 / 64
 _SPECKS = BackgroundConfig()
 
@@ -27,7 +27,7 @@ def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]
     """Return the silhouette (H, W), 0 or 255, of what is nearer than ``within_m``.
 
     Args:
-        depth_m: (H, W), metres, not finite or 0 where it is not known.
+        depth_m: (H, W), metres; not finite or 0 where it is unknown.
         within_m: the limit, metres along the optical axis.
     """
     is_known = np.isfinite(depth_m) & (depth_m > 0)

@@ -1,4 +1,4 @@
-"""Mean and standard deviation of the empty scene's pixels, learned from images of it."""
+"""Learns the mean and standard deviation of each pixel from images of the empty scene."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class BackgroundModel:
     Attributes:
         mean: mean brightness.
         stddev: standard deviation of the brightness.
-        chroma: the same of the colours; None if the images were grey.
+        chroma: mean and standard deviation of the colours; None if the images were grey.
     """
 
     mean: FloatImage
@@ -39,22 +39,22 @@ class BackgroundLearner:
 
     @property
     def count(self) -> int:
-        """Images learned so far."""
+        """Number of images learned so far."""
         return self._brightness.count
 
     def add(self, image: NDArray[np.uint8] | FloatImage) -> None:
         """Learn from one image: brightness (H, W), or bgr (H, W, 3) uint8.
 
         Raises:
-            ValueError: its size differs from that of the images before it.
+            ValueError: the size differs from that of the earlier images.
         """
         self._brightness.add(brightness_of(image) if image.ndim == 3 else image)
-        # One grey image among them, and there is no colour to compare with.
+        # A single grey image makes the comparison by colour impossible.
         if image.ndim == 3 and self._chroma.count == self._brightness.count - 1:
             self._chroma.add(chroma_planes(np.asarray(image, np.uint8)))
 
     def model(self) -> BackgroundModel:
-        """Return what was learned.
+        """Return the learned background.
 
         Raises:
             ValueError: fewer than two images were added.

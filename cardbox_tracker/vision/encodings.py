@@ -1,8 +1,8 @@
-"""Images as cameras send them, turned into brightness or colour.
+"""Decodes camera images to brightness or colour.
 
 The names are those of ``sensor_msgs/image_encodings``. A Bayer pattern is named after the colours
-of the first row's first two pixels and the second row's first two; OpenCV names the same pattern
-after the second row's second and third pixel, which is why the table below looks crossed.
+of the first row's first two pixels and the second row's first two. OpenCV names the same pattern
+after the second row's second and third pixel, so the names in the table below differ.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 ImageArray = NDArray[np.uint8]
 
 MOST_PIXELS = 2**25
-"""A little more than 8K video has; images with more are refused before memory is taken for them."""
+"""Slightly more than an 8K image; larger images are refused before memory is allocated."""
 
 
 class _Encoding(NamedTuple):
-    """Bytes a pixel, channels of the array, and OpenCV's codes to grey and bgr (None: as it is)."""
+    """Bytes per pixel, channels of the array, OpenCV's codes to grey and bgr (None: unchanged)."""
 
     bytes_per_pixel: int
     channels: int
@@ -53,7 +53,7 @@ SUPPORTED_ENCODINGS: tuple[str, ...] = tuple(_ENCODINGS)
 
 
 def image_parts(message: Any) -> tuple[Any, int, int, int, str, bool]:
-    """Return what the decoders take of a sensor_msgs/Image, of rclpy or of a recording."""
+    """Return the decoders' arguments from a sensor_msgs/Image of rclpy or of a recording."""
     return (
         message.data,
         message.height,
@@ -67,13 +67,13 @@ def image_parts(message: Any) -> tuple[Any, int, int, int, str, bool]:
 def decode_grey(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool = False
 ) -> ImageArray:
-    """Return the brightness (H, W) uint8 of an image; of mono8 without a copy.
+    """Return the brightness (H, W) uint8 of an image; mono8 is not copied.
 
     Args:
         data: the bytes, as bytes, array.array or uint8 array.
         height: rows.
         width: columns.
-        step: bytes a row, padding included.
+        step: bytes per row, padding included.
         encoding: one of ``SUPPORTED_ENCODINGS``.
         is_bigendian: byte order of mono16.
 
@@ -105,7 +105,7 @@ def decode_as_sent(
     is_bigendian: bool = False,
     most_pixels: float = MOST_PIXELS,
 ) -> ImageArray:
-    """Return (H, W, 3) bgr of an image with colours, (H, W) of one without: see the two above.
+    """Return bgr (H, W, 3) uint8 of a colour image, brightness (H, W) uint8 of a grey one.
 
     Raises:
         EncodingError: the encoding is not supported, the bytes do not fit it, or the image has more
@@ -122,9 +122,9 @@ def decode_compressed(
     """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
 
     Args:
-        data: its bytes.
-        grey: True for brightness, False for colours, None for what the image has.
-        most_pixels: larger images are refused, before memory is taken for them.
+        data: the bytes of the file.
+        grey: True for brightness, False for colours, None for the channels of the image.
+        most_pixels: larger images are refused before memory is allocated.
 
     Raises:
         EncodingError: the bytes cannot be decoded as an image, or it is too large.
@@ -145,7 +145,7 @@ def decode_compressed(
 
 
 def _is_cut_off(raw: ImageArray) -> bool:
-    """Whether data is empty or a JPEG without its end, which older OpenCV fills with grey."""
+    """Return whether data is empty or a truncated JPEG, which older OpenCV fills with grey."""
     data = raw.tobytes()
     # The marker cannot occur within a scan; a thumbnail, which has one too, lies before it.
     is_jpeg = data.startswith(b"\xff\xd8")
@@ -155,7 +155,7 @@ def _is_cut_off(raw: ImageArray) -> bool:
 def _pixels(
     data: Any, height: int, width: int, step: int, encoding: str, is_bigendian: bool
 ) -> tuple[ImageArray, _Encoding]:
-    """The image as an array in its own layout, and what its encoding is."""
+    """Return the image as an array in its own layout, and its encoding."""
     check_pixels(width, height, MOST_PIXELS)
     kind = _ENCODINGS.get(encoding)
     if kind is None:
@@ -189,7 +189,7 @@ def _pixels(
         )
     rows = raw[: height * step].reshape(height, step)[:, :row_bytes]
     if encoding == "mono16":
-        # The high byte is the brightness to eight bits.
+        # The high byte is the brightness in eight bits.
         return np.ascontiguousarray(rows[:, 0 if is_bigendian else 1 :: 2]), kind
     if kind.channels == 1:
         return (rows if step == row_bytes else np.ascontiguousarray(rows)), kind

@@ -1,4 +1,4 @@
-"""Where a further camera stands: the rigid transform between two optical frames."""
+"""Extrinsics of a further camera: the rigid transform between two optical frames."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from cardbox_tracker.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 
-# How far a matrix in a file may be from a rotation: files have three digits and more.
+# Tolerance for a rotation matrix in a file, which may be rounded to three digits.
 _ROTATION_TOLERANCE = 1e-2
-# No length is larger, even in millimetres; sums of such numbers stay finite.
+# Largest plausible length, even in millimetres; sums of such numbers stay finite.
 _LARGEST = 1e6
 
 
@@ -24,14 +24,14 @@ def _is_possible(values: FloatArray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Extrinsics:
-    """How points of the first camera's optical frame are seen by another camera.
+    """Rigid transform from the first camera's optical frame into another camera's.
 
     A point p of that frame is ``rotation @ p + translation_m`` in the other's optical frame.
 
     Attributes:
         rotation: (3, 3).
         translation_m: (3,), metres.
-        source: where they are from, in words.
+        source: description of the origin, for messages.
     """
 
     rotation: FloatArray
@@ -40,10 +40,10 @@ class Extrinsics:
 
     @classmethod
     def of(cls, matrix: object, source: str = "") -> Extrinsics:
-        """Make them of a matrix, (4, 4) or (3, 4), of numbers.
+        """Create extrinsics from a matrix, (4, 4) or (3, 4).
 
         Raises:
-            CameraError: it is no rigid transform; the text names ``source``.
+            CameraError: the matrix is no rigid transform; the text names ``source``.
         """
         try:
             values = np.array(matrix, dtype=np.float64)
@@ -66,10 +66,10 @@ class Extrinsics:
 
     @classmethod
     def of_vectors(cls, rotation: object, translation_m: object, source: str = "") -> Extrinsics:
-        """Make them of a rotation vector (3,), rad, and a translation (3,), metres.
+        """Create extrinsics from a rotation vector (3,), rad, and a translation (3,), metres.
 
         Raises:
-            CameraError: they are not three finite numbers each.
+            CameraError: the vectors do not have three finite numbers each.
         """
         try:
             vectors = np.array([rotation, translation_m], dtype=np.float64).reshape(2, 3)
@@ -84,23 +84,23 @@ class Extrinsics:
         return cls(turn, vectors[1].copy(), source)
 
     def after(self, first: Extrinsics) -> Extrinsics:
-        """Return the transform that does ``first``, then this one."""
+        """Return the composition that applies ``first``, then this transform."""
         moved = self.rotation @ first.translation_m + self.translation_m
         return Extrinsics(self.rotation @ first.rotation, moved, self.source or first.source)
 
     def inverse(self) -> Extrinsics:
-        """Return the transform back."""
+        """Return the inverse transform."""
         turned = self.rotation.T
         return Extrinsics(turned, -turned @ self.translation_m, self.source)
 
     @property
     def centre_m(self) -> FloatArray:
-        """The other camera's centre in the first camera's optical frame, (3,)."""
+        """Centre (3,), metres, of the other camera in the first camera's optical frame."""
         centre: FloatArray = -self.rotation.T @ self.translation_m
         return centre
 
     def difference(self, other: Extrinsics) -> tuple[float, float]:
-        """Return the angle between the directions, rad, and the distance of the centres, metres."""
+        """Return the angle between the rotations, rad, and the distance of the centres, metres."""
         turned = cv2.Rodrigues(self.rotation @ other.rotation.T)[0]
         angle = float(np.linalg.norm(turned))
         return angle, float(np.linalg.norm(self.centre_m - other.centre_m))

@@ -1,4 +1,4 @@
-"""Files with extrinsics: a camchain of Kalibr (YAML), a camera group of aniposelib (TOML)."""
+"""Reads and writes extrinsics: camchains of Kalibr (YAML), camera groups of aniposelib (TOML)."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
-# aniposelib counts in the unit of its board, usually millimetres; cameras that see one person are
-# not farther apart than this, metres.
+# aniposelib uses the unit of its board, usually millimetres; cameras that see one person are nearer
+# to each other than this, metres.
 _FARTHEST_M = 30.0
 
 
 def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
-    """Read where cameras stand against the first one.
+    """Read the extrinsics of cameras relative to the first one.
 
     A camera is found by its name in the file; in a camchain also by the first part of its
     ``rostopic``.
 
     Args:
-        path: a camchain of Kalibr, or a TOML file of aniposelib. Lengths are metres, but
-            millimetres in a TOML file whose cameras would be more than 30 m apart.
+        path: a camchain of Kalibr, or a TOML file of aniposelib. Lengths are metres; a TOML file
+            whose cameras would be more than 30 m apart is read as millimetres.
         cameras: names, the first camera first.
 
     Returns:
-        Those of each further camera, by its name.
+        Extrinsics of each further camera, by its name.
 
     Raises:
         CameraError: the file cannot be read, lacks a camera, or has no rigid transforms.
@@ -47,7 +47,7 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
     try:
         data = tomllib.loads(text) if name.endswith(".toml") else parse_small_yaml(text)
     except (ValueError, RecursionError, SmallYamlError) as error:
-        # Of tomllib also numbers of thousands of digits, and lists in lists in lists.
+        # tomllib also raises these for very long numbers and for deeply nested lists.
         raise CameraError(
             f"the extrinsics {name} cannot be parsed: {cut(str(error))}; expected {_EXPECTED}"
         ) from None
@@ -72,9 +72,9 @@ def save_camchain(
     """Write a camchain as Kalibr does, which :func:`load_extrinsics` reads.
 
     Args:
-        path: written atomically.
-        cameras: by their namespaces, the first camera first; without lens distortion.
-        extrinsics: of each further camera against the first one, by its namespace.
+        path: the file, which is written atomically.
+        cameras: cameras without lens distortion by namespace, the first camera first.
+        extrinsics: extrinsics of each further camera relative to the first one, by namespace.
 
     Raises:
         FileWriteError: the file cannot be written.
@@ -105,7 +105,7 @@ def save_camchain(
 
 
 def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
-    """Return poses by name: from the first camera of the chain into each, by key and by topic."""
+    """Return transforms from the chain's first camera into each camera, by key and by topic."""
     poses: dict[str, Extrinsics] = {}
     # cam0, cam1, ..., cam10
     chain = sorted(entries, key=lambda key: (len(key), key))
@@ -123,7 +123,7 @@ def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, 
 
 
 def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
-    """Return poses by name: from the world of the file into each camera."""
+    """Return transforms from the world frame of the file into each camera, by name."""
     poses = {
         str(entry.get("name", key)): Extrinsics.of_vectors(
             entry["rotation"], entry["translation"], f"{name}, {key}"

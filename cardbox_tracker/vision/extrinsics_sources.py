@@ -1,7 +1,7 @@
-"""Extrinsics out of what cameras publish, and the choice where several sources have them.
+"""Reads extrinsics from CameraInfo and ``/tf_static`` and chooses between several sources.
 
-In this order: the projection matrices of a rectified pair, the transforms on ``/tf_static``, a
-file. Whatever is there has to agree.
+The projection matrices of a rectified pair come first, then the transforms on ``/tf_static``, then
+a file. All sources that are present have to agree.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
-# Two sources that differ by more are not of the same calibration.
+# Two sources that differ by more do not belong to the same calibration.
 _AGREE_DEG, _AGREE_M = 1.0, 0.02
 
 
 class FrameTransform(NamedTuple):
-    """What one transform of ``/tf_static`` says.
+    """One transform of ``/tf_static``.
 
     Attributes:
-        parent: frame.
-        child: frame.
-        to_parent: points of the child in the parent.
+        parent: name of the parent frame.
+        child: name of the child frame.
+        to_parent: transform of points from the child frame into the parent frame.
     """
 
     parent: str
@@ -37,11 +37,11 @@ class FrameTransform(NamedTuple):
 def of_rectified_pair(first: Any, other: Any, name: str) -> Extrinsics | None:
     """Return the extrinsics in the projection matrices of two sensor_msgs/CameraInfo.
 
-    The fourth column of P holds where a camera is in the rectified frame: P[0,3] = -fx B for a
-    right camera at the baseline B. With R unrectified images relate to it, too.
+    The fourth column of P places a camera in the rectified frame: P[0,3] = -fx B for a right camera
+    at the baseline B. R relates unrectified images to that frame.
 
     Returns:
-        None if the cameras are no rectified pair, so that both columns are zero.
+        The extrinsics; None if both columns are zero, so that the cameras are no rectified pair.
 
     Raises:
         CameraError: R is no rotation.
@@ -87,7 +87,7 @@ def of_transforms(
 
 
 def transforms_of(message: Any) -> list[FrameTransform]:
-    """Return what a tf2_msgs/TFMessage says, of rclpy or of a recording."""
+    """Return the transforms in a tf2_msgs/TFMessage of rclpy or of a recording."""
     return [
         FrameTransform(
             stamped.header.frame_id.lstrip("/"),
@@ -121,16 +121,16 @@ def extrinsics_between(
     transforms: Sequence[FrameTransform],
     of_file: Mapping[str, Extrinsics],
 ) -> list[Extrinsics]:
-    """Return where each further camera stands against the first one.
+    """Return the extrinsics of each further camera relative to the first one.
 
     Args:
-        infos: sensor_msgs/CameraInfo of each camera, the first one first.
-        names: of the same cameras.
-        transforms: those of ``/tf_static``.
-        of_file: what a file says, by name.
+        infos: sensor_msgs/CameraInfo of each camera, the first camera first.
+        names: names of the same cameras.
+        transforms: the transforms on ``/tf_static``.
+        of_file: extrinsics from a file, by name.
 
     Raises:
-        CameraError: nothing says it of a camera, or two sources disagree.
+        CameraError: a camera has no extrinsics, or two sources disagree.
     """
     first_frame, *frames = (str(info.header.frame_id).lstrip("/") for info in infos)
     return [
@@ -148,22 +148,23 @@ def extrinsics_between(
 
 
 def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrinsics:
-    """Return the first of the extrinsics that are there.
+    """Return the first extrinsics that are present, after a check that all agree.
 
     Args:
-        found: of P, of ``/tf_static``, of a file; None where one has none.
+        found: extrinsics from P, from ``/tf_static`` and from a file; None where absent.
         first: name of the first camera, for the texts.
         other: name of the other camera.
 
     Raises:
-        CameraError: there are none, or two disagree by more than a degree or two centimetres.
+        CameraError: all are None, or two differ by more than a degree or two centimetres.
     """
     there = [extrinsics for extrinsics in found if extrinsics is not None]
     if not there:
         raise CameraError(
-            f"nothing says where camera {other} stands against {first}: expected a rectified pair "
-            "(P[0,3] of CameraInfo), a transform between their optical frames on /tf_static, or a "
-            "file from Kalibr or aniposelib; give --extrinsics FILE, or the nodes extrinsics_file"
+            f"the extrinsics of camera {other} relative to {first} are unknown: expected a "
+            "rectified pair (P[0,3] of CameraInfo), a transform between their optical frames on "
+            "/tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
+            "nodes extrinsics_file"
         )
     for one in there[1:]:
         angle_rad, distance_m = there[0].difference(one)

@@ -1,6 +1,6 @@
-"""Which pixels differ enough from the background, and from their neighbours, to be foreground.
+"""Classifies the pixels that differ enough from the background as foreground.
 
-One pass over the image instead of half a dozen of OpenCV: the rows in use stay in the cache.
+A single pass over the image replaces six of OpenCV, so that the rows stay in the cache.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def segment_foreground(
     edge: float,
     score: FloatImage,
 ) -> ImageArray:
-    """Return the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
+    """Mark the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
 
-    A difference times ``brighter`` or ``darker``, whichever is larger, is its score.
+    The score of a difference is the larger of its products with ``brighter`` and ``darker``.
 
     Args:
         difference: image minus background, (H, W), grey levels.
@@ -53,7 +53,7 @@ def _foreground(
         for u in range(width):
             value = difference[v, u]
             score[v, u] = max(value * brighter[v, u], value * darker[v, u])
-    # The highest of three rows, with a margin that is never the highest.
+    # Maximum over three rows, with a margin that is never the maximum.
     columns = np.full(width + 2, np.float32(-np.inf))
     for v in range(height):
         above, here, below = score[max(v - 1, 0)], score[v], score[min(v + 1, height - 1)]

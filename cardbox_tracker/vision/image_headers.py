@@ -1,7 +1,7 @@
-"""The size of a compressed image, from its first bytes: what it will need is known before.
+"""Reads the size of a compressed image from its header, before memory is allocated.
 
-An image of a few kB can stand for gigabytes. JPEG and PNG are what ROS sends; other formats that
-OpenCV could decode are refused, so that their decoders cannot be reached.
+An image of a few kB can decode to gigabytes. ROS sends JPEG and PNG; other formats that OpenCV
+could decode are refused, so that their decoders cannot be reached.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from cardbox_tracker.errors import EncodingError
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
-# Start of frame: all of C0 to CF but the tables C4 and CC and the reserved C8.
+# Start of frame: C0 to CF without the tables C4 and CC and the reserved C8.
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _WITHOUT_LENGTH = frozenset((0x01, *range(0xD0, 0xD9)))
 _ENDS = (0xD9, 0xDA)
@@ -22,7 +22,7 @@ def compressed_size(data: bytes) -> tuple[int, int]:
     """Return width and height, px, of a JPEG or PNG image that is not decoded yet.
 
     Raises:
-        EncodingError: it is neither, or its header is damaged.
+        EncodingError: the data is neither JPEG nor PNG, or its header is damaged.
     """
     size = None
     if data.startswith(_PNG):
@@ -55,7 +55,7 @@ def _png_size(data: bytes) -> tuple[int, int] | None:
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int] | None:
-    """Size in the frame header, found marker by marker as decoders do."""
+    """Return the size in the frame header, found marker by marker."""
     at = 2
     while True:
         at = data.find(b"\xff", at)

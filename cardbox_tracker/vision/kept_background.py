@@ -1,4 +1,4 @@
-"""A background of before, from a file or from memory, until an image shows that it fits."""
+"""Keeps a saved or earlier background until an image shows that it fits the scene."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ ImageArray = NDArray[np.uint8]
 
 
 class KeptBackground:
-    """What a pipeline may go on with instead of learning, and where what it learns is written.
+    """A background that a pipeline may resume instead of learning, and the file to save it in.
 
     Attributes:
-        path: the file; None without one.
+        path: the file; None if there is none.
     """
 
     def __init__(self, path: Path | None, size: tuple[int, int]) -> None:
         """Read the file ``path`` if there is one; ``size`` is the working size, px.
 
         Raises:
-            BackgroundFileError: it is no background of that size.
+            BackgroundFileError: the file contains no background of that size.
         """
         self.path = path
         self._stored: StoredBackground | None = None
@@ -40,22 +40,22 @@ class KeptBackground:
             self._stored = load_background(path, size)
 
     def carry_over(self, model: BackgroundModel | None) -> None:
-        """Offer a background of before the calibration changed, and no longer the file's."""
+        """Offer the background that was used before a change of calibration, not the file's."""
         if model is not None:
             self._stored, self._before = None, model
 
     def forget(self) -> None:
-        """Offer nothing any more: the scene is learned anew."""
+        """Drop the background, since the scene is learned anew."""
         self._stored = self._before = None
 
     def resume(self, pipeline: SilhouettePipeline, image: ImageArray) -> str:
-        """Let ``pipeline`` go on with the background of before if a prepared image shows it fits.
+        """Resume the kept background in ``pipeline`` if it fits a prepared image.
 
         Returns:
-            What was done, for the log; an empty text if the scene has to be learned.
+            A text for the log; empty if the scene has to be learned.
 
         Raises:
-            BackgroundFileError: what is in the file does not fit; the text says why.
+            BackgroundFileError: the background in the file does not fit; the text gives the reason.
         """
         if self._stored is not None:
             self._resume_file(self._stored, pipeline, image)
@@ -84,7 +84,7 @@ class KeptBackground:
         self._stored = None
 
     def keep(self, pipeline: SilhouettePipeline) -> str:
-        """Write what ``pipeline`` has learned to the file; return what was done, for the log.
+        """Save the background of ``pipeline`` to the file; return a text for the log.
 
         Raises:
             BackgroundFileError: the file cannot be written.

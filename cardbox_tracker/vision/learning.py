@@ -1,4 +1,4 @@
-"""Ways to learn the empty scene: from the first images, once it is still, or around a person."""
+"""Learns the empty scene from the first images, once it is still, or around a person."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ ImageArray = NDArray[np.uint8]
 
 
 class Learning:
-    """Learns from the images as they come, whatever is in them (``always``)."""
+    """Learns from every image, regardless of its content (``always``)."""
 
     def __init__(self, images: int) -> None:
-        """Start with nothing learned; ``images`` are enough."""
+        """Start without images; ``images`` images are enough."""
         self.images = images
         self._learner = BackgroundLearner()
 
     @property
     def count(self) -> int:
-        """Images learned so far."""
+        """Number of images learned so far."""
         return self._learner.count
 
     def add(self, image: ImageArray) -> None:
@@ -34,7 +34,7 @@ class Learning:
         return self.count >= self.images
 
     def model(self) -> BackgroundModel:
-        """Return what was learned.
+        """Return the learned background.
 
         Raises:
             ValueError: fewer than two images were added.
@@ -42,11 +42,11 @@ class Learning:
         return self._learner.model()
 
     def values(self) -> dict[str, str]:
-        """Return how far it is, for the diagnostics."""
+        """Return the progress, for the diagnostics."""
         return {"background learned from": f"{self.count}/{self.images}"}
 
     def waits_for(self, topic: str) -> str:
-        """Say what it needs from the images on ``topic``, and what the user should do."""
+        """Describe the images that are needed on ``topic`` and the action of the user."""
         return (
             f"{self.images} images of the empty scene on {topic} "
             "(learning the background: nobody may be in view)"
@@ -54,19 +54,19 @@ class Learning:
 
 
 class StillLearning(Learning):
-    """Begins again whenever something moves, so that nobody is learned in (``still``).
+    """Starts again when something moves, so that no person is learned (``still``).
 
-    What it learns from a still scene is what :class:`Learning` does.
+    A still scene is learned as in :class:`Learning`.
     """
 
     def __init__(self, images: int) -> None:
-        """Start with nothing learned; ``images`` of a still scene are enough."""
+        """Start without images; ``images`` images of a still scene are enough."""
         super().__init__(images)
         self._motion = SceneMotion(images)
         self._moving = 0.0
 
     def add(self, image: ImageArray) -> None:
-        """Learn from one prepared image, or begin again if something has moved."""
+        """Learn from one prepared image, or start again if something has moved."""
         share = self._motion.add(brightness_of(image))
         if share > STILL:
             self._moving = share
@@ -76,12 +76,12 @@ class StillLearning(Learning):
             super().add(image)
 
     def values(self) -> dict[str, str]:
-        """Return how far it is, and how much last moved meanwhile."""
+        """Return the progress and the share of the image that moved last."""
         moved = f"{100 * self._moving:.1f}"
         return super().values() | {"moved while learning (% of the image)": moved}
 
     def waits_for(self, topic: str) -> str:
-        """Say what it needs, and that something moves."""
+        """Describe the images that are needed and the motion that delays them."""
         if self._moving == 0.0:
             return super().waits_for(topic)
         return (
@@ -93,10 +93,10 @@ class StillLearning(Learning):
 
 
 class PersonInViewLearning(Learning):
-    """Learns where the person is not, and the rest when they step aside (``person_in_view``)."""
+    """Learns the scene around a person, and the rest once they step aside (``person_in_view``)."""
 
     def __init__(self, images: int) -> None:
-        """Start with nothing learned; every pixel takes ``images`` images."""
+        """Start without images; every pixel is learned from ``images`` images."""
         super().__init__(images)
         self._motion = SceneMotion(images)
         self._scene = PartialScene()
@@ -104,11 +104,11 @@ class PersonInViewLearning(Learning):
 
     @property
     def count(self) -> int:
-        """Images seen so far, whatever was learned from them."""
+        """Number of images added so far."""
         return self._seen
 
     def add(self, image: ImageArray) -> None:
-        """Look at one prepared image; after ``images`` of them, learn what nobody hid."""
+        """Add one prepared image; after ``images`` of them, learn the part that was not hidden."""
         self._motion.add(brightness_of(image))
         super().add(image)
         self._seen += 1
@@ -124,20 +124,20 @@ class PersonInViewLearning(Learning):
         return self._scene.is_whole
 
     def model(self) -> BackgroundModel:
-        """Return the scene put together.
+        """Return the combined scene.
 
         Raises:
-            ValueError: a part of it was not seen yet.
+            ValueError: a part of the scene was not seen yet.
         """
         return self._scene.model()
 
     def values(self) -> dict[str, str]:
-        """Return how far it is, and how much of the scene the person hides."""
+        """Return the progress and the share of the scene that the person hides."""
         hidden = f"{100 * self._scene.hidden:.1f}"
         return super().values() | {"hidden by the person (% of the image)": hidden}
 
     def waits_for(self, topic: str) -> str:
-        """Say what the person should do."""
+        """Describe the action of the person."""
         if self._scene.hidden == 1.0:
             return (
                 f"{self.images} images on {topic} (learning the background around you: stand "
@@ -154,4 +154,4 @@ WAYS: dict[str, type[Learning]] = {
     "person_in_view": PersonInViewLearning,
     "always": Learning,
 }
-"""Name of a way to learn to its class; the first one is the default."""
+"""Classes by the name of the method; the first one is the default."""

@@ -1,10 +1,10 @@
-"""Follows the light of the scene, so that a background learned once stays right.
+"""Adapts the learned background to changes of the light.
 
 Slow drift, an automatic gain or a lamp multiply the background by a factor that varies slowly over
-the image: one level for all of it, times a coarse field. Both are estimated from pixels outside the
-person, so that nobody who stands still becomes background. Light has no outline: foreground that
-brightness passes into smoothly from the background is not the person, and is estimated from, too.
-Otherwise a corner that a lamp made foreground would stay so, and grow.
+the image: one level for the whole image times a coarse field. Both are estimated from pixels
+outside the person, so that a person who stands still does not become background. Light has no
+outline, so foreground into which the brightness passes smoothly from the background is used as
+well; without this, a corner that a lamp made foreground would stay foreground and grow.
 """
 
 from __future__ import annotations
@@ -19,56 +19,55 @@ from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, sum_ce
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-# Light is estimated from every fourth pixel of every fourth row.
+# The light is estimated from every fourth pixel of every fourth row.
 _GRID = (slice(1, None, 4), slice(1, None, 4))
-# Cells of the coarse field, and the standard deviation of its smoothing in cells.
+# Cells of the coarse field, and the standard deviation of its smoothing, cells.
 _CELLS = (20, 15)
 _SMOOTHING_CELLS = 2.0
-# Pixels darker than this say nothing about the light.
+# Darker pixels carry no information about the light, grey levels.
 _DARKEST = 10.0
-# A field that differs from 1 by less is none.
+# A field within this of 1 is ignored.
 _SAME = 0.004
-# Brightness of blue, green and red.
+# Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
-# The level is estimated in every image, the field in every third, and in each after a step.
+# The field is estimated in every third image, and in every one after a step; the level always.
 _EVERY = 3
-# The field comes nearer to its estimate by this fraction each time: half of it in 7 images.
+# Share of the new estimate in the field, an exponential moving average.
 _RATE = 1.0 - 0.9**_EVERY
-# A pixel whose brightness differs from the expected one by more is no background.
+# Pixels whose brightness differs from the expected one by more are not background.
 _TOLERANCE, _TOLERANCE_AFTER_STEP = 0.1, 0.4
-# A change of the level from one image to the next by more is a step of the light: a lamp, a gain.
+# A larger change of the level between two images is a step of the light: a lamp, a gain.
 _STEP = 0.04
-# So many images after a step the field is taken as estimated, and the person as known before it.
+# For this many images after a step the field is not averaged and the earlier person is kept.
 _SETTLING = 8
-# Share of the pixels that must be known to be background.
+# Smallest share of pixels that must be background.
 _ENOUGH = 0.15
-# Weight of no change, as a share of a cell's pixels.
+# Weight of the assumption of no change, as a share of a cell's pixels.
 _DOUBT = 0.02
 _LEAST = 1e-3
 _KERNEL = np.ones((5, 5), np.uint8)
-# More of the image than a person covers: the light has changed, not the scene.
+# More foreground than a person covers: the light has changed, not the scene.
 _COVERAGE = 0.5
-# Light varies by less than this fraction within 12 px; an outline does not: of eleven sessions, not
-# more than 3.5 % of the person is reached from the background so, in any image.
+# Light varies by less than this fraction within 12 px; an outline does not.
 _SOFT = 0.06
-# So much of the image as foreground that only light makes: the field is estimated as after a step.
+# With more foreground than this caused by light, the field is estimated as after a step.
 _LIT = 0.01
 _AROUND = np.ones((3, 3), np.uint8)
 
 
 class LightFollower:
-    """How bright each pixel of the background is now.
+    """Estimates the present brightness of each pixel of the background.
 
     Attributes:
-        level: brightness of the scene as a factor of what was learned.
+        level: brightness of the scene relative to the learned background.
     """
 
     def __init__(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
-        """Start with the light that the background was learned in.
+        """Start with the light of the learned background.
 
         Args:
-            mean: brightness of the background, (H, W).
-            chroma: brightness, Cr and Cb of it at any resolution, (3, h, w); None: it is grey.
+            mean: mean brightness of the background, (H, W) float32.
+            chroma: its brightness, Cr and Cb at any resolution, (3, h, w); None if it is grey.
         """
         self._prepare(mean, chroma)
         self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
@@ -76,12 +75,12 @@ class LightFollower:
         self.restart()
 
     def replace(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
-        """Go on with another background of the same size, in the light as it is."""
+        """Use another background of the same size and keep the estimate of the light."""
         self._prepare(mean, chroma)
         self._spread()
 
     def factors(self) -> FloatImage:
-        """Return how bright each pixel (H, W) is now, as a factor of what was learned."""
+        """Return the present brightness (H, W) relative to the learned background."""
         field = cv2.resize(self._field, self._mean.shape[::-1])
         return np.asarray(self.level * field, np.float32)
 
@@ -99,21 +98,21 @@ class LightFollower:
         self._channels = channels.reshape(len(channels), -1)
         self._brightest = self._channels.max(axis=0)
         brightest = self._brightest.reshape(mean.shape)[_GRID]
-        # Ratios of dark pixels are noise: they are never taken as background.
+        # Ratios of dark pixels are noise, so these are never used.
         self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
             np.float32
         )
         self._highest = float(self._brightest.max())
 
     def restart(self) -> None:
-        """Forget the light and the person; the next image may be of any other moment."""
+        """Forget the light and the person, since the next image may be from any other time."""
         self.level = 1.0
         self._field = np.ones(_CELLS[::-1], np.float32)
         self._base = np.ones_like(self._field)
         self._fine = np.ones(self._size[::-1], np.float32)
         self._person = np.zeros(self._size[::-1], np.uint8)
         self._settling, self._is_lit = 0, False
-        # What the silhouette is since the step, but for what only light makes.
+        # The silhouette since the step, without the foreground caused by light.
         self._passing: ImageArray | None = None
         self._lit = np.zeros(self._size[::-1], np.bool_)
         self._brightness = np.zeros(self._mean.shape, np.uint8)
@@ -122,17 +121,17 @@ class LightFollower:
         self._relative, self._highest_field = self._mean, 1.0
 
     def expect_step(self) -> None:
-        """Take the field of the next image as estimated, as after a step of the light."""
+        """Use the next estimate of the field without averaging, as after a step of the light."""
         self._settling = max(self._settling, 1)
 
     def follow(self, brightness: ImageArray) -> tuple[FloatImage, float]:
-        """Return the background (H, W) and a factor: their product is as bright as it is now.
+        """Return the background (H, W) and a factor, whose product has the present brightness.
 
         Args:
-            brightness: of an image, (H, W).
+            brightness: brightness of an image, (H, W) uint8.
 
         Returns:
-            An array that the next call may change, and a number.
+            The background, an array that the next call may change, and the factor.
         """
         self._estimate(brightness)
         if self.level * self._highest_field * self._highest < CUT_OFF:
@@ -143,11 +142,11 @@ class LightFollower:
 
     @property
     def is_settling(self) -> bool:
-        """True in the images after a step of the light, in which little is known of it."""
+        """Whether a step of the light was so recent that its estimate is uncertain."""
         return self._settling > 0
 
     def _cut_off(self) -> None:
-        """Let no channel of what is expected be brighter than a camera can tell."""
+        """Limit the expected brightness to the range of the camera's channels."""
         factor = self.level * self._highest_field
         where = np.flatnonzero(self._brightest > CUT_OFF / factor)
         now = self._now.ravel()
@@ -185,17 +184,17 @@ class LightFollower:
         base = cv2.resize(self._base, self._size)
         sum_cells(*parts, around, base, person, level, tolerance, self._cells)
         change, weight = (cv2.GaussianBlur(c, (0, 0), _SMOOTHING_CELLS) for c in self._cells)
-        # Where nothing is known, there is no change.
+        # Cells without known pixels do not change.
         goal = self._base * (1.0 + change / (weight + _DOUBT))
         self._field += np.float32(rate) * (goal - self._field)
         if self._is_lit:
-            # The next estimate adds to this one what its smoothing has left.
+            # The next estimate is relative to this one and adds the remainder of the smoothing.
             self._base = self._field.copy()
         self._fine = cv2.resize(self._field, self._size).reshape(small.shape)
         self._spread()
 
     def _spread(self) -> None:
-        """Put the field's light on the background."""
+        """Multiply the background by the field."""
         self._highest_field = float(self._field.max())
         if self._highest_field < 1.0 + _SAME and float(self._field.min()) > 1.0 - _SAME:
             self._relative = self._mean
@@ -205,15 +204,15 @@ class LightFollower:
             self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray) -> None:
-        """Take the person's place (H, W) from the silhouette found in the last image."""
+        """Exclude the person, given the silhouette (H, W) of the last image."""
         if cv2.countNonZero(silhouette) > _COVERAGE * silhouette.size:
             self._settling = _SETTLING - 1
             return
         person = np.ascontiguousarray(silhouette[_GRID])
-        # Looked for as often as the field is estimated, before it.
+        # Smooth foreground is searched as often as the field is estimated, before it.
         if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
             smooth, brighter = self._smooth_from_background(person)
-            # What is darker may be the person's shadow, and goes where the person goes.
+            # Darker pixels may be the person's shadow, which moves with the person.
             self._lit = smooth & brighter
             self._is_lit = bool(np.count_nonzero(self._lit) > _LIT * smooth.size)
         if self._settling > 0:
@@ -228,10 +227,10 @@ class LightFollower:
     def _smooth_from_background(
         self, person: ImageArray
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the foreground (h, w) without an outline, and what is brighter than expected.
+        """Return masks (h, w) of foreground without an outline and of its brighter part.
 
         Args:
-            person: not 0 where the last image is foreground, (h, w).
+            person: foreground of the last image, (h, w), not 0 where set.
         """
         relative = cv2.resize(self._brightness, self._size, interpolation=cv2.INTER_AREA) / (
             self._blocks * self._fine * np.float32(self.level)

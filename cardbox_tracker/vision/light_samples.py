@@ -1,4 +1,4 @@
-"""What the pixels of an image say about the light: compiled passes over every fourth of them."""
+"""Compiled kernels that measure the light in every fourth pixel of an image."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from cardbox_tracker.compiling import njit
 
-# A channel as bright as this may be cut off: the pixel is as bright as it seems, or brighter.
+# A channel above this may be saturated, so the pixel may be brighter than it seems.
 CUT_OFF = 250.0
 
 
@@ -16,15 +16,15 @@ CUT_OFF = 250.0
 def collect_ratios(
     small: Any, mean: Any, brightest: Any, field: Any, person: Any, ratios: Any
 ) -> Any:
-    """Write how bright the background's pixels are as a factor of expected; return how many.
+    """Write the ratios of measured to expected brightness in the background; return their count.
 
     Args:
         small: brightness of an image, (h, w) uint8.
         mean: brightness of the background.
-        brightest: its brightest channel; infinite where it is not to be used.
-        field: what is expected of each pixel as a factor of the level.
+        brightest: the brightest channel of the background; infinite where it must not be used.
+        field: expected brightness of each pixel as a factor of the level.
         person: not 0 where the person is.
-        ratios: result, h * w numbers at least.
+        ratios: result, at least h * w values.
     """
     count = 0
     height, width = small.shape
@@ -49,17 +49,17 @@ def sum_cells(
     tolerance: Any,
     cells: Any,
 ) -> None:
-    """Write the mean change of each cell times its share of usable pixels, and that share.
+    """Write each cell's mean change times its share of usable pixels, and that share.
 
     Args:
-        small: as for :func:`collect_ratios`, like the next two.
+        small: brightness of an image, (h, w) uint8.
         mean: brightness of the background.
-        brightest: its brightest channel.
-        around: factors of the level that background lies around, (h, w).
+        brightest: the brightest channel of the background.
+        around: expected factors of the level, (h, w).
         base: factors of the level that the change is relative to, (h, w).
         person: not 0 where the person is.
-        level: brightness of the scene as a factor.
-        tolerance: a pixel farther from ``around`` than this fraction is not used.
+        level: brightness of the scene relative to the learned background.
+        tolerance: pixels that differ from ``around`` by more than this fraction are not used.
         cells: result, (2, rows, columns).
     """
     cells[:] = 0
@@ -71,7 +71,7 @@ def sum_cells(
             ratio = np.float32(small[v, u]) / max(mean[v, u], np.float32(1))
             relative = np.float32(ratio / level)
             change = relative / around[v, u] - 1
-            # What is cut off says only that it is no darker than that.
+            # A saturated pixel gives only a lower bound.
             is_cut_off = ratio * brightest[v, u] >= CUT_OFF
             known = not is_cut_off or (change > 0 and np.isfinite(brightest[v, u]))
             if person[v, u] == 0 and known and abs(change) < tolerance:

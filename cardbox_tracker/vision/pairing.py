@@ -1,8 +1,8 @@
-"""Which images of several cameras belong together, by their stamps.
+"""Groups the images of several cameras by their stamps.
 
-Those that are within a tolerance of the earliest one. :func:`side_by_side` reads recordings, in
-which it is known what comes next; :class:`Arrivals` takes what live cameras send, of which any may
-be late or cease.
+Images within a tolerance of the earliest one belong together. :func:`side_by_side` reads
+recordings, where the next image of each stream is known. :class:`Arrivals` groups images of live
+cameras, any of which may be late or stop.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ T = TypeVar("T")
 MOST_CAMERAS = 4
 
 TOLERANCE_NS = 16_000_000
-"""Half a period of 30 Hz: what belongs together where the period is not known."""
+"""Tolerance where the period is unknown: half a period of 30 Hz."""
 
-# So many of another camera's images may wait for one: whatever its camera needs to send it.
+# Number of images of another camera that may wait for a delayed one.
 _WAITING = 2
-# After so many times in vain a camera is not waited for until it sends again.
+# After this many missed sets a camera is not waited for until it sends again.
 _PATIENCE = 5
-# Further back than the network reorders messages: the source has started again, or another clock.
+# Stamps that go back by more than the network reorders mean a restart or another clock.
 _RESTART_NS = 1_000_000_000
 
 
 def camera_names(cameras: Sequence[str]) -> list[str]:
-    """Return the namespaces of cameras without slashes around them.
+    """Return the namespaces of cameras without leading and trailing slashes.
 
     Raises:
-        CardboxError: there are too many, one twice, or one without a name.
+        CardboxError: there are too many names, or a name is empty or occurs twice.
     """
     names = [camera.strip("/") for camera in cameras]
     if len(names) > MOST_CAMERAS or len(set(names)) < len(names) or not all(names):
@@ -46,9 +46,9 @@ def camera_names(cameras: Sequence[str]) -> list[str]:
 def side_by_side(
     streams: Sequence[Iterator[T]], stamp_ns: Callable[[T], int], tolerance_ns: int
 ) -> Iterator[tuple[T | None, ...]]:
-    """Pair what several streams have at the same time; each item is used once, in order.
+    """Group the items of several streams by time; each item is used once, in order.
 
-    An item that is more than ``tolerance_ns`` after the earliest one waits for the next turn.
+    An item that is more than ``tolerance_ns`` after the earliest one waits for the next group.
     """
     heads = [next(stream, None) for stream in streams]
     while any(head is not None for head in heads):
@@ -62,46 +62,46 @@ def side_by_side(
 
 
 def _together(stamps_ns: Sequence[int | None], tolerance_ns: int) -> list[bool]:
-    """Return which of the next items, by their stamps, are taken together; None of a missing one.
+    """Return for each of the next items, given their stamps, whether it belongs to this group.
 
-    At least one is there.
+    A missing item has the stamp None; at least one item is present.
     """
     first_ns = min(stamp_ns for stamp_ns in stamps_ns if stamp_ns is not None)
     return [stamp_ns is not None and stamp_ns - first_ns <= tolerance_ns for stamp_ns in stamps_ns]
 
 
 class Arrivals(Generic[T]):
-    """Pairs items as they arrive, as :func:`side_by_side` would, without waiting for ever.
+    """Groups items as they arrive, like :func:`side_by_side`, with a limited wait.
 
-    A set is complete once every stream has sent the item that belongs to it, or a later one. One
-    that is silent is waited for until another has sent two items more, and after five such sets no
-    longer, until it sends again. Items that come after their set has gone are left out; where the
-    stamps of a stream go back by more than a second, everything starts anew.
+    A set is complete once every stream has sent the item that belongs to it, or a later one. A
+    silent stream is waited for until another has sent two more items. After five such sets it is no
+    longer waited for until it sends again. Items that arrive after their set are dropped. If the
+    stamps of a stream go back by more than a second, everything is reset.
 
     Attributes:
         tolerance_ns: items whose stamps are this near to the earliest one belong together.
-        late: how many items of each stream came too late.
+        late: number of items of each stream that came too late.
     """
 
     def __init__(self, count: int, tolerance_ns: int) -> None:
-        """Start with nothing of ``count`` streams."""
+        """Start with ``count`` streams and no items."""
         self.tolerance_ns = tolerance_ns
         self.late = [0] * count
         self._items: list[deque[tuple[int, T]]] = [deque() for _ in range(count)]
         self.restart()
 
     def restart(self) -> None:
-        """Forget what has arrived: the stamps start anew."""
+        """Drop all items, since the stamps start again."""
         for items in self._items:
             items.clear()
         self._missed = [0] * len(self._items)
         self._newest_ns = [0] * len(self._items)
-        # Of the last set: the earliest stamp, and whose items were in it.
+        # Earliest stamp of the last set, and the streams that had items in it.
         self._last_ns: int | None = None
         self._chosen = [False] * len(self._items)
 
     def add(self, number: int, stamp_ns: int, item: T) -> None:
-        """Take an item of stream ``number``; a stamp of 0 stands for none."""
+        """Add an item of stream ``number``; a stamp of 0 means that it has none."""
         if stamp_ns and self._newest_ns[number] - stamp_ns > _RESTART_NS:
             self.restart()
         elif stamp_ns and self._is_late(number, stamp_ns):
@@ -114,12 +114,12 @@ class Arrivals(Generic[T]):
         items = self._items[number]
         items.append((stamp_ns, item))
         if len(items) > _WAITING + 1:
-            # Of a clock that is ahead of the others: their time may never come.
+            # These items may be from a clock that is ahead, so their time may never come.
             items.popleft()
             self.late[number] += 1
 
     def sets(self) -> Iterator[tuple[T | None, ...]]:
-        """Yield each set that is complete now, an item or None of each stream."""
+        """Yield each complete set, with an item or None for each stream."""
         while self._is_complete():
             stamps_ns = [items[0][0] if items else None for items in self._items]
             chosen = _together(stamps_ns, self.tolerance_ns)
@@ -137,7 +137,7 @@ class Arrivals(Generic[T]):
             return True
         if self._last_ns is None:
             return False
-        # Of a set in which it was missing, or of one before.
+        # The item belongs to a set in which it was missing, or to an earlier one.
         margin_ns = 0 if self._chosen[number] else self.tolerance_ns
         return stamp_ns <= self._last_ns + margin_ns
 

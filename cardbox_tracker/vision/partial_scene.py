@@ -1,8 +1,8 @@
-"""The empty scene, put together from spans of time in which a person hid different parts of it.
+"""Combines models of the scene from times in which a person hid different parts of it.
 
-Where the person is follows from what moves: the outline of somebody who stands sways, and what it
-encloses, down to the lower border, is hidden. A pixel once hidden stays so until what is seen
-there has changed and nothing moves there any more.
+The person is located by motion: the outline of a standing person sways, and the area that it
+encloses, down to the lower border, is hidden. A hidden pixel stays hidden until its brightness has
+changed and nothing moves there any more.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from cardbox_tracker.vision.scene_motion import changed_pixels
 Mask = NDArray[np.bool_]
 FloatImage = NDArray[np.float32]
 
-# Parts of one outline are at most so far apart, and a body reaches so far beyond what moves, as
-# shares of the image's width.
+# Largest gap between parts of one outline, and margin of the body around moving pixels, as shares
+# of the image's width.
 _GAP, _MARGIN = 0.06, 0.03
-# Smaller regions that moved, as shares of the image, are noise.
+# Moving regions below this share of the image are noise.
 _LEAST = 0.0005
-# A rest that stays hidden is taken from its surroundings if it is smaller.
+# Hidden rests below this share of the image are filled from their surroundings.
 _REST = 0.002
 _REST_RADIUS_PX = 3.0
 
 
 class PartialScene:
-    """Models of the scene of which each is right outside the person, made one."""
+    """Combines models of the scene, each of which is valid outside the person."""
 
     def __init__(self) -> None:
         """Start with nothing seen."""
@@ -39,20 +39,20 @@ class PartialScene:
 
     @property
     def hidden(self) -> float:
-        """Share of the scene that was not seen yet."""
+        """Share of the scene that has not been seen yet."""
         return 1.0 if self._known is None else float(1.0 - np.mean(self._known))
 
     @property
     def is_whole(self) -> bool:
-        """True once nothing is hidden but some specks."""
+        """Whether only small specks are still hidden."""
         return self._known is not None and self.hidden <= _REST
 
     def add(self, model: BackgroundModel, moved: Mask) -> None:
-        """Take what nobody hid in a span of time.
+        """Add the part of the scene that was visible in a span of time.
 
         Args:
-            model: mean and deviation (H, W) of its images.
-            moved: pixels that moved in it, at any resolution.
+            model: mean and standard deviation (H, W) of the images in that span.
+            moved: mask of pixels that moved in it, at any resolution.
         """
         size = model.mean.shape[1], model.mean.shape[0]
         body = bodies(_resized(moved, size))
@@ -65,10 +65,10 @@ class PartialScene:
         self._known = self._known | new
 
     def model(self) -> BackgroundModel:
-        """Return the whole scene; specks that stayed hidden are like their surroundings.
+        """Return the whole scene; hidden specks are filled from their surroundings.
 
         Raises:
-            ValueError: more than specks is hidden.
+            ValueError: a part larger than a speck is hidden.
         """
         if self._model is None or self._known is None or not self.is_whole:
             raise ValueError(f"{100 * self.hidden:.1f} % of the scene was not seen yet")
@@ -86,10 +86,10 @@ class PartialScene:
 
 
 def bodies(moved: Mask) -> Mask:
-    """Return what may be a person (H, W) where pixels (H, W) moved.
+    """Return a mask (H, W) of possible persons, given the pixels (H, W) that moved.
 
-    Regions that are near each other are one body: the convex hull of what moved, with a margin,
-    and all below it, since feet do not sway.
+    Regions that are near each other form one body: their convex hull with a margin, and everything
+    below it, since feet do not sway.
     """
     height, width = moved.shape
     image = moved.astype(np.uint8)
@@ -122,7 +122,7 @@ def _disk(radius_px: float) -> NDArray[np.uint8]:
 
 
 def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:
-    """Return where any part of a pixel is set, at another size (width, height)."""
+    """Return the mask at another size (width, height); a pixel is set if any part of it is."""
     whole = cv2.resize(mask.astype(np.float32), (size[0], size[1]), interpolation=cv2.INTER_AREA)
     return np.asarray(whole > 0, np.bool_)
 
@@ -130,7 +130,7 @@ def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:
 def _merged(
     known: BackgroundModel, other: BackgroundModel, new: Mask, both: Mask
 ) -> BackgroundModel:
-    """Return ``known`` with the pixels ``new`` of ``other``, in the light of ``known``."""
+    """Return ``known`` with the pixels ``new`` taken from ``other``, in the light of ``known``."""
     level = 1.0
     if both.any():
         level = float(np.median(known.mean[both] / np.maximum(other.mean[both], 1.0)))
@@ -140,13 +140,13 @@ def _merged(
 def merged(
     known: BackgroundModel, other: BackgroundModel, new: Mask, light: FloatImage
 ) -> BackgroundModel:
-    """Return a model with some pixels of another one.
+    """Return a model with some pixels replaced by those of another one.
 
     Args:
         known: the model, (H, W).
-        other: of the same scene at another time.
-        new: pixels (H, W) that are taken from it.
-        light: factor of its brightness there, (H, W).
+        other: a model of the same scene at another time.
+        new: mask (H, W) of the pixels that are taken from it.
+        light: factor applied to its brightness, (H, W).
     """
     mean = np.where(new, other.mean * light, known.mean)
     stddev = np.where(new, other.stddev, known.stddev)

@@ -1,18 +1,18 @@
-"""Which pixels a planar patch covers: the definition, written for reading, not for speed.
+"""Reference rasterisation of planar patches, written for clarity instead of speed.
 
-A pixel is covered where its centre lies inside the projected patch. To make that the same on every
-computer and in every program, coordinates are whole numbers: corners are moved to a grid of 1/256
-px, and an edge is a line that starts at the first row v0 of the image below its upper end
-(x0, y0), and moves by the same whole number of 1/65536 px from row to row on to its lower end
-(x1, y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
+A pixel is covered where its centre lies inside the projected patch. To give the same result on
+every computer, coordinates are integers: corners are rounded to a grid of 1/256 px, and an edge is
+a line that starts at the first row v0 of the image below its upper end (x0, y0), and moves by the
+same multiple of 1/65536 px from row to row down to its lower end (x1,
+y1). With s = (x1 - x0) / (y1 - y0), row v of y0 <= v < y1 is crossed at
 
     X(v) = round(65536 (x0 + (v0 - y0) s)) + (v - v0) round(65536 s)
 
 and the columns ceil(min X / 65536) <= u < ceil(max X / 65536) are covered. Neighbouring patches
 that share an edge therefore neither overlap nor leave a gap.
 
-The compiled cost (``estimation/cost/compiled.py``) must agree with this pixel by pixel; 32 bits are
-enough for it, as long as corners beyond 16000 px are moved to there.
+The compiled cost (``estimation/cost/compiled.py``) must agree with this pixel by pixel; 32 bits
+suffice, since corners are clamped to 16000 px.
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ from numpy.typing import NDArray
 from cardbox_tracker.vision.camera import Camera, FloatArray
 
 NEAR_PLANE_M = 0.1
-"""What is nearer to the camera's plane than this, or behind it, is cut off; see ``in_front``."""
+"""Depth of the near plane, metres; nearer points are clipped, see ``in_front``."""
 
 SUBPIXELS = 256.0
-"""Corners are rounded to a grid of this many points a pixel."""
+"""Grid points per pixel to which corners are rounded."""
 
 CROSSING_BITS = 16
-"""Edges cross rows at whole numbers of 2^-16 px."""
+"""Bits of the fraction in the crossings of edges and rows: multiples of 2^-16 px."""
 
 FARTHEST_PX = 16000.0
-"""Corners beyond this, in either direction, are moved to it."""
+"""Largest coordinate of a corner; others are clamped to it."""
 
 
 def in_front(points_m: FloatArray) -> NDArray[np.bool_]:
-    """Which points (..., 3) of the optical frame, metres, are drawn: on the near plane or beyond.
+    """Return which points (..., 3), metres, of the optical frame lie on or behind the near plane.
 
-    The rule of everything that draws: polygons are cut by :func:`clip_near`, which keeps just these
-    points; what cannot be cut, such as a skeleton's lines, is left out unless all its points are.
+    All drawing follows this rule: polygons are cut by :func:`clip_near`, which keeps just these
+    points. Lines of a skeleton, which are not cut, are dropped unless all their points are kept.
     """
     visible: NDArray[np.bool_] = np.asarray(points_m)[..., 2] >= NEAR_PLANE_M
     return visible
 
 
 def clip_near(corners_m: FloatArray) -> FloatArray:
-    """Cut a polygon (n, 3) of the optical frame at the near plane (Sutherland-Hodgman).
+    """Clip a polygon (n, 3), metres, of the optical frame at the near plane (Sutherland-Hodgman).
 
     Returns:
-        Shape (m, 3), metres; m is 0 to n + 1 for a plane convex polygon.
+        Shape (m, 3), metres; m is 0 to n + 1 for a planar convex polygon.
     """
     kept = []
     for start, end in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
@@ -62,7 +62,7 @@ def clip_near(corners_m: FloatArray) -> FloatArray:
 
 
 def snap(pixels: FloatArray) -> FloatArray:
-    """Move pixel coordinates to the nearest point of the 1/256 px grid, and to within 16000 px."""
+    """Round pixel coordinates to the 1/256 px grid and clamp them to 16000 px."""
     near = np.clip(np.asarray(pixels, dtype=np.float64), -FARTHEST_PX, FARTHEST_PX)
     snapped: FloatArray = np.floor(near * SUBPIXELS + 0.5) / SUBPIXELS
     return snapped
@@ -80,7 +80,7 @@ def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
         return
     crossings: dict[int, list[int]] = {}
     for ends in zip(polygon_px, np.roll(polygon_px, -1, axis=0), strict=True):
-        # From the upper end whichever patch the edge belongs to: both round to one crossing.
+        # Every edge starts at its upper end, so that both patches that share it round alike.
         (x0, y0), (x1, y1) = sorted(ends, key=lambda corner: float(corner[1]))
         first, end = (int(v) for v in np.clip(np.ceil([y0, y1]), 0, height))
         if first < end:
@@ -94,17 +94,17 @@ def fill_convex(mask: NDArray[np.uint8], polygon_px: FloatArray) -> None:
 
 
 def _fixed(pixels: float) -> int:
-    """Whole number of 2^-16 px."""
+    """Return a coordinate, px, as an integer multiple of 2^-16 px."""
     return int(np.floor(pixels * 2**CROSSING_BITS + 0.5))
 
 
 def render(patches_m: FloatArray, camera: Camera, height: int | None = None) -> NDArray[np.uint8]:
-    """Draw patches of the reference frame as the camera sees them: h(x, y, d) of equation (2).
+    """Render patches of the reference frame as seen by the camera: h(x, y, d) of equation (2).
 
     Args:
         patches_m: shape (n, 4, 3), planar convex patches, metres in the reference frame.
-        camera: the working camera.
-        height: rows to draw, from the top; all of the camera's by default.
+        camera: the camera at the working resolution.
+        height: number of rows to render, from the top; by default those of the camera.
 
     Returns:
         Shape (height, camera.width), 0 or 255.

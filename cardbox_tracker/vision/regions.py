@@ -1,10 +1,9 @@
-"""Regions of a binary image: small ones dropped or filled, and all of them listed.
+"""Finds the connected regions of a binary image and removes small ones.
 
-Pixels are connected by their sides (4 neighbours). OpenCV labels every pixel; the area of each
-region and the recolouring of the small ones then need two more passes over all pixels. Here a
-region is a list of runs, joined with a union-find forest: a silhouette has about a thousand runs
-but tens of thousands of pixels, and long stretches of one colour are skipped eight pixels at a
-time. The result is the same, in a tenth of the time.
+Pixels are connected by their sides (4 neighbours). A region is a list of runs, joined with a
+union-find forest: a silhouette has about a thousand runs but tens of thousands of pixels, and long
+runs are skipped eight pixels at a time. This is faster than labelling every pixel with OpenCV and
+recolouring the small regions in further passes.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ ImageArray = NDArray[np.uint8]
 
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _EIGHT = np.uint64(0x0101010101010101)
-# The smallest kernel that closes a gap of one pixel, in all eight directions.
+# Smallest kernel that closes a gap of one pixel in all eight directions.
 _CLOSING_KERNEL = np.ones((3, 3), np.uint8)
 _inline = njit(cache=True, nogil=True, inline="always")
 
 
 def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None:
-    """Turn regions of ``colour`` with fewer than ``area_px`` pixels to the other one, in place.
+    """Invert regions of ``colour`` with fewer than ``area_px`` pixels, in place.
 
     Args:
         image: (H, W), contiguous, 0 or 255.
         colour: 0 or 255.
-        area_px: the smallest area that stays.
+        area_px: smallest area that is kept, px.
     """
     height, width = image.shape
     words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
@@ -42,14 +41,14 @@ def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None
 
 
 class Regions(NamedTuple):
-    """The connected regions of a binary image, as runs of pixels, row by row.
+    """Connected regions of a binary image as runs of pixels, row by row.
 
     Attributes:
         rows: row of each run, (n,).
-        starts: its first column, (n,).
-        ends: the column after its last, (n,).
-        labels: the region it belongs to, (n,), from 0 in the order of their first pixels.
-        areas_px: pixels of each region, (m,).
+        starts: first column of each run, (n,).
+        ends: column after the last of each run, (n,).
+        labels: region of each run, (n,), counted from 0 in the order of the first pixels.
+        areas_px: number of pixels of each region, (m,).
     """
 
     rows: NDArray[np.int32]
@@ -62,13 +61,13 @@ class Regions(NamedTuple):
 def clean_silhouette(
     foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
 ) -> ImageArray:
-    """Drop small specks and fill small holes of a binary image.
+    """Remove small specks and fill small holes of a binary image.
 
     Args:
         foreground: (H, W), 0 or 255.
         min_area: smallest speck to keep, as a fraction of the image.
         max_hole: largest hole to fill, as a fraction of the image.
-        window: all foreground is in it, with background around; the whole image if None.
+        window: a window that contains all foreground; the whole image if None.
 
     Returns:
         A new (H, W) image, 0 or 255.
@@ -76,12 +75,13 @@ def clean_silhouette(
     silhouette = np.zeros(foreground.shape, np.uint8)
     if window is not None and window.is_empty:
         return silhouette
-    # Background that a window cuts off must not look like a hole: it has at least one side.
+    # Background in a window is at least as long as a side; unless holes are smaller than that, the
+    # whole image is used.
     sides = () if window is None else (window.bottom - window.top, window.right - window.left)
     if window is None or max_hole * foreground.size > min(sides):
         window = Window(0, foreground.shape[0], 0, foreground.shape[1])
     part = window.slices
-    # Closing, not opening: it joins what noise cut, and thin fingers survive it.
+    # Closing joins parts that noise separated; opening would remove thin fingers.
     closed = np.ascontiguousarray(
         cv2.morphologyEx(foreground[part], cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8
     )
@@ -92,8 +92,8 @@ def clean_silhouette(
 
 
 def find_regions(image: ImageArray) -> Regions:
-    """Return the regions of the pixels that are 255 in ``image`` (H, W), 0 or 255."""
-    # Compiled code has another version for memory that may not be written to.
+    """Return the connected regions of the pixels of ``image`` (H, W) that are 255."""
+    # A read-only array would make numba compile another version.
     image = np.require(image, requirements=("C", "W"))
     height, width = image.shape
     words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
@@ -108,7 +108,7 @@ def find_regions(image: ImageArray) -> Regions:
 
 @_inline
 def _root(parents: Any, run: Any) -> Any:
-    """The first run of a region; the way there becomes shorter."""
+    """Return the root run of a region, with path compression."""
     while parents[run] != run:
         parents[run] = parents[parents[run]]
         run = parents[run]
@@ -117,7 +117,7 @@ def _root(parents: Any, run: Any) -> Any:
 
 @_inline
 def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
-    """The first column of row ``v`` from ``u`` on that is not of ``colour``."""
+    """Return the first column of row ``v`` from ``u`` on that is not of ``colour``."""
     width = image.shape[1]
     word = np.uint64(colour) * _EIGHT
     while u < width and image[v, u] == colour:
@@ -130,7 +130,7 @@ def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
 
 @njit(cache=True, nogil=True)
 def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> Any:
-    """Write start, end, parent and area of each run; areas are right at roots. Return how many."""
+    """Write start, end, parent and area (valid at roots) of each run; return their number."""
     starts, ends, parents, areas = runs[0], runs[1], runs[2], runs[3]
     height, width = image.shape
     other = np.uint8(255) - colour
@@ -143,14 +143,14 @@ def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> A
             end = _end_of(image, words, v, u, colour)
             starts[count], ends[count] = u, end
             parents[count], areas[count] = count, end - u
-            # Runs above that ended before this one began touch none of those to come.
+            # Runs above that end before this one begins touch none of the following runs.
             while above < firsts[v] and ends[above] <= u:
                 above += 1
             touching = above
             while touching < firsts[v] and starts[touching] < end:
                 one, two = _root(parents, touching), _root(parents, count)
                 if one != two:
-                    # The smaller number becomes the root.
+                    # The run with the smaller number becomes the root.
                     first, second = min(one, two), max(one, two)
                     parents[second] = first
                     areas[first] += areas[second]
@@ -164,14 +164,14 @@ def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> A
 
 @njit(cache=True, nogil=True)
 def _number_regions(firsts: Any, runs: Any, rows: Any) -> Any:
-    """Turn parents into numbers of regions, with their areas first; return how many there are."""
+    """Replace parents by region numbers and write their areas; return the number of regions."""
     parents, areas = runs[2], runs[3]
     count = 0
     for v in range(len(firsts) - 1):
         for run in range(firsts[v], firsts[v + 1]):
             rows[run] = v
             root = parents[run]
-            # The root comes first, and has its number already where this is not one.
+            # A root precedes the other runs of its region, so it already has its number.
             if root == run:
                 areas[count] = areas[run]
                 parents[run] = count

@@ -1,4 +1,4 @@
-"""Bring an image's brightness to the working resolution."""
+"""Resizes images to the working resolution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 def to_working_size(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """Return ``image`` (H, W) or (H, W, 3) at (height, width); the same array if it fits.
+    """Resize ``image`` (H, W) or (H, W, 3) to (height, width); return the same array if it fits.
 
     Shrinking averages over area, which also averages the sensor's noise.
     """

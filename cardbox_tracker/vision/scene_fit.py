@@ -1,8 +1,8 @@
-"""Whether an image shows the scene that was learned, from the same place, in whatever light.
+"""Checks whether an image shows the learned scene from the same place, in any light.
 
-The learned scene is cut into tiles, and each that has some texture is looked for around its place
-in the image, by normalised correlation, which no level of light changes. A person hides some tiles;
-a camera that was moved shifts all of them.
+The learned scene is divided into tiles. Each tile with texture is searched around its place in the
+image by normalised correlation, which is invariant to the level of the light. A person hides some
+tiles; a moved camera shifts all of them.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from cardbox_tracker.vision.empty_scene import BackgroundModel
 ImageArray = NDArray[np.uint8]
 FloatImage = NDArray[np.float32]
 
-# Tiles along the width, and how far one is looked for, as a share of its size.
+# Tiles along the width, and the search radius as a share of a tile's size.
 _TILES = 8
 _REACH = 0.25
-# A tile has texture if its grey levels spread by more than this times the noise of a pixel.
+# A tile has texture if the deviation of its grey levels exceeds this multiple of the noise.
 _TEXTURE, _LEAST_TEXTURE = 1.5, 3.0
-# Correlation from which on a tile was found; how much better a shifted place has to be.
+# Smallest correlation of a found tile, and the gain that a shifted place needs.
 _FOUND, _BETTER = 0.6, 0.05
-# A shift up to this, px, is none.
+# Smaller shifts are ignored, px.
 _SAME_PX = 1
-# Share of the tiles that have to be found in place, and least number of tiles to judge by.
+# Share of the tiles that must be found in place, and least number of tiles for a decision.
 _ENOUGH, _FEWEST = 0.3, 4
-# Without texture: share of the image that may look different, and the difference from which on a
-# pixel does, in grey levels and as a share of what is expected.
+# Without texture: share of the image that may look different, and the difference that counts, in
+# grey levels and relative to the expected brightness.
 _MOST_CHANGED = 0.4
 _LEAST_CHANGE, _CHANGE = 6.0, 0.12
 _DARKEST = 8.0
@@ -38,14 +38,14 @@ _DARKEST = 8.0
 
 @dataclass(frozen=True)
 class SceneFit:
-    """How an image compares with the learned scene.
+    """Result of the comparison of an image with the learned scene.
 
     Attributes:
         tiles: number of tiles that have texture.
-        in_place: those found where they were learned.
-        shifted: those found elsewhere.
-        shift_px: (right, down), the median of the shifts of the latter.
-        changed: share of the pixels that look different, in the light of the image.
+        in_place: number of tiles found where they were learned.
+        shifted: number of tiles found elsewhere.
+        shift_px: median shift (right, down) of the shifted tiles, px.
+        changed: share of the pixels that look different, after correction for the light.
     """
 
     tiles: int
@@ -56,18 +56,18 @@ class SceneFit:
 
     @property
     def is_moved(self) -> bool:
-        """True if the camera looks elsewhere than when the scene was learned."""
+        """Whether the camera was moved since the scene was learned."""
         return self.shifted > max(self.in_place, _FEWEST - 1)
 
     @property
     def is_same(self) -> bool:
-        """True if the image shows the scene, be it with a person in it."""
+        """Whether the image shows the learned scene, with or without a person."""
         if self.tiles < _FEWEST:
             return self.changed <= _MOST_CHANGED
         return not self.is_moved and self.in_place >= _ENOUGH * self.tiles
 
     def __str__(self) -> str:
-        """Say how it compares, for a message."""
+        """Return a description of the result, for messages."""
         if self.is_moved:
             right, down = self.shift_px
             return f"the camera was moved: the scene is shifted by about ({right}, {down}) px"
@@ -110,7 +110,7 @@ def compare_scene(model: BackgroundModel, brightness: ImageArray) -> SceneFit:
 def _find(
     tile: FloatImage, image: FloatImage, top: int, left: int, reach: int
 ) -> tuple[int, int] | None:
-    """Return by how much (right, down) a tile is shifted, px; None if it is not there."""
+    """Return the shift (right, down) of a tile, px; None if it was not found."""
     up, back = min(top, reach), min(left, reach)
     height, width = tile.shape
     around = image[top - up : top + height + reach, left - back : left + width + reach]
@@ -119,7 +119,7 @@ def _find(
     best = float(scores[best_v, best_u])
     if best < _FOUND:
         return None
-    # Along an edge, many places look alike.
+    # Many places along an edge correlate equally well.
     if float(scores[up, back]) >= best - _BETTER:
         return 0, 0
     return int(best_u) - back, int(best_v) - up

@@ -1,10 +1,8 @@
-"""Whether something moves before a fixed camera, be it as little as a person who stands still.
+"""Detects motion before a fixed camera, as small as the sway of a standing person.
 
-Nobody stands still: a sway of some millimetres moves every edge of the body. Means over a few
-images have little noise, so two of them differ along the outline of a person, and nowhere in an
-empty scene. Of eleven recorded sessions, means within 30 images differed in 1.2 % of the image or
-more wherever somebody was in it, and in 0.5 % or less of an empty scene
-(docs/evaluation/silhouettes.md).
+A standing person sways by some millimetres, which moves every edge of the body. Means over a few
+images have little noise, so two of them differ along the outline of a person but nowhere in an
+empty scene. docs/evaluation/silhouettes.md has the measured shares of moving pixels.
 """
 
 from __future__ import annotations
@@ -20,15 +18,15 @@ ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 STILL = 0.006
-"""A scene is still if no larger share of its pixels moves."""
+"""Largest share of moving pixels in a still scene."""
 
-# Motion is looked for at a quarter of the pixels, the noise of which is halved.
+# Motion is detected at half the resolution, where averaging halves the noise.
 _SCALE = 2
 _SMOOTHING_PX = 0.8
-# Images a mean is made of; their noise is less than half of an image's.
+# Images per mean, whose noise is less than half of an image's.
 _MEAN_OF = 5
-# A pixel has changed by so many grey levels at least, and so many times the noise; whoever runs
-# past smears over half of the image, so what passes for noise has an end.
+# A changed pixel differs by at least this many grey levels and this multiple of the noise. The
+# estimated noise is limited, since a running person smears over half of the image.
 _LEAST, _MOST = 2.0, 8.0
 _TIMES_NOISE = 6.0
 _DARKEST = 8.0
@@ -37,14 +35,15 @@ _FROM_MEDIAN = 1.4826
 
 
 class SceneMotion:
-    """Compares the latest images with the first ones, one image at a time.
+    """Compares the latest images with the first ones.
 
     Attributes:
-        moved: pixels that have moved so far, (H / 2, W / 2) bool; None before the second mean.
+        moved: mask of pixels that have moved so far, (H / 2, W / 2) bool; None before the second
+            mean.
     """
 
     def __init__(self, images: int) -> None:
-        """Start with nothing seen; ``images`` is how many will be shown, 2 or more."""
+        """Start without images; ``images`` is the number that will be added, 2 or more."""
         self._of = max(1, min(_MEAN_OF, images // 2))
         self._latest: deque[FloatImage] = deque(maxlen=self._of)
         self._count = 0
@@ -52,7 +51,7 @@ class SceneMotion:
         self.moved: Mask | None = None
 
     def add(self, brightness: ImageArray) -> float:
-        """Look at an image (H, W); return the share of the pixels that have moved so far."""
+        """Add an image (H, W); return the share of the pixels that have moved so far."""
         self._latest.append(_small(brightness))
         self._count += 1
         if self._count == self._of:
@@ -76,12 +75,12 @@ def _small(brightness: ImageArray) -> FloatImage:
 def changed_pixels(
     before: FloatImage, after: FloatImage, times_noise: float = _TIMES_NOISE
 ) -> Mask:
-    """Return where two images (h, w) differ by so many times their noise, in whatever light.
+    """Return a mask of pixels in which two images (h, w) differ by a multiple of their noise.
 
-    The level of the light and the noise are medians: what moves covers less than half of it.
+    The level of the light and the noise are medians, since moving pixels are less than half.
     """
     level = max(float(np.median(after / np.maximum(before, _DARKEST))), 1e-3)
-    # In more light differences are larger, too.
+    # Differences grow with the light.
     difference = np.abs(after - level * before) / max(level, 1.0)
     noise = _FROM_MEDIAN * float(np.median(difference))
     return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)

@@ -1,8 +1,8 @@
-"""Shadows told from dark clothes by their soft edge.
+"""Distinguishes shadows from dark clothes by their soft edge.
 
-Both are darker than the wall in its own colour. But cloth ends within a pixel or two, and a shadow
-fades over many. So the background is let in, pixel by pixel, where the brightness relative to it
-changes slowly: it floods a shadow and stops at the outline of cloth.
+Both darken the wall without changing its colour. But cloth ends within a pixel or two, and a shadow
+fades over many. The background is therefore flooded, pixel by pixel, into dark pixels where the
+relative brightness changes slowly. The flood covers a shadow and stops at the outline of cloth.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from cardbox_tracker.vision.window import Window
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-# What a pixel that may be a shadow is meanwhile, besides 0 (background) and 255 (foreground).
+# Temporary value of a shadow candidate, besides 0 (background) and 255 (foreground).
 _DARK = 128
-# Half the width of the square in which the brightness is compared.
+# Half the width of the square in which the brightness is compared, px.
 _REACH_PX = 2
 
 
-# Eight pixels at a time, where rows are made of such.
+# Eight pixels are processed at a time where the width is a multiple of eight.
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _NOTHING = np.zeros((1, 1), np.uint8)
 
@@ -39,26 +39,26 @@ def decide_shadows(
     softest: float,
     window: Window | None = None,
 ) -> None:
-    """Add what the colour finds to ``foreground`` and take soft shadows away, in place.
+    """Add coloured pixels to ``foreground`` and remove soft shadows from it, in place.
 
-    A pixel is darker by its difference times its ``per_level``, a fraction of the background.
+    The darkness of a pixel is its difference times ``per_level``, a fraction of the background.
 
     Args:
-        foreground: (H, W), 0 or 255, by brightness alone.
+        foreground: (H, W), 0 or 255, found by brightness alone.
         difference: image minus background, (H, W), grey levels.
         per_level: one grey level as a fraction of the background, (H, W).
-        colored: not negative where the colour differs, of the window's size; None without colour.
-        darkest: a shadow is darker by less than this fraction.
-        softest: around a pixel of a shadow, that fraction varies by less than this.
-        window: all foreground is in it; its columns are multiples of 8 if the width is one; the
-            whole image if None.
+        colored: >= 0 where the colour differs, of the window's size; None without colour.
+        darkest: largest darkness of a shadow.
+        softest: largest variation of the darkness around a pixel of a shadow.
+        window: a window that contains all foreground, whose columns are multiples of 8 if the
+            width is one; the whole image if None.
     """
     window = window or Window(0, foreground.shape[0], 0, foreground.shape[1])
     part = foreground[window.slices]
     by_color = _NOTHING
     if colored is not None:
         by_color = np.asarray(cv2.inRange(colored, 0.0, np.inf), np.uint8)
-    # Row and column of the candidates, and of those that are let in.
+    # Row and column of the candidates, and of the pixels that were flooded.
     queues = np.empty((4, part.size), np.int32)
     limits = np.float32(-darkest), np.float32(softest)
     words = foreground.view(np.uint64) if foreground.shape[1] % 8 == 0 else _NO_WORDS
@@ -70,7 +70,7 @@ def decide_shadows(
 
 @njit(cache=True, nogil=True, inline="always")
 def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> Any:
-    """Whether the darkness varies by less than ``softest`` in the square around a pixel."""
+    """Return whether the darkness varies by less than ``softest`` in the square around a pixel."""
     height, width = difference.shape
     low = high = difference[v, u] * per_level[v, u]
     for y in range(max(v - _REACH_PX, 0), min(v + _REACH_PX + 1, height)):
@@ -120,7 +120,7 @@ def _decide(
                     rows[number], columns[number] = v, u
                     number += 1
             start = end
-    # From the background, as far as the shadow is soft.
+    # The flood starts at the background and spreads as far as the shadow is soft.
     count = 0
     for index in range(number):
         v, u = rows[index], columns[index]
@@ -147,7 +147,7 @@ def _decide(
                 foreground[y, x] = 0
                 queued_rows[count], queued_columns[count] = y, x
                 count += 1
-    # Beside the outline the square reaches into the person: those last pixels go without it.
+    # Near the outline the square reaches into the person, so the last pixels skip this test.
     begin = 0
     for _ in range(_REACH_PX):
         last = count

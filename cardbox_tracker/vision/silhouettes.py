@@ -1,7 +1,7 @@
-"""From a camera's image to the silhouette in it: the same steps live and in a recording.
+"""Turns camera images into silhouettes, with the same steps live and in a recording.
 
-An image is resized and rectified; the first ones teach the empty scene, and in every later one the
-person is cut out before it.
+An image is resized and rectified. The first images teach the empty scene; from every later one the
+silhouette of the person is extracted.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from cardbox_tracker.vision.resize import to_working_size
 
 ImageArray = NDArray[np.uint8]
 
-# A silhouette so many times larger than in another light says that the light is another one.
+# If another light makes the silhouette smaller by this factor, that light is correct.
 _IN_WRONG_LIGHT = 1.7
 
 
 class SilhouettePipeline:
-    """Learns the empty scene of one camera, then cuts silhouettes out of its images.
+    """Learns the empty scene of one camera, then extracts silhouettes from its images.
 
     Attributes:
-        calibration: of the images that come in.
-        camera: the pinhole camera of what comes out, at the working size, without distortion.
-        learning: how far the empty scene is learned.
+        calibration: calibration of the input images.
+        camera: pinhole camera of the silhouettes, at the working size, without distortion.
+        learning: the method and progress of learning the empty scene.
     """
 
     def __init__(
@@ -41,13 +41,14 @@ class SilhouettePipeline:
         config: BackgroundConfig | None = None,
         learning: type[Learning] = Learning,
     ) -> None:
-        """Set up with nothing learned.
+        """Start without a background.
 
         Args:
-            calibration: of the images that come in, of any size of that aspect ratio.
+            calibration: calibration of the input images, which may have any size of its aspect
+                ratio.
             size: working size (width, height), px.
             config: settings of the background model.
-            learning: how the empty scene is learned.
+            learning: the method of learning the empty scene.
 
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
@@ -63,7 +64,7 @@ class SilhouettePipeline:
 
     @property
     def config(self) -> BackgroundConfig:
-        """The settings; assigning others keeps what was learned and acts on the next image."""
+        """The settings; other settings act on the next image and keep the background."""
         return self._config
 
     @config.setter
@@ -80,17 +81,17 @@ class SilhouettePipeline:
 
     @property
     def is_ready(self) -> bool:
-        """True once a background is learned, so that silhouettes can be cut out."""
+        """Whether a background is learned, so that silhouettes can be extracted."""
         return self._extractor is not None
 
     @property
     def learned_images(self) -> int:
-        """Images of the empty scene added so far."""
+        """Number of images of the empty scene added so far."""
         return self.learning.count
 
     @property
     def has_enough(self) -> bool:
-        """True once the scene is learned well enough for :meth:`finish_learning`."""
+        """Whether enough is learned for :meth:`finish_learning`."""
         return self.learning.has_enough()
 
     def prepare(self, image: ImageArray) -> ImageArray:
@@ -103,7 +104,7 @@ class SilhouettePipeline:
         self.learning.add(image)
 
     def finish_learning(self) -> BackgroundModel:
-        """Learn the background from the images added; later images are compared with it.
+        """Make a background from the added images; later images are compared with it.
 
         Raises:
             ValueError: fewer than two images were added.
@@ -113,30 +114,30 @@ class SilhouettePipeline:
         return model
 
     def relearn(self, learning: type[Learning] | None = None) -> None:
-        """Forget the background; it is learned again, in another way if one is given."""
+        """Forget the background and learn it again, with another method if one is given."""
         self._way = learning or self._way
         self.learning = self._way(self._config.learn_images)
         self._extractor = None
 
     def resume(self, model: BackgroundModel, image: ImageArray) -> None:
-        """Go on with a background learned before, from a prepared image with anybody in it.
+        """Continue with a background learned before; the prepared image may show a person.
 
-        The light may have changed since: where the silhouette is much smaller in a light estimated
-        from this image, that light is taken.
+        The light may have changed since. If the silhouette is much smaller in a light that is
+        estimated from this image, that light is used.
         """
         extractor = SilhouetteExtractor(model, self._config)
         found = np.count_nonzero(extractor(image))
         extractor.restart()
         other = SilhouetteExtractor(model, self._config)
         other.expect_other_light()
-        for _ in range(2):  # the second time, without the person
+        for _ in range(2):  # the second pass excludes the person
             left = np.count_nonzero(other(image))
         self._extractor = other if found > _IN_WRONG_LIGHT * left else extractor
 
     def silhouette(self, image: ImageArray, stamp_ns: int = 0) -> ImageArray:
         """Return the silhouette (H, W), 0 or 255, of a prepared image, grey or bgr.
 
-        Its stamp, 0 if unknown, only says how fast images come.
+        The stamp, ns, 0 if unknown, is only used to measure the rate of the images.
 
         Raises:
             RuntimeError: no background is learned yet.
@@ -146,19 +147,19 @@ class SilhouettePipeline:
         return self._extractor(image, stamp_ns)
 
     def restart(self) -> None:
-        """Say that the next image is not the one after the last, so that no light is followed."""
+        """Forget the light, since the next image does not follow the last one."""
         if self._extractor is not None:
             self._extractor.restart()
 
     @property
     def light(self) -> float:
-        """Brightness of the scene in the last image as a factor of what was learned."""
+        """Brightness of the scene in the last image relative to the learned background."""
         return 1.0 if self._extractor is None else self._extractor.gain
 
     def drift(self, image: ImageArray) -> float:
-        """Return how much brighter a prepared image is than the background, grey levels.
+        """Return the median difference of a prepared image from the background, grey levels.
 
-        The median over the image, since the person covers less than half of it; 0 before a
+        The median is robust, since the person covers less than half of the image. It is 0 before a
         background is learned.
         """
         if self._extractor is None:

@@ -1,4 +1,4 @@
-"""Depth from a rectified pair of images, by OpenCV's semi-global matching."""
+"""Measures depth in rectified image pairs with OpenCV's semi-global matching."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 DepthImage = NDArray[np.float32]
 
 NEAREST_M = 0.8
-"""Nearer things are not found, metres."""
+"""Smallest measured distance, metres."""
 
-# As OpenCV's documentation has them: penalties of 8 and 32 times the pixels of a block, disparities
-# in sixteenths of a pixel, and a number of them that 16 divides.
+# Recommended by OpenCV: penalties of 8 and 32 times the pixels of a block. Disparities are in
+# sixteenths of a pixel, and their number is a multiple of 16.
 _BLOCK, _STEP, _PARTS = 5, 16, 16.0
 _SMALL_STEP, _LARGE_STEP = 8 * _BLOCK**2, 32 * _BLOCK**2
 _UNIQUE_PERCENT, _LEFT_RIGHT = 5, 1
@@ -30,12 +30,12 @@ class StereoDepth:
     """Measures depth in the left one of two rectified images."""
 
     def __init__(self, fx: float, baseline_m: float, nearest_m: float = NEAREST_M) -> None:
-        """Prepare.
+        """Prepare the matcher.
 
         Args:
             fx: focal length of both images, px.
             baseline_m: distance of the cameras, metres.
-            nearest_m: anything nearer is not found; the time grows with what this costs.
+            nearest_m: smallest measured distance, metres; a smaller one takes more time.
 
         Raises:
             CameraError: focal length or baseline is not positive.
@@ -65,8 +65,8 @@ class StereoDepth:
         """Return the depth (H, W), metres along the optical axis; 0 where none was found.
 
         Args:
-            left: (H, W) grey or (H, W, 3) bgr, rectified.
-            right: of the same size.
+            left: left image, (H, W) grey or (H, W, 3) bgr, rectified.
+            right: right image of the same size.
         """
         pair = (np.ascontiguousarray(brightness_of(image)) for image in (left, right))
         disparity = np.asarray(self._matcher.compute(*pair), np.float32) / np.float32(_PARTS)
@@ -78,16 +78,16 @@ class StereoDepth:
 def stereo_of_pair(
     left: Camera, right: Camera, where: Extrinsics, nearest_m: float = NEAREST_M
 ) -> StereoDepth:
-    """Return what measures depth in a rectified pair.
+    """Create the depth measurement of a rectified pair.
 
     Args:
         left: camera of the left images.
         right: camera of the right images, of the same size.
-        where: the right camera stands against the left one.
+        where: extrinsics of the right camera relative to the left one.
         nearest_m: see :class:`StereoDepth`.
 
     Raises:
-        CameraError: they are no rectified pair with the left camera first.
+        CameraError: the cameras are no rectified pair with the left camera first.
     """
     x, *rest = where.translation_m.tolist()
     one, other = ((c.fx, c.fy, c.cx, c.cy) for c in (left, right))

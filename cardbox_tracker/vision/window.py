@@ -1,4 +1,4 @@
-"""The part of an image that has foreground, so that the rest costs no time."""
+"""Windows that contain the foreground of an image, so that the rest need not be processed."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Window(NamedTuple):
 
     @property
     def slices(self) -> tuple[slice, slice]:
-        """What an array is indexed with."""
+        """Slices of rows and columns that index an array."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     @property
     def is_empty(self) -> bool:
-        """True without any pixel."""
+        """Whether the window has no pixels."""
         return self.bottom <= self.top or self.right <= self.left
 
     def joined(self, other: Window) -> Window:
-        """Return the smallest window with both in it; one without pixels does not count."""
+        """Return the smallest window that contains both; an empty one is ignored."""
         if self.is_empty or other.is_empty:
             return other if self.is_empty else self
         return Window(
@@ -42,9 +42,9 @@ class Window(NamedTuple):
         )
 
     def grown(self, margin_px: int, shape: tuple[int, ...]) -> Window:
-        """Return it with a margin, within an image of ``shape``, its edges at multiples of 8.
+        """Return the window with a margin and edges at multiples of 8, in an image of ``shape``.
 
-        Without pixels it stays so.
+        An empty window stays empty.
         """
         if self.is_empty:
             return Window(0, 0, 0, 0)
@@ -55,9 +55,9 @@ class Window(NamedTuple):
 
 
 def window_of(image: ImageArray) -> Window:
-    """Return a window with all pixels that are not 0 of an image (H, W), contiguous.
+    """Return a window that contains all pixels of an image (H, W), contiguous, that are not 0.
 
-    It is the smallest one up to eight columns at either side, and has none of an empty image.
+    It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
     """
     if image.shape[1] % 8:
         return Window(*_bounds(image.view(np.uint8), 1))
@@ -66,7 +66,7 @@ def window_of(image: ImageArray) -> Window:
 
 @njit(cache=True, nogil=True)
 def _bounds(words: Any, pixels: Any) -> Any:
-    """First row, row after the last, first column and column after the last, of words of pixels."""
+    """Return first row, row after the last, first column and column after the last, px."""
     height, width = words.shape
     top, bottom = height, 0
     columns = np.zeros(width, words.dtype)

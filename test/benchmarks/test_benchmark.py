@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.benchmarks import core as benchmark_core
-from cardbox_tracker.benchmarks import report as benchmark_report
-from cardbox_tracker.benchmarks import run as benchmark
-from cardbox_tracker.benchmarks import tools as benchmark_tools
-from cardbox_tracker.benchmarks.scene import make_scene
+from benchmarks import core as benchmark_core
+from benchmarks import report as benchmark_report
+from benchmarks import run as benchmark
+from benchmarks.scene import make_scene
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.estimation.config import paper_preset
-from cardbox_tracker.evaluation.paper.results import read_json
+from cardbox_tracker.evaluation.results import read_json
 from tools.readme_figures import BENCHMARKS
 
 ROOT = Path(__file__).parents[2]
@@ -92,12 +90,12 @@ def test_the_compiled_cost_is_the_faster_one(core: dict[str, Any]) -> None:
 
 def test_particles_at_30hz_by_hand() -> None:
     measured = {
-        "600": {"cores_2_ms": 1.0},
-        "6000": {"cores_2_ms": 100 / 3 - 10},
-        "60000": {"cores_2_ms": 100 / 3 + 10},
+        "600": 1.0,
+        "6000": 100 / 3 - 10,
+        "60000": 100 / 3 + 10,
     }
     assert benchmark_core.particles_at_30hz(measured) == 33_000
-    assert benchmark_core.particles_at_30hz({"600": {"cores_2_ms": 40.0}}) == 0
+    assert benchmark_core.particles_at_30hz({"600": 40.0}) == 0
 
 
 def test_turns_give_every_tracker_every_image_once() -> None:
@@ -114,12 +112,6 @@ def test_the_scene_moves_and_its_background_does_not() -> None:
     assert np.any(scene.silhouettes[0] != scene.silhouettes[-1])
     assert np.abs(np.diff(scene.empty.astype(int), axis=0)).mean() < 6
     assert not np.any(make_scene(80, 60, 1, 3).empty != scene.empty)
-
-
-def test_both_arms_at_once_find_what_one_after_the_other_does() -> None:
-    """What the benchmark compares is the same work."""
-    assert benchmark_tools.one_core(paper_preset()).parallel_from is None
-    assert paper_preset().parallel_from is not None
 
 
 @pytest.mark.parametrize("nodes", [None, NODES])

@@ -93,7 +93,7 @@ def packed(raw: bytes) -> str:
     ],
 )
 def test_damaged_text_is_refused(text: str) -> None:
-    with pytest.raises(BodyModelError, match="appearance is damaged: expected the base64 text"):
+    with pytest.raises(BodyModelError, match=r"appearance.*base64"):
         Appearance.from_text(text)
 
 
@@ -108,7 +108,7 @@ def test_damaged_text_is_refused(text: str) -> None:
     ],
 )
 def test_other_shapes_are_refused(levels: np.ndarray, brightness: np.ndarray) -> None:
-    with pytest.raises(BodyModelError, match="expected 5 parts of 32 grey values or 1728 colours"):
+    with pytest.raises(BodyModelError, match=r"5 .*32 .*1728"):
         Appearance(levels, brightness)
 
 
@@ -143,10 +143,10 @@ def test_a_model_file_holds_it(channels: int) -> None:
 @pytest.mark.parametrize(
     ("value", "reason"),
     [
-        ("17", "appearance is of type int; expected a text in base64"),
-        ("[a, b]", "appearance is of type list; expected a text in base64"),
-        ("", "appearance is of type NoneType; expected a text in base64"),
-        ("eNoz", "appearance is damaged"),
+        ("17", "appearance .* int; .*base64"),
+        ("[a, b]", "appearance .* list; .*base64"),
+        ("", "appearance .* NoneType; .*base64"),
+        ("eNoz", "appearance .*base64"),
     ],
 )
 def test_a_model_file_with_a_damaged_one_is_refused_by_name(value: str, reason: str) -> None:

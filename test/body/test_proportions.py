@@ -54,8 +54,8 @@ def test_the_file_says_that_nobody_was_measured() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("source: proportions", "source: guessed", "source is 'guessed'; expected one of"),
-        ("unknown: [", "unknown: [knee, ", "unknown names 'knee'"),
+        ("source: proportions", "source: guessed", "source .*'guessed'.*expected"),
+        ("unknown: [", "unknown: [knee, ", "'knee'"),
         ("source: proportions", "source: 3", "source is 3"),
     ],
 )

@@ -38,7 +38,7 @@ def test_spans_that_are_none(text: str) -> None:
 def test_times_that_are_none(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as caught:
         time(text)
-    assert str(caught.value) == f"expected seconds from the start of the recording, got {text!r}"
+    assert "seconds" in str(caught.value) and repr(text) in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["-1", "2.5", "many", ""])
@@ -49,10 +49,10 @@ def test_times_that_are_none(text: str) -> None:
 def test_numbers_that_are_none(kind: Callable[[str], int], lowest: int, text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as caught:
         kind(text)
-    assert str(caught.value) == f"expected a whole number of {lowest} or more, got {text!r}"
+    assert f"{lowest} or more" in str(caught.value) and repr(text) in str(caught.value)
 
 
 @pytest.mark.parametrize(("kind", "lowest"), [(particle_count, 2), (run_count, 2)])
 def test_numbers_that_are_too_low(kind: Callable[[str], int], lowest: int) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match=f"of {lowest} or more"):
+    with pytest.raises(argparse.ArgumentTypeError, match=f"{lowest} or more"):
         kind(str(lowest - 1))

@@ -24,7 +24,7 @@ def test_an_input_is_refused_by_whatever_name(tmp_path: Path) -> None:
     (tmp_path / "linked.csv").symlink_to(recording)
     (tmp_path / "hard.csv").hardlink_to(recording)
     for name in ("linked.csv", "hard.csv", "bag/bag.mcap", "bag/../bag/bag.mcap"):
-        with pytest.raises(CardboxError, match=r"it is read, as .*bag\.mcap; give another name"):
+        with pytest.raises(CardboxError, match=r"bag\.mcap; .*another name"):
             check_outputs((tmp_path / name,), force=True, inputs=(tmp_path / "bag",))
     check_outputs((tmp_path / "bag" / "other.csv",), force=False, inputs=(tmp_path / "bag",))
 
@@ -37,7 +37,7 @@ def test_only_what_would_be_lost_needs_force(tmp_path: Path) -> None:
     check_outputs((tmp_path / "new.csv", *devices), False, results=(tmp_path / "empty",))
     check_outputs((tmp_path / "old.csv",), force=True)
     for results in ((tmp_path / "old.csv",), (tmp_path,)):
-        with pytest.raises(CardboxError, match="exists; choose another name, or give --force"):
+        with pytest.raises(CardboxError, match=r"exists.*--force"):
             check_outputs((), force=False, results=results)
 
 
@@ -58,9 +58,7 @@ def test_evaluate_does_not_replace_a_report_but_resumes_without_one(
     tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[Path] = []
-    monkeypatch.setattr(
-        "cardbox_tracker.evaluation.paper.evaluate.evaluate", lambda *given: done.append(given[0])
-    )
+    monkeypatch.setattr("experiments.evaluate.evaluate", lambda *given: done.append(given[0]))
     (tmp_path / "parts").mkdir()
     assert cardbox("evaluate", "--output", tmp_path).code == 0
     (tmp_path / "report.md").write_text("days of work")
@@ -80,7 +78,7 @@ def run(options):
     with BagWriter(options.output / "bag") as bag, atomic_path(options.output / "out.csv"):
         bag.write_string("chatter", 1, "hello")
         print("begun", flush=True)
-        time.sleep(600)
+        signal.pause()
 
 # Below nohup it is ignored, which the command respects.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_bag import ResultBag
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.vision.camera import Camera
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -31,7 +31,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
     with ResultBag(path, "camera") as bag:
         for i, estimate in enumerate((seen, seen, Estimate(LOST), seen, seen)):
-            bag.add(Frame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+            bag.add(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
     return path
 
 

@@ -17,6 +17,10 @@ import pytest
         (("--background", "90:99"), "0 images lie in the background span 90:99 s of a bag of"),
         (("--preset", "fast"), "invalid choice: 'fast' (choose from "),
         (("--strategy", "best"), "invalid choice: 'best' (choose from "),
+        (
+            ("--refine-sizes", "1"),
+            "--refine-sizes was removed: breadths stay as they were measured",
+        ),
         (("--particles", "1"), "--particles: expected a whole number of 2 or more, got '1'"),
         (("--particles", "9999999999"), "particles is 1e+10; expected 2 to 1e+06"),
         (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),

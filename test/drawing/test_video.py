@@ -37,7 +37,7 @@ def test_every_image_is_in_the_video(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["a.gif", "a", "mp4", "a.mp4.txt"])
 def test_a_wrong_ending_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(CardboxError, match=r"must end in \.mp4 or \.avi"):
+    with pytest.raises(CardboxError, match=r"\.mp4.*\.avi"):
         write(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
@@ -61,5 +61,5 @@ def test_an_error_on_the_way_leaves_the_old_video(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match=r"cannot write .*none/a\.avi"):
+    with pytest.raises(CardboxError, match=r"none/a\.avi"):
         write(tmp_path / "none" / "a.avi")

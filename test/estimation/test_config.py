@@ -28,7 +28,7 @@ def test_the_paper_preset_is_table_one() -> None:
     assert (config.torso.sigma_gamma_px, config.arm.sigma_gamma_px) == (8000.0, 4000.0)
     assert config.strategy == "drs"
     # One cycle a frame whose best particle is the result, and nothing else.
-    assert (config.cycles, config.average, config.terms, config.explore) == (1, 1, (), 0.0)
+    assert (config.cycles, config.average, config.terms) == (1, 1, ())
     assert not config.relocalize and not config.select_person
 
 
@@ -42,8 +42,8 @@ def test_only_the_default_preset_takes_the_whole_body_filter() -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected more than the 58 special ones"),
-        ({"fresh_torsos": 17}, "fresh_torsos, torso_explorers and torsos are 17, 16, 70"),
+        ({"arms": 50, "banked_arms": 40}, "arms is 50; expected .*58"),
+        ({"fresh_torsos": 17}, "fresh_torsos, .*17, 16, 70"),
         ({"best_torsos": 71}, "best_torsos is 71; expected 1 to 70"),
         ({"alike": 33}, "alike is 33; expected 1 to 32"),
     ],
@@ -80,9 +80,7 @@ def test_a_filter_value_out_of_range_is_named(name: str, values: tuple[float, ..
     ("name", "values"),
     [
         ("cycles", (0, -1, 101)),
-        ("noise_decay", (-0.1, 1.1)),
         ("average", (0, -3, 201)),
-        ("explore", (-0.1, 0.91)),
         ("lost_iou", (-0.1, 1.1)),
         ("lost_frames", (0, -1)),
     ],
@@ -94,7 +92,7 @@ def test_a_tracker_value_out_of_range_is_named(name: str, values: tuple[float, .
 
 
 def test_an_unknown_strategy_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"strategy is 'best'; expected one of drs, srs"):
+    with pytest.raises(ValueError, match=r"strategy .*'best'; .*drs, srs"):
         TrackerConfig(strategy="best")
 
 

@@ -26,6 +26,7 @@ from cardbox_tracker.estimation.cost import (
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import chroma, light, regions, shadows, window
@@ -93,6 +94,6 @@ def test_nor_does_one_of_several_cameras() -> None:
     beside = OtherCamera(CAMERA, Extrinsics(np.eye(3), np.array([0.2, 0.0, 0.0])))
     tracker = Tracker(body, CAMERA, PRESETS["default"](), others=[beside])
     for seen in ([person, person], [None, person], [person, None]):
-        estimate = tracker.track_views(seen, [None, None])
+        estimate = tracker.track([Observation(one) for one in seen])
     assert estimate.keypoints_m is not None
     assert compiled() == before

@@ -236,7 +236,7 @@ def test_whoever_was_lost_is_found(seed: int) -> None:
 
 
 def test_a_paper_tracker_that_may_search_again_finds_whom_it_lost_at_once() -> None:
-    tracker = make(replace(paper_preset(), relocalize=True, cycles=2, noise_decay=0.5))
+    tracker = make(replace(paper_preset(), relocalize=True, cycles=2))
     tracker.track(seen(front()))
     while tracker.track(stripes()).state != LOST:
         pass
@@ -311,7 +311,7 @@ def test_the_camera_is_pitched_as_the_body_model_says() -> None:
 @pytest.mark.parametrize("shape", [(120, 161), (160, 120), (240, 320)])
 def test_a_silhouette_of_another_size_is_refused(shape: tuple[int, int]) -> None:
     tracker = make()
-    with pytest.raises(ValueError, match=r"silhouette has shape .* camera's is \(120, 160\)"):
+    with pytest.raises(ValueError, match=r"silhouette .*\(120, 160\)"):
         tracker.track(np.zeros(shape, np.uint8))
     # It changes nothing for the next one.
     assert_same(tracker.track(seen(front())), make().track(seen(front())))
@@ -348,8 +348,8 @@ class CountingSilhouette(CompiledSilhouette):
 
 
 @pytest.mark.parametrize("cycles", [1, 3])
-def test_an_image_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
-    config = replace(paper_preset(), cycles=cycles, noise_decay=0.1).with_particles(2000)
+def test_an_image_takes_as_many_cycles_as_asked(cycles: int) -> None:
+    config = replace(paper_preset(), cycles=cycles).with_particles(2000)
     # One survivor, so that particles lie around it by the noise of one cycle.
     config = replace(config, torso=replace(config.torso, survival_rate=1e-9))
     counting = CountingSilhouette()
@@ -360,10 +360,8 @@ def test_an_image_takes_as_many_cycles_with_falling_noise(cycles: int) -> None:
     counting.torsos.clear()
     tracker.track(seen(front()))
     assert len(counting.torsos) == cycles
-    for cycle, torsos in enumerate(counting.torsos):
-        np.testing.assert_allclose(
-            torsos.std(axis=0), np.array([0.02, 0.1, 0.1, 0.1]) * 0.1**cycle, rtol=0.1
-        )
+    for torsos in counting.torsos:
+        np.testing.assert_allclose(torsos.std(axis=0), [0.02, 0.1, 0.1, 0.1], rtol=0.1)
 
 
 def test_the_mean_of_the_best_is_steadier_than_the_best() -> None:
@@ -392,7 +390,7 @@ class StandingStill:
         self.posture = posture
         self.calls.append(("initialize", noise_scale))
 
-    def iterate(self, observation: Any, noise_scale: float = 1.0, explore: float = 0.0) -> None:
+    def iterate(self, observation: Any, noise_scale: float = 1.0) -> None:
         self.calls.append(("iterate", noise_scale))
 
     def estimate(self) -> np.ndarray:
@@ -403,7 +401,7 @@ class StandingStill:
 
 
 def test_the_tracker_takes_another_filter() -> None:
-    config = replace(paper_preset(), cycles=2, noise_decay=0.5)
+    config = replace(paper_preset(), cycles=2)
     tracker = make(config, make_filter=partial(Cycles, make_hierarchy=StandingStill))
     estimates = [tracker.track(seen(front())) for _ in range(2)]
     for estimate in estimates:
@@ -413,7 +411,7 @@ def test_the_tracker_takes_another_filter() -> None:
     assert tracker._filter.hierarchy.calls == [
         ("initialize", 1.0),
         ("iterate", 1.0),
-        ("iterate", 0.5),
+        ("iterate", 1.0),
     ]
 
 
@@ -422,16 +420,18 @@ class _Infected:
 
     made = 0
 
-    def __init__(self, config: Any, silhouette: Any, rng: Any, part: str = "posture") -> None:
+    def __init__(
+        self, config: Any, silhouette: Any, rng: Any, views: Any, part: str = "posture"
+    ) -> None:
         type(self).made += 1
-        self._inner = FILTERS[config.filter](config, silhouette, rng)
+        self._inner = FILTERS[config.filter](config, silhouette, rng, views)
         self._frames, self._part = 0, part
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._inner, name)
 
-    def follow(self, terms: Any) -> Any:
-        fit = self._inner.follow(terms)
+    def follow(self, frames: Any, terms: Any) -> Any:
+        fit = self._inner.follow(frames, terms)
         self._frames += 1
         ruined = np.array(getattr(fit, self._part), dtype=float)
         ruined.flat[0] = np.nan
@@ -450,7 +450,7 @@ def test_numbers_that_are_not_finite_never_leave_and_do_not_stay(part: str) -> N
 
 
 def test_an_image_of_another_size_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"image has shape \(60, 80, 3\); the camera's is"):
+    with pytest.raises(ValueError, match=r"image .*\(60, 80, 3\)"):
         make().track(seen(front()), np.zeros((60, 80, 3), np.uint8))
 
 

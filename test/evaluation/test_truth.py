@@ -87,7 +87,7 @@ def test_joints_are_ordered_by_name_and_angles_read(tmp_path: Path) -> None:
 def test_a_missing_part_is_named(tmp_path: Path, missing: str) -> None:
     data = truth_data()
     del data[missing]
-    with pytest.raises(CardboxError, match=rf"no ground truth.*{missing}"):
+    with pytest.raises(CardboxError, match=rf"ground.truth.*{missing}"):
         load_ground_truth(write(tmp_path, data))
 
 
@@ -95,12 +95,12 @@ def test_a_missing_part_is_named(tmp_path: Path, missing: str) -> None:
 def test_what_is_no_ground_truth_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "ground_truth.json"
     path.write_text(text)
-    with pytest.raises(CardboxError, match="is no ground truth"):
+    with pytest.raises(CardboxError, match=r"ground_truth\.json"):
         load_ground_truth(path)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="cannot read the ground truth"):
+    with pytest.raises(CardboxError, match=r"nothing\.json"):
         load_ground_truth(tmp_path / "nothing.json")
 
 

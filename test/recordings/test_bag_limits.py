@@ -96,7 +96,7 @@ def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Pa
     struct.pack_into("<Q", data, at + 9 + 16, size)
     file.write_bytes(data)
     for path in (file, file.parent):
-        with pytest.raises(BagError, match=r"would unpack to .* MB"), BagReader(path):
+        with pytest.raises(BagError, match=r"unpack.* MB"), BagReader(path):
             pytest.fail("it was opened")
 
 
@@ -119,7 +119,7 @@ def test_the_stated_size_is_the_limit_while_messages_are_read(tmp_path: Path) ->
 def test_many_chunks_that_are_large_together_are_refused(tmp_path: Path) -> None:
     chunk = struct.pack("<BQQQQIIQ", 0x06, 40, 0, 0, bag_limits.MOST_BYTES // 3, 0, 0, 0)
     (tmp_path / "bag.mcap").write_bytes(b"\x89MCAP0\r\n" + chunk * 4)
-    with pytest.raises(BagError, match="would unpack to"), BagReader(tmp_path / "bag.mcap"):
+    with pytest.raises(BagError, match="unpack"), BagReader(tmp_path / "bag.mcap"):
         pytest.fail("it was opened")
 
 
@@ -201,7 +201,7 @@ def test_broken_images_are_left_out_counted_and_named(tmp_path: Path) -> None:
 def test_a_recording_of_broken_images_says_so(tmp_path: Path) -> None:
     with (
         BagReader(record(tmp_path / "bag", broken=tuple(range(12)))) as bag,
-        pytest.raises(CardboxError, match=r"0 images lie in the background span.*12 images cannot"),
+        pytest.raises(CardboxError, match=r"0 images .*background.*12 images"),
     ):
         SilhouetteSource(bag, TimeSpan(0.0, 0.5))
 
@@ -233,7 +233,7 @@ def test_a_type_that_is_not_that_of_ros_is_refused(
     monkeypatch.setattr(BagReader, "deserialize", lambda *_: odd)
     with BagReader(record(tmp_path / "bag")) as bag:
         for use in (lambda: list(bag.images()), bag.calibration):
-            with pytest.raises(BagError, match="is damaged"):
+            with pytest.raises(BagError, match="damaged"):
                 use()
 
 
@@ -242,5 +242,5 @@ def test_bytes_that_are_no_message_are_refused(tmp_path: Path) -> None:
         writer.write_camera_info("/camera_info", START_NS, "eye", CAMERA)
         kind = "sensor_msgs/msg/CompressedImage"
         writer.write_raw("/image_raw/compressed", kind, b"\0\1\0\0" + b"\xff" * 30, START_NS)
-    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="is damaged"):
+    with BagReader(tmp_path / "bag") as bag, pytest.raises(BagError, match="damaged"):
         list(bag.images())

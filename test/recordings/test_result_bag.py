@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
@@ -38,7 +39,14 @@ def results(
     folder = tmp_path_factory.mktemp("results")
     with ResultBag(folder / "bag", source.frame_id) as bag:
         summary = track_recording(
-            *(source, recording.body, default_preset(), 0, 0.0, folder / "person.csv"),
+            *(
+                Recording([""], [source]),
+                recording.body,
+                default_preset(),
+                0,
+                0.0,
+                folder / "person.csv",
+            ),
             observers=(bag.add,),
         )
     return folder / "bag", summary

@@ -29,9 +29,7 @@ def test_spans_are_read(text: str, expected: tuple[float, float]) -> None:
     "text", ["5", "9:3", "3:3", "-1:3", ":", "1:", ":2", "", "a:b", "1:2:3", "nan:3", "0:nan"]
 )
 def test_what_is_no_span_is_refused(text: str) -> None:
-    with pytest.raises(
-        ValueError, match=r"expected T0:T1 in seconds with T0 before T1, such as 0:4"
-    ):
+    with pytest.raises(ValueError, match="T0:T1 in seconds"):
         TimeSpan.parse(text)
 
 
@@ -121,7 +119,7 @@ def test_a_background_without_images_is_refused(recording: Any, span: TimeSpan, 
         BagReader(recording.folder) as bag,
         pytest.raises(
             BagError,
-            match=rf"{count} images lie in the background span {span} s of a bag of 24.2 s;",
+            match=rf"{count} images .*background.* {span} s .*24\.2 s;",
         ),
     ):
         SilhouetteSource(bag, span)
@@ -130,6 +128,6 @@ def test_a_background_without_images_is_refused(recording: Any, span: TimeSpan, 
 def test_a_span_without_images_is_refused_by_name(source: SilhouetteSource) -> None:
     with pytest.raises(
         CardboxError,
-        match=r"no image lies in the arms span 90:91 s of a bag of 24.2 s; give",
+        match=r"arms.* 90:91 s .*24\.2 s; give",
     ):
         source.held(TimeSpan(90, 91), "arms")

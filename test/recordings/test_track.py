@@ -23,6 +23,7 @@ from cardbox_tracker.estimation.initialization.config import InitializationConfi
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
+from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import CSV_HEADER, TrackSummary, csv_row, track_recording
@@ -44,7 +45,9 @@ def track(
     recording: Any, source: SilhouetteSource, path: Path, seed: int = 0, **rest: Any
 ) -> TrackSummary:
     start_s = rest.pop("start_s", recording.start_s())
-    return track_recording(source, recording.body, CONFIG, seed, start_s, path, **rest)
+    return track_recording(
+        Recording([""], [source]), recording.body, CONFIG, seed, start_s, path, **rest
+    )
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -76,14 +79,16 @@ def test_the_tracker_gets_the_images(
     seen = []
     follow = Tracker.track
 
-    def spy(tracker: Tracker, silhouette: Any, image: Any = None, stamp_ns: Any = None) -> Any:
-        seen.append(image)
-        return follow(tracker, silhouette, image, stamp_ns)
+    def spy(tracker: Tracker, observations: Any) -> Any:
+        seen.append(observations[0].image)
+        return follow(tracker, observations)
 
     monkeypatch.setattr(Tracker, "track", spy)
     config = default_preset().with_particles(20)
     with_cue = tmp_path / "cue.csv"
-    track_recording(source, recording.body, config, 0, recording.start_s(), with_cue)
+    track_recording(
+        Recording([""], [source]), recording.body, config, 0, recording.start_s(), with_cue
+    )
     assert seen
     assert all(image.shape == (240, 320) for image in seen)
 
@@ -104,7 +109,7 @@ def test_a_reference_outside_of_the_recording_is_refused(
     recording: Any, source: SilhouetteSource
 ) -> None:
     spans = {name: TimeSpan(7.0, 8.0) for name in ("front", "side")} | {"arms": TimeSpan(70, 80)}
-    with pytest.raises(CardboxError, match="no image lies in the arms span 70:80 s of a bag of"):
+    with pytest.raises(CardboxError, match=r"arms.* 70:80 s"):
         initialize_from_recording(source, spans, InitializationConfig())
 
 
@@ -232,9 +237,7 @@ def test_one_seed_gives_the_same_bytes_and_another_others(
 def test_a_start_after_the_end_is_refused_and_leaves_nothing(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    with pytest.raises(
-        CardboxError, match="no image lies after --start 99 s; give seconds from the bag's start"
-    ):
+    with pytest.raises(CardboxError, match="--start 99 s; give seconds"):
         track(recording, source, tmp_path / "person.csv", start_s=99.0)
     assert os.listdir(tmp_path) == []
 

@@ -110,10 +110,10 @@ def test_without_a_solution_the_robot_stands_still(monkeypatch: pytest.MonkeyPat
 def test_a_robot_that_is_no_arm_is_told() -> None:
     with pytest.raises(CardboxError, match="no link 'foot'"):
         HandFollower(ROBOT, RetargetConfig(), "foot")
-    with pytest.raises(CardboxError, match="has 1 joints before it"):
+    with pytest.raises(CardboxError, match="1 joint"):
         HandFollower(ROBOT, RetargetConfig(), "shoulder_roll_link")
     part = ROBOT.urdf.replace('<link name="hand_link">', '<link name="palm">')
-    with pytest.raises(CardboxError, match="cannot use the robot's URDF"):
+    with pytest.raises(CardboxError, match="robot's URDF"):
         HandFollower(parse_robot(part), RetargetConfig())
 
 

@@ -170,9 +170,9 @@ def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
 
 
 def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match="no movable joint 'wheel'; it has shoulder_roll"):
+    with pytest.raises(CardboxError, match=r"joint 'wheel'; .*shoulder_roll"):
         ROBOT.limits_of(("wheel",))
-    with pytest.raises(CardboxError, match="no link 'foot'; it has base_link"):
+    with pytest.raises(CardboxError, match=r"link 'foot'; .*base_link"):
         ROBOT.chain("foot")
     with pytest.raises(CardboxError, match="No such file"):
         load_robot(tmp_path / "missing.urdf")

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from cardbox_tracker.evaluation.paper.report import recorded_results
-from cardbox_tracker.evaluation.paper.results import motions_in, read_json
+from cardbox_tracker.evaluation.results import read_json
+from experiments.results import motions_in, recorded_results
 from tools.readme_figures import (
     BEGIN,
     END,
@@ -18,7 +18,6 @@ from tools.readme_figures import (
     current,
     main,
     readme_section,
-    replaced,
     sessions_section,
 )
 
@@ -96,23 +95,25 @@ def test_section_by_hand() -> None:
     assert max(len(line) for line in text.splitlines()) <= 100
 
 
-def test_marks_are_needed_once() -> None:
-    assert replaced(f"a {BEGIN}old{END} b", "new") == f"a {BEGIN}\nnew\n{END} b"
-    for text in ("", BEGIN, f"{BEGIN}{END}{BEGIN}{END}"):
-        with pytest.raises(ValueError, match="needs the marks"):
-            replaced(text, "new")
-
-
 def test_sessions_by_hand() -> None:
     def session(name: str, aligned: float, peer: float) -> dict[str, Any]:
-        run = {"absolute": 9.0, "aligned": aligned, "without_estimate": 5, "frames": 50, "ms": 2.5}
+        run = {"absolute": 9.0, "aligned": aligned, "ms": 2.5}
         return {"name": name, "mediapipe": {"aligned": peer}, "runs": [run, run]}
 
     results = {"seeds": [0, 1], "sessions": [session("a", 4.0, 8.0), session("b", 9.0, 6.0)]}
-    text = sessions_section(results)
-    assert "| a | 4.0 cm | 8.0 cm | 9.0 cm | 10 % |" in text
-    assert "| **mean** | 6.5 cm | 7.0 cm | 9.0 cm | |" in text
+    other = {"people": "real", "cameras": "two", "source": "elsewhere", "mediapipe": None}
+    text = sessions_section(
+        results,
+        [
+            other | {"aligned": [4.06, 6.7], "absolute": 7.3, "hands": 22.6},
+            other | {"aligned": 7.0, "absolute": 10.6, "without_correction": [6.7, 8.8]},
+        ],
+    )
+    first, *rest = [line for line in text.splitlines() if " cm " in line]
+    assert "(2 recordings) | one | 6.5 cm | 7.0 cm | 9.0 cm |" in first
+    assert rest[0] == "| real | two | 4.1 to 6.7 cm (hands 23) |  | 7.3 cm | elsewhere |"
+    assert "| 7.0 cm (6.7 without the correction) |  | 10.6 cm (8.8) |" in rest[1]
     words = " ".join(text.split())
-    assert "Better than MediaPipe on 1 of 2, at worst 1.5 times its error." in words
+    assert "on 1 of the 2 rendered recordings" in words
     assert "An image takes 2.5 ms" in words
-    assert "on 2 recordings, 2 seeds" in words
+    assert "2 seeds" in words

@@ -9,7 +9,7 @@ import pytest
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.vision.camera import Camera
-from tools.real_report import BEGIN, END, Run, cells, projected, read_frames, replaced
+from tools.real_report import Run, cells, projected, read_frames
 from tools.real_sheet import blurred
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -49,13 +49,6 @@ def test_nobody_can_be_recognized() -> None:
     assert np.abs(np.diff(seen[:, 210:].astype(int), axis=1)).max() < 30
     landmarks[0] = np.nan
     assert np.abs(np.diff(blurred(image, mask, landmarks).astype(int), axis=1)).max() < 30
-
-
-def test_figures_are_replaced_between_their_marks() -> None:
-    document = f"before\n{BEGIN}\nold\n{END}\nafter\n"
-    assert replaced(document, "new") == f"before\n{BEGIN}\nnew\n{END}\nafter\n"
-    with pytest.raises(CardboxError, match="no marks"):
-        replaced("nothing", "new")
 
 
 def test_a_folder_that_is_no_session_is_refused(tmp_path: Path) -> None:

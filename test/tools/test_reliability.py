@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
-from cardbox_tracker.errors import CardboxError
-from tools.reliability import BEGIN, END, PAGE, Row, rows_of, with_table
+from tools.reliability import BEGIN, END, PAGE, Row, rows_of, table_of
 
 ROOT = Path(__file__).resolve().parents[2]
 REPORT = """<testsuites><testsuite>
@@ -31,14 +28,9 @@ def test_a_row_is_a_function_and_its_promise(tmp_path: Path) -> None:
         Row("It holds", "test/a/test_b.py::test_c", 1234),
         Row("It fails", "test/a/test_b.py::test_d", 7, 1),
     ]
-    page = with_table(f"# A\n\n{BEGIN}\nstale\n{END}\n\nmore\n", rows)
+    page = table_of(rows)
     assert "| It holds | `test/a/test_b.py::test_c` | 1,234 | all |" in page
     assert "| It fails | `test/a/test_b.py::test_d` | 7 | **no: 1 failed** |" in page
-    assert "stale" not in page
-    assert page.startswith("# A\n") and page.endswith(f"{END}\n\nmore\n")
-    assert with_table(page, rows) == page
-    with pytest.raises(CardboxError, match="has no"):
-        with_table("# A\n", rows)
 
 
 def test_every_test_in_the_table_is_there() -> None:

@@ -74,17 +74,17 @@ def test_a_deviation_needs_two_images(count: int) -> None:
     learner = BackgroundLearner()
     for _ in range(count):
         learner.add(np.zeros((2, 2), np.uint8))
-    with pytest.raises(ValueError, match=f"^{count} images learned"):
+    with pytest.raises(ValueError, match=f"^{count} images"):
         learner.model()
 
 
 def test_an_image_of_another_size_is_refused() -> None:
     learner = BackgroundLearner()
     learner.add(np.zeros((4, 6), np.uint8))
-    with pytest.raises(ValueError, match=r"\(6, 4\), those before it \(4, 6\)"):
+    with pytest.raises(ValueError, match=r"\(6, 4\).*\(4, 6\)"):
         learner.add(np.zeros((6, 4), np.uint8))
     for config in (PLAIN, BackgroundConfig()):
-        with pytest.raises(ValueError, match=rf"\(6, 4\), the background \({H}, {W}\)"):
+        with pytest.raises(ValueError, match=rf"\(6, 4\).*\({H}, {W}\)"):
             SilhouetteExtractor(flat(100, 2), config)(np.zeros((6, 4), np.uint8))
 
 

@@ -66,7 +66,7 @@ def test_what_is_written_is_read(tmp_path: Path, color: bool) -> None:
 
 def test_another_camera_is_refused_with_both(path: Path) -> None:
     other = Calibration(320, 240, K + np.diag((1.0, 1.0, 0.0)), np.zeros(5))
-    with pytest.raises(BackgroundFileError, match=r"f 330 px, plumb_bob.*f 331 px, no distortion"):
+    with pytest.raises(BackgroundFileError, match=r"330 px, plumb_bob.*331 px, no distortion"):
         load_background(path, SIZE).check_camera(other, "b.npz")
 
 
@@ -79,17 +79,17 @@ def test_another_working_size_is_refused(path: Path) -> None:
 @pytest.mark.parametrize(
     ("entries", "words"),
     [
-        ({"format": np.array("something_else")}, "its format is 'something_else'"),
-        ({"format": None}, "no entry 'format'"),
-        ({"mean": None}, "no entry 'mean'"),
-        ({"mean": planes(12, 16) + np.nan}, "values outside 0 to 255"),
-        ({"stddev": planes(12, 16) - 300}, "values outside 0 to 255"),
-        ({"stddev": planes(6, 16)}, "'stddev' has the shape"),
-        ({"mean": np.zeros((12, 16))}, "of float64"),
-        ({"chroma_mean": planes(3, 5, 8)}, "'chroma_mean' has the shape"),
-        ({"mean": planes(1200, 1600)}, "too much for a background"),
-        ({"distortion": np.zeros(1000)}, "too much for a background"),
-        ({"distortion_model": np.array("x" * 1000)}, "too much for a background"),
+        ({"format": np.array("something_else")}, "format .*'something_else'"),
+        ({"format": None}, "'format'"),
+        ({"mean": None}, "'mean'"),
+        ({"mean": planes(12, 16) + np.nan}, "0 to 255"),
+        ({"stddev": planes(12, 16) - 300}, "0 to 255"),
+        ({"stddev": planes(6, 16)}, "'stddev' .*shape"),
+        ({"mean": np.zeros((12, 16))}, "float64"),
+        ({"chroma_mean": planes(3, 5, 8)}, "'chroma_mean' .*shape"),
+        ({"mean": planes(1200, 1600)}, "too much"),
+        ({"distortion": np.zeros(1000)}, "too much"),
+        ({"distortion_model": np.array("x" * 1000)}, "too much"),
         ({"k": np.zeros(4)}, "reshape"),
         ({"size": np.array([320])}, "unpack"),
     ],
@@ -105,7 +105,7 @@ def test_pickled_objects_are_never_loaded(path: Path) -> None:
     with np.load(path) as archive:
         arrays = dict(archive)
     np.savez(path, **(arrays | {"size": np.array([{}, {}], dtype=object)}))
-    with pytest.raises(BackgroundFileError, match="no background that can be used"):
+    with pytest.raises(BackgroundFileError, match=r"background\.npz"):
         load_background(path, SIZE)
 
 
@@ -118,7 +118,7 @@ def test_a_huge_header_is_refused_before_anything_is_allocated(path: Path) -> No
     entry = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
     with zipfile.ZipFile(path, "a") as archive_file:
         archive_file.writestr("mean.npy", entry)
-    with pytest.raises(BackgroundFileError, match="too much for a background"):
+    with pytest.raises(BackgroundFileError, match="too much"):
         load_background(path, SIZE)
 
 
@@ -142,7 +142,7 @@ def test_a_damaged_file_is_refused_wherever_it_is_damaged(path: Path) -> None:
 
 def test_a_text_is_refused(path: Path) -> None:
     path.write_text("sizes:\n  torso_height: 0.5\n")
-    with pytest.raises(BackgroundFileError, match="expected a file that the background node wrote"):
+    with pytest.raises(BackgroundFileError, match=r"expected .*background node"):
         load_background(path, SIZE)
 
 
@@ -158,17 +158,17 @@ def test_home_is_expanded_and_no_name_is_no_file(
 def test_what_cannot_be_a_file_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for name, words in (
-        (str(tmp_path), "is a folder"),
-        (str(tmp_path / "pipe"), "no ordinary file"),
-        (str(tmp_path / "none" / "b.npz"), "cannot be written: No such file"),
-        ("/proc/b.npz", "cannot be written"),
-        ("/dev/null", "no ordinary file"),
-        ("~nobody_of_that_name/b.npz", "cannot be written"),
+        (str(tmp_path), "folder"),
+        (str(tmp_path / "pipe"), "ordinary file"),
+        (str(tmp_path / "none" / "b.npz"), "No such file"),
+        ("/proc/b.npz", "/proc/b.npz"),
+        ("/dev/null", "ordinary file"),
+        ("~nobody_of_that_name/b.npz", "nobody_of_that_name"),
     ):
         with pytest.raises(BackgroundFileError, match=words):
             background_path(name)
 
 
 def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
-    with pytest.raises(BackgroundFileError, match="choose a folder that exists"):
+    with pytest.raises(BackgroundFileError, match="choose a folder"):
         save_background(stored(), tmp_path / "none" / "b.npz")

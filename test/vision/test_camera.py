@@ -100,7 +100,7 @@ def test_an_uncalibrated_camera_is_refused() -> None:
         lambda c: c.camera(320, 240),
         lambda c: c.rectifier(320, 240),
     ):
-        with pytest.raises(CameraError, match=r"not calibrated .*all zero"):
+        with pytest.raises(CameraError, match="not calibrated"):
             call(calibration(k=np.zeros((3, 3))))
     assert not calibration(k=np.full((3, 3), np.nan)).is_calibrated
     assert calibration().is_calibrated
@@ -111,16 +111,16 @@ def test_an_uncalibrated_camera_is_refused() -> None:
 def test_every_entry_of_k_has_to_be_finite(entry: int, value: float) -> None:
     k = K.copy()
     k.flat[entry] = value
-    with pytest.raises(CameraError, match=f"K has values that are not finite numbers.*{value:g}"):
+    with pytest.raises(CameraError, match=f"K .*not finite .*{value:g}"):
         calibration(k=k).camera(320, 240)
 
 
 @pytest.mark.parametrize(
     ("entry", "value", "words"),
     [
-        (0, -600.0, "fx = -600 px; expected 12.8 to 640000 px"),
-        (4, 0.0, "fy = 0 px; expected 9.6 to"),
-        (4, 1e300, "fy = 1e"),
+        (0, -600.0, "fx .*-600 px; .*12.8 to 640000 px"),
+        (4, 0.0, "fy .*0 px; .*9.6 to"),
+        (4, 1e300, "fy .*1e"),
         (2, 1e200, "principal point"),
         (5, -1e9, "principal point"),
     ],
@@ -134,7 +134,7 @@ def test_a_matrix_that_no_camera_has_is_refused(entry: int, value: float, words:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_coefficients_that_are_not_finite_are_refused(value: float) -> None:
-    with pytest.raises(CameraError, match="D have values that are not finite numbers"):
+    with pytest.raises(CameraError, match=r"D .*not finite"):
         calibration(distortion=np.array([0.0, 0.0, value, 0.0, 0.0])).camera(320, 240)
 
 
@@ -145,7 +145,7 @@ def test_a_calibration_without_a_size_is_refused(width: int, height: int) -> Non
 
 
 def test_an_unknown_distortion_model_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(CameraError, match="'fov' is unknown; supported are plumb_bob, "):
+    with pytest.raises(CameraError, match=r"'fov' .*plumb_bob"):
         calibration(distortion_model="fov", distortion=BENT).camera(320, 240)
     # Without distortion its name does not matter: drivers leave it empty.
     straight = calibration(distortion_model="", distortion=np.zeros(0))
@@ -164,9 +164,7 @@ def test_an_unknown_distortion_model_is_refused_with_those_that_are_known() -> N
 )
 def test_a_wrong_count_of_coefficients_is_refused(model: str, count: int, expected: str) -> None:
     wrong = calibration(distortion_model=model, distortion=np.full(count, 0.01))
-    with pytest.raises(
-        CameraError, match=f"'{model}' has {count} coefficients; expected {expected}"
-    ):
+    with pytest.raises(CameraError, match=f"'{model}' .*{count} .*; expected {expected}"):
         wrong.rectifier(320, 240)
 
 
@@ -257,21 +255,21 @@ def test_a_calibration_file_is_read(tmp_path: Path) -> None:
 )
 def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
     path = written(tmp_path, {k: v for k, v in FILE.items() if k != key})
-    with pytest.raises(CameraError, match=f"{path}: missing key '{key}'"):
+    with pytest.raises(CameraError, match=f"{path}: .*'{key}'"):
         load_calibration(path)
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"camera_matrix": {"rows": 3}}, "missing key 'data'"),
-        ({"camera_matrix": {"data": [1.0, 2.0]}}, "malformed value"),
-        ({"camera_matrix": {"data": ["a"] * 9}}, "malformed value"),
-        ({"camera_matrix": 5}, "malformed value"),
-        ({"image_width": "wide"}, "malformed value"),
+        ({"camera_matrix": {"rows": 3}}, "'data'"),
+        ({"camera_matrix": {"data": [1.0, 2.0]}}, "malformed"),
+        ({"camera_matrix": {"data": ["a"] * 9}}, "malformed"),
+        ({"camera_matrix": 5}, "malformed"),
+        ({"image_width": "wide"}, "malformed"),
         ({"image_width": 0}, "0x480"),
         ({"camera_matrix": {"data": [0.0] * 9}}, "not calibrated"),
-        ({"distortion_model": "fov"}, "'fov' is unknown"),
+        ({"distortion_model": "fov"}, "'fov'"),
         ({"distortion_coefficients": {"data": [0.1] * 3}}, "3 coefficients"),
     ],
 )
@@ -287,11 +285,11 @@ def test_a_file_that_is_none_of_that_kind(tmp_path: Path) -> None:
     with pytest.raises(CameraError, match=r"none\.yaml: No such file"):
         load_calibration(tmp_path / "none.yaml")
     path = written(tmp_path, [1, 2])
-    with pytest.raises(CameraError, match="expected a mapping"):
+    with pytest.raises(CameraError, match="mapping"):
         load_calibration(path)
     path.write_text("a: [1")
-    with pytest.raises(CameraError, match="not valid YAML"):
+    with pytest.raises(CameraError, match="YAML"):
         load_calibration(path)
     path.write_bytes(b"\xff\xfe\x80")
-    with pytest.raises(CameraError, match="not a text file"):
+    with pytest.raises(CameraError, match="text file"):
         load_calibration(path)

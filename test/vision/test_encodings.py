@@ -231,5 +231,5 @@ def test_zeros_behind_a_jpeg_do_no_harm() -> None:
 
 @pytest.mark.parametrize(("height", "width"), [(0, 0), (0, 4), (4, 0)])
 def test_an_image_without_pixels_is_told_as_such(height: int, width: int) -> None:
-    with pytest.raises(EncodingError, match=f"size {width}x{height}; expected one pixel or more"):
+    with pytest.raises(EncodingError, match=f"{width}x{height}; .*one pixel"):
         decode_grey(b"", height, width, 0, "mono8")

@@ -54,7 +54,7 @@ def test_a_chain_of_kalibr_is_taken_from_any_first_camera(
     assert_same(first["cam1"], steps[0])
     assert_same(first["cam2"], steps[1].after(steps[0]))
     assert_same(load_extrinsics(file, ["cam2", "cam0"])["cam0"], first["cam2"].inverse())
-    with pytest.raises(CameraError, match=r"no camera right; they have cam0, cam1, cam2, left"):
+    with pytest.raises(CameraError, match=r"right; .*cam0, cam1, cam2, left"):
         load_extrinsics(file, ["left", "right"])
 
 
@@ -76,12 +76,12 @@ def test_a_group_of_aniposelib_may_be_in_millimetres(
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("x.yaml", "cam0: {}\ncam1: {}\n", "cam1 lacks T_cn_cnm1"),
-        ("x.yaml", "cam0: {}\ncam1: {T_cn_cnm1: [[1, 2], [3, 4]]}\n", "rigid transform of 4 x 4"),
-        ("x.yaml", f"cam0: {{}}\ncam1: {{T_cn_cnm1: {np.ones((4, 4)).tolist()}}}\n", "no rotation"),
-        ("x.yaml", "cam0: [", "cannot be parsed"),
-        ("x.yaml", "- 1", "they have none"),
-        ("x.toml", "cam = 1", "they have none"),
+        ("x.yaml", "cam0: {}\ncam1: {}\n", "cam1 .*T_cn_cnm1"),
+        ("x.yaml", "cam0: {}\ncam1: {T_cn_cnm1: [[1, 2], [3, 4]]}\n", "4 x 4"),
+        ("x.yaml", f"cam0: {{}}\ncam1: {{T_cn_cnm1: {np.ones((4, 4)).tolist()}}}\n", "rotation"),
+        ("x.yaml", "cam0: [", "pars"),
+        ("x.yaml", "- 1", "none"),
+        ("x.toml", "cam = 1", "none"),
         ("x.toml", '[a]\nname = "cam0"\nrotation = [1]\ntranslation = [0, 0, 0]', "three numbers"),
         ("missing.yaml", None, "No such file"),
     ],
@@ -106,7 +106,7 @@ def test_a_rectified_pair_has_its_baseline_in_p(rng: np.random.Generator) -> Non
     np.testing.assert_allclose(found.centre_m, [0.12, 0.0, 0.0], atol=1e-12)
     np.testing.assert_array_equal(found.rotation, np.eye(3))
     assert of_rectified_pair(info(), info(), "right") is None
-    with pytest.raises(CameraError, match=r"P and R of right's CameraInfo: .* no rotation"):
+    with pytest.raises(CameraError, match=r"right's CameraInfo: .*rotation"):
         of_rectified_pair(info(), info(0.12, np.full((3, 3), 7.0)), "right")
     # Images that are not rectified stand as R says.
     left, right = (random_pose(rng).rotation for _ in range(2))
@@ -146,7 +146,7 @@ def test_sources_have_an_order_and_have_to_agree() -> None:
     near = Extrinsics.of_vectors([0.0, 0.01, 0.0], [-0.13, 0.0, 0.0], "file")
     assert choose([None, one, near], "left", "right") is one
     far = Extrinsics.of_vectors([0.0, np.radians(2.0), 0.0], [-0.12, 0.0, 0.0], "file")
-    with pytest.raises(CameraError, match=r"differ by 2\.0 degrees"):
+    with pytest.raises(CameraError, match=r"2\.0 degrees"):
         choose([one, None, far], "left", "right")
     with pytest.raises(CameraError, match="--extrinsics FILE"):
         choose([None, None, None], "left", "right")

@@ -51,7 +51,7 @@ def test_an_image_too_large_is_refused_before_memory_is_taken(
 ) -> None:
     data = make(width, height)
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
-    with pytest.raises(EncodingError, match=f"{width}x{height} is larger than the 33.6 million"):
+    with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
         decode_compressed(data)
     monkeypatch.undo()
     assert decode_compressed(make(64, 48) if make is png_of else data_of(".jpg")).shape == (48, 64)
@@ -70,13 +70,13 @@ def test_no_decoder_but_those_of_jpeg_and_png_is_reached(
 ) -> None:
     data = data_of(extension)
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
-    with pytest.raises(EncodingError, match="expected whole JPEG or PNG data"):
+    with pytest.raises(EncodingError, match=r"expected .*JPEG or PNG"):
         decode_compressed(data)
 
 
 @pytest.mark.parametrize("decode", [decode_grey, decode_bgr, decode_as_sent])
 def test_a_raw_image_too_large_is_refused_whatever_its_bytes(decode: Callable) -> None:
-    with pytest.raises(EncodingError, match="60000x60000 is larger than"):
+    with pytest.raises(EncodingError, match="60000x60000"):
         decode(b"", 60000, 60000, 60000, "mono8")
 
 

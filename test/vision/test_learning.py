@@ -57,7 +57,7 @@ def test_somebody_who_walks_through_is_not_learned_in(room: Any) -> None:
     images = [room.image() for _ in range(IMAGES // 2)]
     images += [room.image(at) for at in np.linspace(0, 159, 15)]
     learning = learned(StillLearning, images)
-    assert "something moves in it" in learning.waits_for("/image_raw")
+    assert "moves" in learning.waits_for("/image_raw")
     assert float(learning.values()["moved while learning (% of the image)"]) > 0.6
     for _ in range(4 * IMAGES):
         learning.add(room.image())
@@ -83,13 +83,13 @@ def test_a_person_in_view_is_left_out_and_completed(room: Any, color: bool) -> N
         return cv2.cvtColor(made, cv2.COLOR_GRAY2BGR) if color else made
 
     learning = PersonInViewLearning(IMAGES)
-    assert "stand where you are" in learning.waits_for("/image_raw")
+    assert "stand" in learning.waits_for("/image_raw")
     for k in range(2 * IMAGES):
         learning.add(image(40 + 0.4 * (k // 3 % 3)))
     assert not learning.has_enough()
-    assert "step aside by twice your width" in learning.waits_for("/image_raw")
+    assert "step aside" in learning.waits_for("/image_raw")
     assert 10 < float(learning.values()["hidden by the person (% of the image)"]) < 40
-    with pytest.raises(ValueError, match="of the scene was not seen yet"):
+    with pytest.raises(ValueError, match="not seen"):
         learning.model()
     for k in range(8 * IMAGES):
         learning.add(image(min(40 + 4 * k, 125) + 0.4 * (k // 3 % 3)))

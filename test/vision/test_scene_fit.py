@@ -23,7 +23,7 @@ def model_of(room: Any) -> BackgroundModel:
 def test_the_scene_is_recognised(room: Any, gain: float, at: float | None) -> None:
     fit = compare_scene(model_of(room), room.image(at, gain=gain))
     assert fit.is_same and not fit.is_moved
-    assert "places of the scene are found" in str(fit)
+    assert "places" in str(fit)
 
 
 @pytest.mark.parametrize("shift", [(3, 0), (0, -3), (4, 2)])
@@ -34,7 +34,7 @@ def test_a_moved_camera_is_found_with_its_shift(
     fit = compare_scene(model_of(room), room.image(at, shift=shift))
     assert fit.is_moved and not fit.is_same
     assert fit.shift_px == pytest.approx(shift, abs=1)
-    assert "the camera was moved" in str(fit)
+    assert "moved" in str(fit)
 
 
 def test_another_room_is_refused(room: Any) -> None:
@@ -51,4 +51,4 @@ def test_without_texture_the_brightness_decides() -> None:
     assert fit.tiles == 0 and fit.is_same
     image[:, :70] = 220
     fit = compare_scene(model, image)
-    assert not fit.is_same and "44 % of the image looks different" in str(fit)
+    assert not fit.is_same and "44 %" in str(fit)

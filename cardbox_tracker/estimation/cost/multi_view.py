@@ -1,4 +1,4 @@
-"""Rate whole bodies by what several cameras see: the cost is the sum over the cameras.
+"""Rate whole bodies by what one camera or several see: the cost is the sum over the cameras.
 
 Each camera's silhouette counts by its own area, so a camera that is nearer has no more to say:
 
@@ -18,6 +18,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Silhouette, TermObservation
+from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
@@ -27,7 +28,7 @@ ToView = Callable[[FloatArray], FloatArray]
 
 
 class MultiViewCost:
-    """Ratings of states (N, 14) before several cameras; the first one's states are meant.
+    """Ratings of states (N, 14), which are those of the first camera, before all cameras.
 
     It is asked like a :class:`~cardbox_tracker.estimation.cost.whole_body.WholeBodyCost`.
 
@@ -41,14 +42,14 @@ class MultiViewCost:
         self,
         body: BodyModel,
         camera: Camera,
-        others: Sequence[tuple[BodyModel, Camera, ToView]],
+        views: Sequence[View],
         config: WholeBodyCostConfig,
     ) -> None:
-        """Prepare for one body before ``camera``, and as each of ``others`` has it."""
+        """Prepare for one body before ``camera``, and for each of the further ``views`` of it."""
         without_priors = replace(config, weight=0.0)
         self.costs = [WholeBodyCost(body, camera, config)]
-        self.costs += [WholeBodyCost(there, seen, without_priors) for there, seen, _ in others]
-        self.to_views: list[ToView] = [lambda states: states, *(to_view for *_, to_view in others)]
+        self.costs += [WholeBodyCost(view.body, view.camera, without_priors) for view in views]
+        self.to_views: list[ToView] = [lambda states: states, *(view.states for view in views)]
         self.seeing: tuple[int, ...] = (0,)
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle

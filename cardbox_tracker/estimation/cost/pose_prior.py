@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from importlib import resources
-from math import cos, exp, log, sin
+from math import exp, log
 from typing import Any
 
 import numpy as np
@@ -89,43 +89,3 @@ def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
         if log_density > -20.0:
             density += exp(log_density)
     return -log(density)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def add_arm_prior(arms: Any, gmm: Any, floor_nats: float, weight: float, costs: Any) -> None:
-    """Add ``weight`` times -log p, nats, of arms (N, 4), rad, to ``costs`` (N,), in place."""
-    x, away = np.empty(_D), np.empty(_D)
-    rest = exp(-floor_nats)
-    for i in range(arms.shape[0]):
-        ca, sa = cos(arms[i, 0]), sin(arms[i, 0])
-        cf, sf = cos(arms[i, 1]), sin(arms[i, 1])
-        x[0], x[1], x[2] = sf, sa * cf, -ca * cf
-        # The forearm's direction in the frame of the upper arm, turned by Rx(a) Ry(-f).
-        ce, se = cos(arms[i, 3]), sin(arms[i, 3])
-        u, v, w = se, sin(arms[i, 2]) * ce, -cos(arms[i, 2]) * ce
-        x[3] = cf * u - sf * w
-        z = sf * u + cf * w
-        x[4] = ca * v - sa * z
-        x[5] = sa * v + ca * z
-        costs[i] += weight * nats_of(x, gmm, rest, away)
-
-
-class ArmPrior:
-    """-log p of arms in nats, see the module."""
-
-    def __init__(self, floor_nats: float = FLOOR_NATS) -> None:
-        """Read the mixture, and compile the kernel if it is not yet."""
-        self._gmm = np.array(load_gmm())
-        self._floor_nats = floor_nats
-        self(np.zeros((1, 4)))
-
-    def __call__(self, arms: FloatArray) -> FloatArray:
-        """Return -log p (N,), nats, of arms (N, 4): shoulder and elbow as in d5..d8, rad."""
-        costs = np.zeros(len(arms))
-        self.add(costs, arms, 1.0)
-        return costs
-
-    def add(self, costs: FloatArray, arms: FloatArray, weight: float) -> None:
-        """Add ``weight`` times -log p of arms (N, 4) to ``costs`` (N,), float64, in place."""
-        contiguous = np.ascontiguousarray(arms, np.float64)
-        add_arm_prior(contiguous, self._gmm, self._floor_nats, weight, costs)

@@ -52,7 +52,7 @@ ArmCosts = Callable[[str, FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame as all terms get it.
+    """What one camera shows of the person at one time, prepared for filter and terms.
 
     Attributes:
         silhouette: (H, W), 0 or 255, of the camera's size; not to be written to.
@@ -61,7 +61,6 @@ class Frame:
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
         posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
             metres; None where tracking starts.
-        others: what further cameras see at that time, each a frame of its own.
         depth_m: (H, W), metres along the optical axis, not finite or 0 where it is not known; None
             without a depth image.
         interval_s: since the frame before, s.
@@ -72,7 +71,6 @@ class Frame:
     foreground_px: int
     image: Image | None = None
     posture: FloatArray | None = None
-    others: tuple[Frame, ...] = ()
     depth_m: DepthImage | None = None
     interval_s: float = USUAL_INTERVAL_S
 

@@ -161,14 +161,14 @@ class View:
         )
         return axes
 
-    def line_of_sight(self, sight: float) -> tuple[FloatArray, FloatArray]:
-        """Return the camera's place and the level direction (x, y) of ``sight``, each (2,).
+    def line_of_sight(self, bearing: float) -> tuple[FloatArray, FloatArray]:
+        """Return the camera's place and the level direction (x, y) of a line of sight, each (2,).
 
-        Metres in the first camera's level frame; ``sight`` is aside over ahead.
+        Metres in the first camera's level frame; ``bearing`` is aside over ahead.
         """
         level = _about_vertical(self.yaw_rad)
         place = -level.T @ self.offset_m
-        direction = level.T @ np.array([-1.0, sight, 0.0])
+        direction = level.T @ np.array([-1.0, bearing, 0.0])
         return place[:2], direction[:2] / np.linalg.norm(direction[:2])
 
 

@@ -121,8 +121,8 @@ class WholeBodyCost:
         self._seen[:] = 0
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
 
-    def sight(self) -> float:
-        """Direction of the silhouette's median column, aside over ahead."""
+    def bearing(self) -> float:
+        """Bearing of the silhouette's median column, aside over ahead."""
         column = kernels.median_column(self._seen)
         return (float(column) - self._camera.cx) / self._camera.fx
 
@@ -219,8 +219,8 @@ class WholeBodyCost:
             ratings += self._scale * term.postures(states)
         return ratings, costs_px, areas_px
 
-    def share_sight(self, other: WholeBodyCost) -> None:
-        """See what ``other``, of another body before the same camera, has seen."""
+    def share_silhouette(self, other: WholeBodyCost) -> None:
+        """Take over the silhouette of ``other``, of another body before the same camera."""
         self._seen, self.anchor = other._seen, other.anchor
         self.silhouette_px, self._scale = other.silhouette_px, other._scale
 

@@ -1,7 +1,7 @@
 """Settings of the whole-body rating: what is drawn, and which postures are usual.
 
 Unless a text names another source, values come from trials on recorded sessions with motion capture
-or scripted truth, see "What was tried" in ``docs/architecture.md``.
+or scripted truth (``docs/research``).
 """
 
 from __future__ import annotations

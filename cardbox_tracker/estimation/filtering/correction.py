@@ -1,14 +1,15 @@
-"""A learned correction of the result: where people's arms are when a search ends like this.
+"""A corrector that has learned where joints are, given a result and how it was found.
 
-An outline is nearly the same for many depths, and the filter's result is one of them. How wrong it
-is on average depends on the posture that was found, on what else would fit, on where the cameras
-stand, and on what was found before. A small recurrent network has learned that dependence from
-rendered recordings with ground truth (``tools/make_correction.py``; the data file names them). What
-several cameras leave open is something else, so another one has learned from such recordings. Its
-memory also tells motion from noise, so that the result is steadier, without a filter that lags. It
-sees one arm as if it were the left one, so both arms share it, and gives for each where the middle
-of the shoulders is beside the place found, and where elbow and hand are beside that, in metres
-along the axes of the optical frame.
+An outline is nearly the same for many depths, and the filter's result is one of them. Its error
+depends on average on the posture found, on other postures that fit, on where the cameras stand, and
+on the frames before. A recurrent network has learned that dependence from rendered recordings with
+ground truth (``tools/make_correction.py``; the data file names them); another one has learned from
+recordings of several cameras. Its hidden state also tells motion from noise, so that the result is
+steadier without the delay of a filter.
+
+The network sees one arm as if it were the left one, so both arms share it. For each arm it answers
+where the middle of the shoulders is beside the place found, and where elbow and hand are beside
+that, in metres along the axes of the optical frame.
 """
 
 from __future__ import annotations
@@ -20,30 +21,30 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
-from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
-from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.corrector import Result
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
-from cardbox_tracker.estimation.filtering.low_pass import LowPass
+from cardbox_tracker.estimation.filtering.deviations import DATA as DATA_OF_DEVIATIONS
+from cardbox_tracker.estimation.filtering.deviations import deviations_of
 from cardbox_tracker.estimation.filtering.networks import (
     RecurrentNetwork,
+    load_network,
     load_recurrent_network,
 )
-from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
-from cardbox_tracker.estimation.filtering.search_features import Search, features_of_search
+from cardbox_tracker.estimation.filtering.result_features import FEATURES, features_of
+from cardbox_tracker.estimation.filtering.search_features import SEARCH_FEATURES, features_of_search
 from cardbox_tracker.vision.camera import Camera
 
 DATA, DATA_OF_SEVERAL = "correction.npz", "correction_views.npz"
 """Names of the data files of the networks: for one camera, with or without depth, and several."""
-# Place and arms move; the torso keeps its angles.
-_STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
-_STEPS = 1
-# Roll, pitch and yaw of the torso in a state.
-_TURNS = slice(1, 4)
+# The angles among the values of a state.
+_ANGLES = slice(1, 12)
 _LEAST_BONE_M = 1e-6
 _NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
+N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES
+"""Inputs of the network: the result's, the search's, then those of the depth image."""
+N_ANSWERS = 9
+"""Outputs of the network: x, y, z of the middle of the shoulders, elbow and hand."""
 
 
 def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
@@ -88,79 +89,60 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
                 result[end, axis] = result[begin, axis] + scale * ahead[axis]
 
 
-def network_for(cameras: int) -> RecurrentNetwork:
-    """Return the network that corrects what so many cameras have found."""
-    return load_recurrent_network(DATA if cameras == 1 else DATA_OF_SEVERAL)
-
-
-class Correction:
-    """Corrects the results of the whole-body filter for one body.
+class NetworkCorrector:
+    """A :class:`~.corrector.Corrector` that asks a recurrent network.
 
     Attributes:
-        features: what the network saw last, (2, F).
-        found_m: keypoints before the last correction, (6, 3), metres in the optical frame.
+        features: input of the network in the last frame, (2, F).
+        result_features: input of the network of the deviations in the last frame, (2, F).
     """
 
-    def __init__(
-        self, cost: WholeBodyCost, camera: Camera, smoothing_s: float = 0.0, cameras: int = 1
-    ) -> None:
-        """Prepare for the body of ``cost`` before ``camera``, the first one.
+    def __init__(self, cost: WholeBodyCost, camera: Camera, network: RecurrentNetwork) -> None:
+        """Prepare for the body of ``cost`` before ``camera``, the first one."""
+        self._cost, self._camera, self._network = cost, camera, network
+        # Who comes back is the same person, so nothing resets it.
+        self._hidden = network.initial_hidden(2)
+        self._deviations = load_network(DATA_OF_DEVIATIONS)
+        self.features = self.result_features = np.empty((2, 0))
 
-        Args:
-            cost: of the first camera.
-            camera: the first one.
-            smoothing_s: time constant by which joints and the torso's angles are steadied.
-            cameras: how many there are.
-        """
-        self._cost, self._camera = cost, camera
-        self._keypoints, self._turns = LowPass(smoothing_s), LowPass(smoothing_s)
-        self._network = network_for(cameras)
-        # Who comes back is the same person, so nothing makes it forget.
-        self._memory = self._network.new_memory(2)
-        self.features, self.found_m = np.empty((2, 0)), np.empty((6, 3))
-
-    def forget(self) -> None:
-        """Begin anew with what is steadied: the next state may be of another place."""
-        self._keypoints.forget()
-        self._turns.forget()
-
-    def __call__(
-        self,
-        frame: Frame,
-        state: FloatArray,
-        stddev: FloatArray,
-        iou: float,
-        search: Search,
-        viewpoints: Viewpoints,
-    ) -> FloatArray:
-        """Return the state (14,) with its keypoints moved.
-
-        Args:
-            frame: what is seen; of its depth image nothing unless ``viewpoints`` say so.
-            state: result of the filter, (14,).
-            stddev: its deviations, (14,).
-            iou: of model and silhouette.
-            search: that has found it.
-            viewpoints: how the person was seen.
-        """
-        cost = self._cost
-        self.found_m = cost.keypoints(state)
-        result = state[None], stddev[None], self.found_m[None], np.array([iou])
+    def __call__(self, found: Result) -> FloatArray:
+        """See :class:`~.corrector.Corrector`."""
         self.features = np.concatenate(
             [
-                features_of(*result, viewpoints)[0],
-                features_of_search(search, cost, self.found_m),
-                features_of_depth(frame, self._camera, self.found_m)
-                if viewpoints.has_depth
+                _features_of(found),
+                features_of_search(found.search, self._cost, found.keypoints_m),
+                features_of_depth(found.frame, self._camera, found.keypoints_m)
+                if found.viewpoints.has_depth
                 else _NO_DEPTH,
             ],
             axis=1,
         )
-        answers_m, self._memory = self._network(self.features, self._memory)
-        corrected = state.copy()
-        corrected[_TURNS] = self._turns(state[_TURNS], frame.interval_s)
-        figure = cost.parts, cost.girdle, cost.place, cost.view
-        wanted = self._keypoints(moved(self.found_m, answers_m), frame.interval_s)
-        pose_at_keypoints(corrected, *figure, wanted, STATE_LIMITS)
-        fit_keypoints(corrected, *figure, wanted, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
-        return corrected
+        answers_m, self._hidden = self._network(self.features, self._hidden)
+        return moved(found.keypoints_m, answers_m)
+
+    def deviations(self, corrected: Result) -> FloatArray:
+        """See :class:`~.corrector.Corrector`: those of the angles are learned."""
+        self.result_features = _features_of(corrected)
+        stddev = corrected.stddev.copy()
+        stddev[_ANGLES] = deviations_of(self._deviations, self.result_features[None])[0]
+        return stddev
+
+
+def _features_of(result: Result) -> FloatArray:
+    """Return the features (2, F) of one result."""
+    state, stddev, keypoints_m = (
+        one[None] for one in (result.state, result.stddev, result.keypoints_m)
+    )
+    iou = np.array([result.iou])
+    both: FloatArray = features_of(state, stddev, keypoints_m, iou, result.viewpoints)[0]
+    return both
+
+
+def learned(cost: WholeBodyCost, camera: Camera, cameras: int) -> NetworkCorrector:
+    """Return the corrector of the package for one camera or several."""
+    return NetworkCorrector(cost, camera, network_for(cameras))
+
+
+def network_for(cameras: int) -> RecurrentNetwork:
+    """Return the package's network that corrects the results of this number of cameras."""
+    return load_recurrent_network(DATA if cameras == 1 else DATA_OF_SEVERAL)

@@ -12,8 +12,9 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, SumOfTerms, Term
+from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
-from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
 from cardbox_tracker.vision.rasterisation import render
 
 # Somebody sideways shows about half the area of the front view, at the image's border less.
@@ -35,9 +36,18 @@ class Cycles:
         config: TrackerConfig,
         silhouette: SilhouetteTerm,
         rng: np.random.Generator,
+        views: Sequence[View] = (),
         make_hierarchy: MakeHierarchy = HierarchicalFilter,
     ) -> None:
-        """Prepare; ``make_hierarchy`` takes settings, pixels of an image and random numbers."""
+        """Prepare; see ``MakeFilter``.
+
+        ``make_hierarchy`` takes settings, pixels of an image and random numbers.
+
+        Raises:
+            ValueError: there are ``views``: the paper's filter has one camera.
+        """
+        if views:
+            raise ValueError("the filter hierarchical has one camera; whole_body takes several")
         self._config, self._term = config, silhouette
         body, camera = silhouette.body, silhouette.camera
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
@@ -47,11 +57,17 @@ class Cycles:
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self._started = False
+        self._iou: float | None = None
 
-    def look(self, frame: Frame) -> Sight:
+    def ious(self) -> list[float | None]:
         """See :class:`PoseFilter`."""
-        self._frame = frame
-        return Sight.NOBODY if frame.foreground_px < self._min_person_px else Sight.PERSON
+        return [self._iou]
+
+    def look(self, frames: Sequence[Frame]) -> Presence:
+        """See :class:`PoseFilter`."""
+        self._iou = None
+        is_there = frames[0].foreground_px >= self._min_person_px
+        return Presence.PERSON if is_there else Presence.NOBODY
 
     def forget(self) -> None:
         """See :class:`PoseFilter`."""
@@ -65,38 +81,34 @@ class Cycles:
         """See :class:`PoseFilter`."""
         self._config = config
 
-    def follow(self, terms: Sequence[Term]) -> Fit:
+    def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`PoseFilter`."""
-        seen = self._term.observe(self._frame)
-        observation = SumOfTerms((seen, *(term.observe(self._frame) for term in terms)))
+        (frame,), (further,) = frames, terms
+        seen = self._term.observe(frame)
+        observation = SumOfTerms((seen, *(term.observe(frame) for term in further)))
         if self._started:
-            self._iterate(observation)
+            for _ in range(self._config.cycles):
+                self.hierarchy.iterate(observation)
         else:
-            self._start(observation)
+            self._start(frame, observation)
         posture = self.hierarchy.estimate()
         cost_px, iou = seen.overlap(posture)
+        self._iou = iou
         is_poor = iou < self._config.lost_iou
         keypoints_m = self._keypoints(posture)
         stddev = self.hierarchy.stddev()
         return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, posture, iou)
 
-    def _iterate(self, observation: SumOfTerms) -> None:
-        """Run the cycles of one frame, with falling noise; the first one explores."""
-        for cycle in range(self._config.cycles):
-            explore = self._config.explore if cycle == 0 else 0.0
-            self.hierarchy.iterate(observation, self._config.noise_decay**cycle, explore)
-
-    def _start(self, observation: SumOfTerms) -> None:
+    def _start(self, frame: Frame, observation: SumOfTerms) -> None:
         """Start around the front reference where the person stands, then settle."""
         self._started = True
         reference = self._reference.copy()
         if self._config.relocalize:
-            reference[0] = self._lateral_m(self._frame.silhouette)
+            reference[0] = self._lateral_m(frame.silhouette)
         self.hierarchy.initialize(observation, clip_to_limits(reference))
         if self._config.relocalize:
-            for cycle in range(_RECOVERY_CYCLES):
-                noise_scale = _RECOVERY_NOISE * self._config.noise_decay**cycle
-                self.hierarchy.iterate(observation, noise_scale)
+            for _ in range(_RECOVERY_CYCLES):
+                self.hierarchy.iterate(observation, _RECOVERY_NOISE)
 
     def _lateral_m(self, silhouette: Silhouette) -> float:
         """``torso_y`` under which the silhouette's median column lies."""

@@ -1,7 +1,7 @@
-"""What the learned correction sees of a depth image: how far behind the result its surface is.
+"""Features of a depth image for the learned corrector: how far behind the result its surface is.
 
 The term of the depth (:mod:`cardbox_tracker.estimation.cost.depth`) has chosen among the states
-with it; what is left at shoulder, elbow and hand says where the result is still wrong.
+with it; the remaining distances at shoulder, elbow and hand say where the result is still wrong.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """The hierarchical particle filter: first the torso, then both arms (paper, section III-B).
 
 The torso filter rates torso, waist and head. Each arm filter then rates its arm beside the torso
-just found, so the two arms do not depend on each other and can run at the same time.
+just found, so the two arms do not depend on each other. Two threads for them would save nothing
+with the paper's particles.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
@@ -33,7 +33,7 @@ class HierarchicalFilter:
         Args:
             config: settings.
             image_px: pixels of an image, to scale what the settings say of 320x240.
-            rng: split into one stream a filter, so that threads cannot mix them.
+            rng: split into one stream a filter.
         """
         self._config = config
         self._scale = image_px / _REFERENCE_AREA_PX
@@ -51,9 +51,6 @@ class HierarchicalFilter:
             for (side, joints), stream in zip(ARMS.items(), streams[1:], strict=True)
         }
         self._estimate = np.zeros(N_JOINTS)
-        fewest = config.parallel_from
-        parallel = fewest is not None and config.arm.particles >= fewest
-        self._pool = ThreadPoolExecutor(1, "left_arm") if parallel else None
 
     def initialize(
         self, observation: TermObservation, posture: FloatArray, noise_scale: float = 1.0
@@ -66,20 +63,11 @@ class HierarchicalFilter:
 
         self._run(observation, run)
 
-    def iterate(
-        self, observation: TermObservation, noise_scale: float = 1.0, explore: float = 0.0
-    ) -> None:
-        """Run one estimation cycle of all filters.
-
-        Args:
-            observation: what rates postures.
-            noise_scale: factor on sigma_beta.
-            explore: fraction of the arms' particles to draw from anywhere.
-        """
-        explorers = int(explore * self._config.arm.particles)
+    def iterate(self, observation: TermObservation, noise_scale: float = 1.0) -> None:
+        """Run one estimation cycle of all filters, with ``noise_scale`` as factor on sigma_beta."""
 
         def run(of: ParticleFilter, evaluate: CostFunction, joints: slice) -> None:
-            of.iterate(evaluate, noise_scale, self._scale, 0 if of is self.torso else explorers)
+            of.iterate(evaluate, noise_scale, self._scale)
 
         self._run(observation, run)
 
@@ -92,18 +80,8 @@ class HierarchicalFilter:
         posture[TORSO] = self.torso.mean(average, self._scale)
 
         arm_costs = observation.arms_beside(posture[TORSO])
-        work = [
-            partial(run, self.arms[side], partial(arm_costs, side), joints)
-            for side, joints in ARMS.items()
-        ]
-        if self._pool is None:
-            for arm in work:
-                arm()
-        else:
-            left = self._pool.submit(work[0])
-            work[1]()
-            left.result()
         for side, joints in ARMS.items():
+            run(self.arms[side], partial(arm_costs, side), joints)
             posture[joints] = self.arms[side].mean(average, self._scale)
         self._estimate = posture
 

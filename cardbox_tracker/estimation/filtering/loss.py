@@ -2,13 +2,15 @@
 
 The chance is a logistic regression on 37,518 frames of 22 recorded sessions with three seeds; in
 1.8 % of them the keypoints are wrong by more than 30 cm on average. Wrong and right frames weigh
-alike, so 0.5 is where a frame is as typical of either. With the coefficients fitted to the other 21
-sessions, 78 % of the wrong frames of a session and 12 % of all its frames are above 0.6.
+alike: above 0.5 a frame looks more like the wrong ones. With the coefficients fitted to the other
+21 sessions, 78 % of the wrong frames of a session and 12 % of all its frames are above 0.6.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import exp, log
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,7 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import PITCH, TORSO_X, Y
 
 
 class Evidence(NamedTuple):
-    """What the search of one frame tells about its result; shares are of the silhouette's pixels.
+    """Evidence that a result is right or wrong; shares are of the silhouette's pixels.
 
     Attributes:
         residual: share in which model and silhouette differ.
@@ -43,11 +45,26 @@ class Evidence(NamedTuple):
     age: int
 
 
-_INTERCEPT = -3.936
-# What each adds to the logit; between these the area and the prior count.
-AREA_LIMITS = (0.1, 3.0)
+INTERCEPT = -3.936
+COEFFICIENTS: Mapping[str, float] = MappingProxyType(
+    {
+        "residual": 2.574,
+        "left_over": 8.733,
+        "outside": -2.048,
+        "log_area": -1.448,
+        "log_area_size": 1.815,
+        "prior": 10.544,
+        "arm_m": 25.654,
+        "torso_x_stddev": 49.456,
+        "yaw_size": 2.136,
+        "pitch_size": -0.205,
+        "freshness": 0.323,
+    }
+)
+"""Of the logistic regression, by the names that :func:`features_of_loss` returns in this order."""
+_AREA_LIMITS = (0.1, 3.0)
 _PRIOR_LIMITS = (-0.2, 0.3)
-FRESH_FRAMES = 15.0
+_FRESH_FRAMES = 15.0
 # Share of the chance before in the one that is judged.
 _MEMORY = 0.5
 
@@ -109,23 +126,39 @@ def evidence_of(
     )
 
 
+def log_area(evidence: Evidence) -> float:
+    """Return the logarithm of the area, which counts between a tenth and three."""
+    return log(min(max(evidence.area, _AREA_LIMITS[0]), _AREA_LIMITS[1]))
+
+
+def freshness(evidence: Evidence) -> float:
+    """Return how fresh a search is: 1 in its first frame, 1/e after 15 frames."""
+    return exp(-evidence.age / _FRESH_FRAMES)
+
+
+def features_of_loss(evidence: Evidence) -> dict[str, float]:
+    """Return the features of the logistic regression by name, in the order of the coefficients."""
+    area = log_area(evidence)
+    return {
+        "residual": evidence.residual,
+        "left_over": evidence.left_over,
+        "outside": evidence.outside,
+        "log_area": area,
+        "log_area_size": abs(area),
+        "prior": min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1]),
+        "arm_m": evidence.arm_m,
+        "torso_x_stddev": float(evidence.stddev[TORSO_X]),
+        "yaw_size": abs(float(evidence.mean[YAW])),
+        "pitch_size": abs(float(evidence.mean[PITCH])),
+        "freshness": freshness(evidence),
+    }
+
+
 def chance_of_loss(evidence: Evidence) -> float:
     """Return the chance, 0 to 1, that the keypoints are wrong by more than 30 cm on average."""
-    log_area = log(min(max(evidence.area, AREA_LIMITS[0]), AREA_LIMITS[1]))
-    logit = (
-        _INTERCEPT
-        + 2.574 * evidence.residual
-        + 8.733 * evidence.left_over
-        - 2.048 * evidence.outside
-        - 1.448 * log_area
-        + 1.815 * abs(log_area)
-        + 10.544 * min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1])
-        + 25.654 * evidence.arm_m
-        + 49.456 * float(evidence.stddev[TORSO_X])
-        + 2.136 * abs(float(evidence.mean[YAW]))
-        - 0.205 * abs(float(evidence.mean[PITCH]))
-        + 0.323 * exp(-evidence.age / FRESH_FRAMES)
-    )
+    logit = INTERCEPT
+    for name, value in features_of_loss(evidence).items():
+        logit += COEFFICIENTS[name] * value
     return 1.0 / (1.0 + exp(-logit))
 
 

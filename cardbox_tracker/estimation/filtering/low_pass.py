@@ -1,4 +1,4 @@
-"""What is left of a quantity when its fast changes are taken out."""
+"""First-order low-pass filter."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from cardbox_tracker.body.sizes import FloatArray
 
 
 class LowPass:
-    """An exponential filter of the first order over time: steadier, and later.
+    """First-order low-pass filter (exponential smoothing) over time.
 
-    Of values x that are dt apart, y = a y_before + (1 - a) x with a = exp(-dt / time constant).
-    What changes at an even pace comes dt a / (1 - a) later, a little less than the time constant.
+    y = a y_before + (1 - a) x with a = exp(-dt / time constant) for values x that are dt apart. A
+    ramp comes out dt a / (1 - a) later, a little less than the time constant.
     """
 
     def __init__(self, time_constant_s: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from functools import cache
 from importlib import resources
@@ -12,11 +13,16 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.errors import CardboxError
 
 Layer = tuple[FloatArray, FloatArray]
 """Weights (networks, inputs, outputs) and biases (networks, 1, outputs)."""
 
 Read = TypeVar("Read")
+
+# The package's own have 1 MB.
+_MOST_BYTES = 64 * 2**20
+_MADE_BY = "as tools/make_correction.py writes them"
 
 
 class Network(NamedTuple):
@@ -49,57 +55,56 @@ class Network(NamedTuple):
 
 
 class RecurrentNetwork(NamedTuple):
-    """Some networks of the same shape with a memory, whose answers are averaged.
+    """Some recurrent networks of the same shape, whose answers are averaged.
 
-    A layer, a gated recurrent unit with ``nodes`` values (Cho et al. 2014, in the form of cuDNN,
-    where the reset gate acts after the product), and two layers that see both:
+    A linear layer, a gated recurrent unit with ``nodes`` hidden values (Cho et al. 2014, in the
+    form of cuDNN, where the reset gate acts after the product), and two linear layers:
 
-        v = relu(enter(scaled features))
-        r, u = sigmoid of the first two parts of receive(v) + keep(memory)
-        candidate = tanh(third part of receive(v) + r * third part of keep(memory))
-        memory = (1 - u) candidate + u memory
-        answers = leave_1(relu(leave_0([memory, v])))
+        v = relu(input_layer(scaled features))
+        r, u = sigmoid of the first two parts of gru_input(v) + gru_hidden(hidden)
+        candidate = tanh(third part of gru_input(v) + r * third part of gru_hidden(hidden))
+        hidden = (1 - u) candidate + u hidden
+        answers = output_layers[1](relu(output_layers[0]([hidden, v])))
 
     Attributes:
         mean: of the features, (F,).
         scale: their deviations, (F,).
         most: scaled features beyond this count as this.
-        enter: weights (networks, F, entered) and biases (networks, 1, entered).
-        receive: the same, (networks, entered, 3 nodes).
-        keep: the same, (networks, nodes, 3 nodes).
-        leave: the same of the last two layers.
+        input_layer: weights (networks, F, inputs) and biases (networks, 1, inputs).
+        gru_input: the same, (networks, inputs, 3 nodes).
+        gru_hidden: the same, (networks, nodes, 3 nodes).
+        output_layers: the same of the last two layers.
         unit: of the answers, (A,).
     """
 
     mean: FloatArray
     scale: FloatArray
     most: float
-    enter: Layer
-    receive: Layer
-    keep: Layer
-    leave: tuple[Layer, Layer]
+    input_layer: Layer
+    gru_input: Layer
+    gru_hidden: Layer
+    output_layers: tuple[Layer, Layer]
     unit: FloatArray
 
-    def new_memory(self, rows: int) -> FloatArray:
-        """Return the memory, (networks, rows, nodes), of somebody who was not seen before."""
-        weights = self.keep[0]
+    def initial_hidden(self, rows: int) -> FloatArray:
+        """Return the hidden state, (networks, rows, nodes), before the first frame."""
+        weights = self.gru_hidden[0]
         return np.zeros((len(weights), rows, weights.shape[1]), weights.dtype)
 
-    def __call__(self, features: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the answers, (rows, A), to features (rows, F), and the next memory."""
-        nodes = memory.shape[2]
+    def __call__(self, features: FloatArray, hidden: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the answers, (rows, A), to features (rows, F), and the next hidden state."""
+        nodes = hidden.shape[2]
         scaled = scaled_features(features, self.mean, self.scale, self.most)
-        entered = np.maximum(scaled.astype(memory.dtype) @ self.enter[0] + self.enter[1], 0.0)
-        received = entered @ self.receive[0] + self.receive[1]
-        kept = memory @ self.keep[0] + self.keep[1]
-        gates = _sigmoid(received[..., : 2 * nodes] + kept[..., : 2 * nodes])
+        inputs = np.maximum(_linear(scaled.astype(hidden.dtype), self.input_layer), 0.0)
+        of_input, of_hidden = _linear(inputs, self.gru_input), _linear(hidden, self.gru_hidden)
+        gates = _sigmoid(of_input[..., : 2 * nodes] + of_hidden[..., : 2 * nodes])
         reset, update = gates[..., :nodes], gates[..., nodes:]
-        candidate = np.tanh(received[..., 2 * nodes :] + reset * kept[..., 2 * nodes :])
-        memory = candidate + update * (memory - candidate)
-        (first, first_biases), (last, last_biases) = self.leave
-        inside = np.concatenate([memory, entered], axis=2) @ first + first_biases
-        answers = np.maximum(inside, 0.0) @ last + last_biases
-        return np.asarray(answers.mean(axis=0), np.float64) * self.unit, memory
+        candidate = np.tanh(of_input[..., 2 * nodes :] + reset * of_hidden[..., 2 * nodes :])
+        hidden = candidate + update * (hidden - candidate)
+        first, last = self.output_layers
+        both = np.concatenate([hidden, inputs], axis=2)
+        answers = _linear(np.maximum(_linear(both, first), 0.0), last)
+        return np.asarray(answers.mean(axis=0), np.float64) * self.unit, hidden
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -135,6 +140,12 @@ def scaled_features(
     return scaled
 
 
+def _linear(inputs: FloatArray, layer: Layer) -> FloatArray:
+    """Return the outputs (networks, rows, outputs) of a layer to inputs (..., rows, inputs)."""
+    outputs: FloatArray = inputs @ layer[0] + layer[1]
+    return outputs
+
+
 def _sigmoid(values: FloatArray) -> FloatArray:
     # Without an overflow, whatever the value.
     result: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * values))
@@ -149,7 +160,7 @@ def load_network(name: str) -> Network:
 
 @cache
 def load_recurrent_network(name: str) -> RecurrentNetwork:
-    """Return the network with a memory of the package in the data file ``name``."""
+    """Return the recurrent network of the package in the data file ``name``."""
     return _packaged(name, read_recurrent_network)
 
 
@@ -173,15 +184,64 @@ def read_network(path: Path) -> Network:
 
 
 def read_recurrent_network(path: Path) -> RecurrentNetwork:
-    """Return the network with a memory in a file that ``tools/networks.py`` has written."""
-    data = _arrays(path, np.float32)
-    enter, receive, keep, first, last = (
-        (data[f"weights{i}"], data[f"biases{i}"]) for i in range(5)
-    )
-    most = float(data["most"])
-    return RecurrentNetwork(
-        data["mean"], data["scale"], most, enter, receive, keep, (first, last), data["unit"]
-    )
+    """Return the recurrent network in a file that ``tools/networks.py`` has written.
+
+    Raises:
+        CardboxError: it cannot be read, or is no such network; the text says which array is wrong.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
+                raise CardboxError(f"{path} has over {_MOST_BYTES // 2**20} MB; expected a few")
+        data = _arrays(path, np.float32)
+    except OSError as error:
+        raise CardboxError(f"{path}: {error.strerror or error}; give a network's file") from None
+    except (ValueError, TypeError, zipfile.BadZipFile) as error:
+        raise CardboxError(f"{path} is no network: {error}; {_MADE_BY}") from None
+    try:
+        input_layer, gru_input, gru_hidden, first, last = (
+            (data[f"weights{i}"], data[f"biases{i}"]) for i in range(5)
+        )
+        network = RecurrentNetwork(
+            *(data["mean"], data["scale"], float(data["most"])),
+            *(input_layer, gru_input, gru_hidden, (first, last), data["unit"]),
+        )
+    except (KeyError, TypeError) as error:
+        raise CardboxError(f"{path} is no recurrent network: {error}; {_MADE_BY}") from None
+    _check_shapes(path, network, data)
+    return network
+
+
+def _check_shapes(path: Path, network: RecurrentNetwork, data: dict[str, FloatArray]) -> None:
+    """Raise CardboxError unless all numbers are finite and each layer fits the one before."""
+    answers = network.unit.size
+    try:
+        networks, features, inputs = network.input_layer[0].shape
+        nodes = network.gru_hidden[0].shape[1]
+        left = network.output_layers[0][0].shape[2]
+    except (ValueError, IndexError):
+        raise CardboxError(f"{path}: its weights need three axes; {_MADE_BY}") from None
+    layers = [
+        *((features, inputs), (inputs, 3 * nodes), (nodes, 3 * nodes)),
+        *((nodes + inputs, left), (left, answers)),
+    ]
+    wanted: dict[str, tuple[int, ...]] = {
+        "mean": (features,),
+        "scale": (features,),
+        "most": (),
+        "unit": (answers,),
+        **{f"weights{i}": (networks, *layer) for i, layer in enumerate(layers)},
+        **{f"biases{i}": (networks, 1, layer[1]) for i, layer in enumerate(layers)},
+    }
+    for name, shape in wanted.items():
+        if data[name].shape != shape:
+            raise CardboxError(
+                f"{path}: {name} has the shape {data[name].shape}; expected {shape}, {_MADE_BY}"
+            )
+        if not np.isfinite(data[name]).all():
+            raise CardboxError(f"{path}: {name} has values that are not finite; {_MADE_BY}")
+    if not (data["scale"] > 0.0).all():
+        raise CardboxError(f"{path}: scale has values of 0 or less; {_MADE_BY}")
 
 
 def _arrays(path: Path, kind: type[np.floating[Any]]) -> dict[str, FloatArray]:

@@ -130,31 +130,30 @@ class OutlineFit:
     def forget(self) -> None:
         """Begin anew: the next state is of somebody else, or of another place."""
         self._correction: FloatArray | None = None
-        self._frame: Frame | None = None
+        self._frames: Sequence[Frame] | None = None
         self._looking: list[_Lens] = []
 
-    def __call__(self, frame: Frame, state: FloatArray) -> FloatArray:
-        """Return a state (14,) that fits the outline of the frame's silhouettes better.
+    def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
+        """Return a state (14,) that fits the outlines of the cameras' silhouettes better.
 
         Depth images say more of the distance than an outline; with them the state stays.
         """
-        if self._steps == 0 or frame.depth_m is not None:
+        if self._steps == 0 or frames[0].depth_m is not None:
             return state.copy()
-        correction = self.fitted(frame, state, self._steps) - state
+        correction = self.fitted(frames, state, self._steps) - state
         before = correction if self._correction is None else self._correction
         self._correction = _KEPT * before + (1.0 - _KEPT) * correction
         return np.clip(state + self._correction, *STATE_LIMITS.T)
 
-    def fitted(self, frame: Frame, state: FloatArray, steps: int) -> FloatArray:
-        """Return the state (14,) that fits the silhouettes of this frame alone."""
-        if frame is not self._frame:
-            silhouettes = [frame.silhouette, *(other.silhouette for other in frame.others)]
+    def fitted(self, frames: Sequence[Frame], state: FloatArray, steps: int) -> FloatArray:
+        """Return the state (14,) that fits the silhouettes of these frames alone."""
+        if frames is not self._frames:
             self._looking = [
                 self._lenses[number]
                 for number in self.seeing
-                if self._lenses[number].look(silhouettes[number], state)
+                if self._lenses[number].look(frames[number].silhouette, state)
             ]
-            self._frame = frame
+            self._frames = frames
         fitted = state.copy()
         if not self._looking:
             return fitted

@@ -1,6 +1,6 @@
 """One particle filter over a few joints (paper, algorithm "Online Motion Tracking").
 
-An iteration is: resample, propagate, clip, inject, evaluate. The initial particles are
+An iteration is: resample, propagate, clip, evaluate. The initial particles are
 d_ref + N(0, sigma_beta^2 E).
 """
 
@@ -70,7 +70,6 @@ class ParticleFilter:
         evaluate: CostFunction,
         noise_scale: float = 1.0,
         sigma_scale: float = 1.0,
-        explorers: int = 0,
     ) -> None:
         """Run one estimation cycle.
 
@@ -78,7 +77,6 @@ class ParticleFilter:
             evaluate: costs of particles against the present frame.
             noise_scale: factor on sigma_beta.
             sigma_scale: factor on sigma_gamma, such as for a larger image.
-            explorers: how many particles, the last ones, are drawn from anywhere in the limits.
         """
         ancestors = resample(
             self.strategy,
@@ -90,7 +88,6 @@ class ParticleFilter:
         )
         particles = self._propagated(ancestors, noise_scale)
         clip(particles, self._limits)
-        self._inject(particles, explorers)
         self.particles, self.costs = particles, evaluate(particles)
 
     def _propagated(self, ancestors: Indices, noise_scale: float) -> FloatArray:
@@ -100,12 +97,6 @@ class ParticleFilter:
             steps[0] = 0.0
         propagate(steps, self.particles, ancestors, self.noise * noise_scale)
         return steps
-
-    def _inject(self, particles: FloatArray, explorers: int) -> None:
-        """Replace the last ``explorers`` of the particles (N, D) by any within the limits."""
-        if explorers > 0:
-            low, high = self._limits.T
-            particles[-explorers:] = low + (high - low) * self._rng.random((explorers, len(low)))
 
     def best(self) -> FloatArray:
         """Return the particle (D,) of lowest cost."""

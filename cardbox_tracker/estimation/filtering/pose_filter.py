@@ -13,22 +13,23 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
+from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.filtering.particles import Particles
 
 
-class Sight(Enum):
-    """What a silhouette can be, by its size."""
+class Presence(Enum):
+    """Whether a silhouette can be a person, by its size."""
 
     NOBODY = "too few foreground pixels"
     PERSON = "a person"
     TOO_MUCH = "more foreground than a person can be"
 
 
-def sight_of(share: float, smallest: float, largest: float) -> Sight:
+def presence_of(share: float, smallest: float, largest: float) -> Presence:
     """Return what a silhouette is whose pixels are this share of the model's from the front."""
     if share < smallest:
-        return Sight.NOBODY
-    return Sight.TOO_MUCH if share > largest else Sight.PERSON
+        return Presence.NOBODY
+    return Presence.TOO_MUCH if share > largest else Presence.PERSON
 
 
 @dataclass(frozen=True)
@@ -78,13 +79,23 @@ class Fit:
 class PoseFilter(Protocol):
     """Follows one person from frame to frame."""
 
-    def look(self, frame: Frame) -> Sight:
-        """Take the next frame; say whether it can show a person."""
+    def look(self, frames: Sequence[Frame]) -> Presence:
+        """Take the frames of all cameras of one time; say whether they can show a person."""
 
-    def follow(self, terms: Sequence[Term]) -> Fit:
-        """Find the posture in the frame looked at last, by its silhouette and further ``terms``.
+    def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
+        """Find the posture in the frames looked at last.
 
         Without a person before, it starts around the front reference posture.
+
+        Args:
+            frames: of the first camera, then of the further ones.
+            terms: of each camera's cost, beside that of the silhouette.
+        """
+
+    def ious(self) -> list[float | None]:
+        """Return how well the last result covers each camera's silhouette of that frame.
+
+        Intersection over union; None of a camera that saw nobody, or before the first result.
         """
 
     def forget(self) -> None:
@@ -97,6 +108,8 @@ class PoseFilter(Protocol):
         """Use other settings, of which none restarts."""
 
 
-MakeFilter = Callable[[TrackerConfig, SilhouetteTerm, np.random.Generator], PoseFilter]
-"""Takes settings, the silhouette's term, which has body and camera, and the source of random
-numbers; returns a new filter."""
+MakeFilter = Callable[
+    [TrackerConfig, SilhouetteTerm, np.random.Generator, Sequence[View]], PoseFilter
+]
+"""Takes settings, the silhouette's term, which has body and first camera, the source of random
+numbers, and how the further cameras see the body; returns a new filter."""

@@ -1,31 +1,26 @@
-"""What is done to the result of the whole-body filter; its particles know nothing of it.
+"""Refines the result of the whole-body filter; its particles stay as they are.
 
-1. It is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
-2. It is corrected by what was learned (:mod:`.correction`).
-3. How wrong it may be is estimated for such results (:mod:`.deviations`).
+1. The result is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
+2. A corrector says where the joints are (:mod:`.corrector`).
+3. The body is posed at these joints, smoothed over time (:mod:`.posing`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering.correction import Correction
-from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
-from cardbox_tracker.estimation.filtering.networks import load_network
+from cardbox_tracker.estimation.filtering.corrector import Result
+from cardbox_tracker.estimation.filtering.corrector_loading import load_corrector
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
-from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
+from cardbox_tracker.estimation.filtering.posing import SmoothedPosing
+from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.vision.camera import Camera
-
-# The angles among the values of a state.
-_ANGLES = slice(1, 12)
 
 
 class Refinement:
@@ -33,8 +28,8 @@ class Refinement:
 
     Attributes:
         outline: the fit to the outlines.
-        correction: what was learned; None if it is switched off.
-        features: what the deviations are learned from, of the last corrected result, (2, F).
+        corrector: what the settings name; None if nothing corrects.
+        found: the result before the last correction; None before the first one.
     """
 
     def __init__(
@@ -44,17 +39,20 @@ class Refinement:
         config: WholeBodyConfig,
         others: Sequence[tuple[WholeBodyCost, View]] = (),
     ) -> None:
-        """Prepare for the body of ``cost`` before ``camera`` and ``others``."""
+        """Prepare for the body of ``cost`` before ``camera`` and ``others``.
+
+        Raises:
+            CardboxError: the corrector cannot be loaded.
+        """
         self._cost = cost
         self.outline = OutlineFit(cost, camera, config.outline_steps, others)
         self._yaws_rad = [0.0, *(view.yaw_rad for _, view in others)]
         self.see(range(len(self._yaws_rad)))
-        self.correction = (
-            Correction(cost, camera, config.output_smoothing_s, 1 + len(others))
-            if config.learned_correction
-            else None
-        )
-        self._deviations = load_network(DATA) if config.learned_deviations else None
+        make = load_corrector(config.corrector)
+        self.corrector = make and make(cost, camera, len(self._yaws_rad))
+        self._has_own_deviations = config.learned_deviations
+        self._posing = SmoothedPosing(cost, config.output_smoothing_s)
+        self.found: Result | None = None
 
     def see(self, seeing: Sequence[int]) -> None:
         """Let only the cameras of these numbers count in this frame; the first one is 0."""
@@ -63,35 +61,33 @@ class Refinement:
         self._viewpoints = Viewpoints.of(self._cost.pitch_rad, yaws_rad, self._cost.is_measured)
 
     def forget(self) -> None:
-        """Begin anew with the outline: the next state may be of another place.
+        """Begin anew with outline and smoothing: the next state may be of another place.
 
-        What was learned goes on: it has learned from people who leave and come back.
+        The corrector goes on: the learned one knows people who leave and come back.
         """
         self.outline.forget()
-        if self.correction is not None:
-            self.correction.forget()
+        self._posing.forget()
 
     def corrected(
         self, frame: Frame, fitted: FloatArray, stddev: FloatArray, iou: float, search: Search
     ) -> FloatArray:
-        """Return the result (14,): what was learned moves the state that fits the outlines.
+        """Return the corrected result (14,).
 
         Args:
-            frame: what is seen.
-            fitted: to the outlines, (14,).
-            stddev: its deviations, (14,).
+            frame: silhouette and, if there are any, image and depth image.
+            fitted: the state that fits the outlines, (14,).
+            stddev: deviations of the state, (14,).
             iou: of model and silhouette.
-            search: that has found it.
+            search: the search that found the state.
         """
-        if self.correction is None:
+        if self.corrector is None:
             return fitted
-        viewpoints = self._viewpoints_of(frame)
-        return self.correction(frame, fitted, stddev, iou, search, viewpoints)
-
-    def _viewpoints_of(self, frame: Frame) -> Viewpoints:
-        # Beside a further camera a depth image adds little, and nothing was learned of both.
+        keypoints_m = self._cost.keypoints(fitted)
+        # Beside a further camera a depth image adds little, and the networks know no such case.
         has_depth = frame.depth_m is not None and len(self._yaws_rad) == 1
-        return self._viewpoints._replace(has_depth=has_depth)
+        viewpoints = self._viewpoints._replace(has_depth=has_depth)
+        self.found = Result(frame, fitted, stddev, keypoints_m, iou, search, viewpoints)
+        return self._posing(fitted, self.corrector(self.found), frame.interval_s)
 
     def deviations(
         self,
@@ -101,23 +97,20 @@ class Refinement:
         keypoints_m: FloatArray,
         iou: float,
     ) -> FloatArray:
-        """Return the deviations (14,) of the result: learned ones of the angles.
-
-        Results that are not corrected keep those of the filter.
+        """Return the deviations (14,) of the last result: the corrector's, or else ``stddev``.
 
         Args:
-            frame: what is seen.
-            state: the result, (14,).
+            frame: as for :meth:`corrected`.
+            state: the corrected result, (14,).
             stddev: the filter's deviations, (14,).
             keypoints_m: of the state, (6, 3), metres in the optical frame.
             iou: of model and silhouette.
         """
-        if self.correction is None:
+        if self.corrector is None or self.found is None:
             return stddev
-        row = state[None], stddev[None], keypoints_m[None], np.array([iou])
-        self.features = features_of(*row, self._viewpoints_of(frame))[0]
-        if self._deviations is None:
-            return stddev
-        learned = stddev.copy()
-        learned[_ANGLES] = deviations_of(self._deviations, self.features[None])[0]
-        return learned
+        result = Result(
+            *(frame, state, stddev, keypoints_m, iou),
+            *(self.found.search, self.found.viewpoints),
+        )
+        own = self.corrector.deviations(result)
+        return own if self._has_own_deviations and own is not None else stddev

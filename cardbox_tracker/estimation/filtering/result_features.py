@@ -1,4 +1,4 @@
-"""What the learned networks see of a result: one arm, as if it were the left one, and the torso."""
+"""Features of a result for the networks: one arm, as if it were the left one, and the torso."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ _OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
 # Of each bone of both arms: where it begins and ends among the keypoints.
 _BEGIN, _END = np.array([0, 1, 3, 4]), np.array([1, 2, 4, 5])
 _HAND = 2
-# Directions of four bones and the hand's place, each with its squares; how far aside the hand is;
-# the state, its deviations, IoU, size of the yaw and the viewpoints.
-_RESULT = 2 * 12 + 2 * 3 + 1
-FEATURES = _RESULT + 2 * N_STATE + 8
-OF_CAMERAS = slice(FEATURES - 5, FEATURES)
-"""Where the features are that hardly ever change: what the cameras show, and whose body it is."""
+# First columns of the features: unit vectors of four bones, the hand beside the middle of the
+# shoulders, both squared, how far aside the hand is, the state and its deviations.
+BONES, BONE_SQUARES, HAND, HAND_SQUARES, HAND_ASIDE = 0, 12, 24, 27, 30
+STATE, STDDEV = 31, 31 + N_STATE
+# The other columns.
+IOU = STDDEV + N_STATE
+YAW_SIZE, PITCH, ASIDE, AHEAD, SLANTING, IS_MEASURED, HAS_DEPTH = range(IOU + 1, IOU + 8)
+FEATURES = HAS_DEPTH + 1
+OF_CAMERAS = slice(ASIDE, FEATURES)
+"""Columns that hardly ever change: what the cameras show, and whether the body was measured."""
 
 
 class Viewpoints(NamedTuple):
@@ -108,27 +112,26 @@ def _fill(
                 x, y, z = keypoints_m[n, end] - keypoints_m[n, begin]
                 length = sqrt(x * x + y * y + z * z)
                 for axis, value in enumerate((sideways * x / length, y / length, z / length)):
-                    row[3 * bone + axis] = value
-                    row[12 + 3 * bone + axis] = value * value
+                    row[BONES + 3 * bone + axis] = value
+                    row[BONE_SQUARES + 3 * bone + axis] = value * value
             hand = _OTHER_POINTS[_HAND] if arm else _HAND
             for axis in range(3):
                 middle = 0.5 * (keypoints_m[n, 0, axis] + keypoints_m[n, 3, axis])
                 value = keypoints_m[n, hand, axis] - middle
-                row[24 + axis] = sideways * value if axis == 0 else value
-                row[27 + axis] = value * value
-            row[30] = abs(row[24])
+                row[HAND + axis] = sideways * value if axis == 0 else value
+                row[HAND_SQUARES + axis] = value * value
+            row[HAND_ASIDE] = abs(row[HAND])
             for i in range(N_STATE):
                 if arm:
-                    row[_RESULT + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
-                    row[_RESULT + N_STATE + i] = stddevs[n, _OTHER_ARM[i]]
+                    row[STATE + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
+                    row[STDDEV + i] = stddevs[n, _OTHER_ARM[i]]
                 else:
-                    row[_RESULT + i], row[_RESULT + N_STATE + i] = states[n, i], stddevs[n, i]
-            said = row[_RESULT + 2 * N_STATE :]
-            said[0] = ious[n]
-            said[1] = abs(states[n, YAW])
-            said[2] = pitch_rad
-            said[3] = aside
-            said[4] = ahead
-            said[5] = sideways * slanting
-            said[6] = is_measured
-            said[7] = has_depth
+                    row[STATE + i], row[STDDEV + i] = states[n, i], stddevs[n, i]
+            row[IOU] = ious[n]
+            row[YAW_SIZE] = abs(states[n, YAW])
+            row[PITCH] = pitch_rad
+            row[ASIDE] = aside
+            row[AHEAD] = ahead
+            row[SLANTING] = sideways * slanting
+            row[IS_MEASURED] = is_measured
+            row[HAS_DEPTH] = has_depth

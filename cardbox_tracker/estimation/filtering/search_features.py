@@ -1,4 +1,4 @@
-"""What the learned correction sees of the search of a frame, beside its result.
+"""Features of the search of a frame for the learned corrector.
 
 Where the rated states have their elbows and hands says which other postures explain the silhouette
 nearly as well, and the evidence of loss says how well the best one does.
@@ -8,7 +8,7 @@ Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code o
 
 from __future__ import annotations
 
-from math import exp, log, sqrt
+from math import exp, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,16 +17,19 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_kernels import keypoints
-from cardbox_tracker.estimation.filtering.loss import AREA_LIMITS, FRESH_FRAMES, Evidence
+from cardbox_tracker.estimation.filtering.loss import Evidence, freshness, log_area
 
 # States that weigh less than this, beside 1 of the best, do not count.
 _LEAST_WEIGHT = 1e-4
 # Left elbow and hand, right elbow and hand among the keypoints; shoulders.
 _MOVING = np.array([1, 2, 4, 5])
 _LEFT, _RIGHT = 0, 3
-# Means of elbows and hands, their deviations, and both of the shoulders' middle.
-_PLACES = 2 * (3 * len(_MOVING) + 3)
-SEARCH_FEATURES = _PLACES + 8
+# First columns: means and deviations of elbows and hands, then of the middle of the shoulders.
+MEANS, DEVIATIONS = 0, 3 * len(_MOVING)
+MIDDLE_MEAN, MIDDLE_DEVIATION = 2 * DEVIATIONS, 2 * DEVIATIONS + 3
+# Columns of the evidence of loss.
+OF_EVIDENCE = slice(MIDDLE_DEVIATION + 3, MIDDLE_DEVIATION + 11)
+SEARCH_FEATURES = OF_EVIDENCE.stop
 """How many numbers :func:`features_of_search` returns for an arm."""
 
 
@@ -63,14 +66,14 @@ def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray
     figure = cost.parts, cost.girdle, cost.place, cost.view
     _fill(search.states, search.ratings, search.spread, result_m, *figure, features)
     seen = search.evidence
-    features[:, _PLACES:] = (
+    features[:, OF_EVIDENCE] = (
         seen.residual,
         seen.left_over,
         seen.outside,
-        log(min(max(seen.area, AREA_LIMITS[0]), AREA_LIMITS[1])),
+        log_area(seen),
         seen.prior,
         seen.arm_m,
-        exp(-seen.age / FRESH_FRAMES),
+        freshness(seen),
         search.chance,
     )
     return features
@@ -108,14 +111,14 @@ def _fill(
         for j in range(count + 1):
             # The arm of the row first; the middle stays the last.
             source = j if j == count or arm == 0 else (j + 2) % count
-            column = 6 * count if j == count else 3 * j
-            after = 3 if j == count else 3 * count
+            of_mean = MIDDLE_MEAN if j == count else MEANS + 3 * j
+            of_deviation = MIDDLE_DEVIATION if j == count else DEVIATIONS + 3 * j
             for axis in range(3):
                 mean = sums[source, axis] / total
                 variance = squares[source, axis] / total - mean * mean
                 sign = -1.0 if arm == 1 and axis == 0 else 1.0
-                features[arm, column + axis] = sign * (mean - seen[source, axis])
-                features[arm, column + after + axis] = sqrt(max(variance, 0.0))
+                features[arm, of_mean + axis] = sign * (mean - seen[source, axis])
+                features[arm, of_deviation + axis] = sqrt(max(variance, 0.0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

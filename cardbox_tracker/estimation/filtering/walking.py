@@ -26,31 +26,31 @@ class Walk:
 
     def __init__(self) -> None:
         """Begin with somebody of whom nothing is known."""
-        self._sight: float | None = None
+        self._bearing: float | None = None
         self.way_m = 0.0
 
-    def see(self, silhouette: Silhouette, sight: float, ahead_m: float) -> float:
-        """Take the next silhouette (H, W), whose middle is at ``sight``, aside over ahead.
+    def see(self, silhouette: Silhouette, bearing: float, ahead_m: float) -> float:
+        """Take the next silhouette (H, W).
 
-        Whoever is first seen at a border of the image is coming in.
+        Somebody who is first seen at a border of the image is assumed to come in.
 
         Args:
             silhouette: the foreground.
-            sight: direction of its middle.
+            bearing: of its middle, aside over ahead.
             ahead_m: how far away the person is.
 
         Returns:
             How far the middle moved since the last silhouette, metres.
         """
-        if self._sight is None:
+        if self._bearing is None:
             step_m = 0.0
             left, right = (bool(silhouette[:, edge].any()) for edge in (0, -1))
             self.way_m = _WAY_M * (left - right)
         else:
-            step_m = (sight - self._sight) * ahead_m
+            step_m = (bearing - self._bearing) * ahead_m
             way_m = (1.0 - _FORGOTTEN) * self.way_m + step_m
             self.way_m = min(max(way_m, -_WAY_M), _WAY_M)
-        self._sight = sight
+        self._bearing = bearing
         return step_m
 
     @property

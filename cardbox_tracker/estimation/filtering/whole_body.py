@@ -2,8 +2,9 @@
 
 A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
 the best torso, then all joints together. ``docs/architecture.md`` has the steps with their numbers
-and what was tried. What proposes is in :mod:`.whole_body_moves`, what rates in
-:mod:`cardbox_tracker.estimation.cost.whole_body`.
+and what was tried. Proposals are in :mod:`.whole_body_moves`, ratings in
+:mod:`cardbox_tracker.estimation.cost.multi_view`, what depends on the number of cameras in
+:mod:`.search_plan`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
+from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_kernels import (
     N_STATE,
@@ -27,39 +29,50 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
 )
 from cardbox_tracker.estimation.filtering import loss
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
-from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS, propose_arms
+from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
+from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.pose_filter import Fit, Sight, sight_of
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence, presence_of
 from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.search_features import Search
-from cardbox_tracker.estimation.filtering.walking import Walk
+from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 
 _HOME_LIMIT_M = 0.7
 # Deviation of x of torsos that stand upright: larger while the search is young.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-# Arms that are passed on, how many of them are combined with the other side's, and the noise around
-# the best, as a share of that of all.
-_BEST_ARMS, _PAIRED_ARMS, _AGAIN_NOISE = 20, 12, 0.45
+# Before all joints move together, so many states, of which so many are alike and the others so far
+# apart, m, are moved by so many Gauss-Newton steps.
+_FITTED, _FIT_STEPS = (3, 1, 0.1), 2
 _STEP_M = 0.05  # across the image: the legs leave the columns where they were
 
 
 class WholeBodyFilter:
-    """Follows states (14,); a :class:`~.pose_filter.PoseFilter`.
+    """Follows states (14,) of the first camera; a :class:`~.pose_filter.PoseFilter`.
 
-    A state is d1..d12, ``torso_x`` and ``torso_z``. What is done to results is in ``refine``.
+    A state is d1..d12, ``torso_x`` and ``torso_z``. :attr:`refine` post-processes the result. Of
+    several cameras, any may see nobody for a while.
+
+    Attributes:
+        states: of the last frame, (N, 14).
+        ratings: theirs, (N,); the lower, the better.
+        refine: fits the result to the outlines, corrects it, and estimates its deviations.
     """
 
-    candidates = 1
-    """Arms that are proposed for each one that is rated."""
-
     def __init__(
-        self, config: TrackerConfig, silhouette: SilhouetteTerm, rng: np.random.Generator
+        self,
+        config: TrackerConfig,
+        silhouette: SilhouetteTerm,
+        rng: np.random.Generator,
+        views: Sequence[View] = (),
     ) -> None:
         """Prepare, and compile what is not yet; see ``MakeFilter``."""
-        self._config = c = config.whole_body
+        self._views = tuple(views)
+        self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
+        self._config = c = plan.config
         self._rng, self._lost_iou = rng, config.lost_iou
-        self.use_body(silhouette)
+        self._use_body(silhouette)
         self._sigma = c.noise()
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[4:12] = 0.0
@@ -68,29 +81,28 @@ class WholeBodyFilter:
         self._reference[0] = self._body.placement.lateral_m
         self.forget()
 
-    def use_body(self, silhouette: SilhouetteTerm) -> None:
-        """Go on with another body from the next frame on, or begin with it."""
-        self._body = silhouette.body
-        self._one = WholeBodyCost(silhouette.body, silhouette.camera, self._config.cost)
-        self._cost: WholeBodyCost | MultiViewCost = self._one
-        self.refine = Refinement(self._one, silhouette.camera, self._config)
+    def _use_body(self, silhouette: SilhouetteTerm) -> None:
+        """Prepare rating and refinement for the body of ``silhouette``."""
+        self._body, camera, views = silhouette.body, silhouette.camera, self._views
+        self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
+        first, *others = cost.costs
+        self._arm = ArmSearch(cost, self._plan)
+        self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
+        self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
         # From the hips to the torso's top: about where the shoulders are.
-        self._lever_m = float(self._one.parts[TORSO, 0] + self._one.parts[TORSO, 1])
-
-    def best(self) -> tuple[WholeBodyCost, FloatArray]:
-        """Return what has rated the last frame, of the first camera, and the best state (14,)."""
-        return self._one, self.states[int(np.argmin(self.ratings))]
+        self._lever_m = float(cost.parts[TORSO, 0] + cost.parts[TORSO, 1])
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
         self._survivors = self._reference[None].copy()
+        self._seeing: list[int] = []
         self._is_new, self._is_lost = True, False
         self._age, self._home_m = 0, 0.0
-        self._walk = Walk()
+        self._locator.forget()
         self._output: FloatArray | None = None
+        self._result: FloatArray | None = None
         self.refine.forget()
-        # Of left elbow and hand, right elbow and hand, m.
-        self._arm_spread = [0.0, 0.0, 0.0, 0.0]
+        self._arm.forget()
         self._chance: float | None = None
 
     def recover(self) -> None:
@@ -99,7 +111,7 @@ class WholeBodyFilter:
         To forget would cost more than it brings where silhouettes stay poor.
         """
         self._is_lost = True
-        # What was wrong is not shown, nor is the next result mixed with it.
+        # A wrong result is not mixed with the next one.
         self._output = None
         self.refine.forget()
 
@@ -107,57 +119,64 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
         self._lost_iou = config.lost_iou
 
-    def look(self, frame: Frame) -> Sight:
-        """See :class:`~.pose_filter.PoseFilter`."""
-        self._frame = frame
-        self._see(self._survivors[0])
-        return self._sight_of(self._cost.silhouette_px, self._cost.frontal_px)
+    def look(self, frames: Sequence[Frame]) -> Presence:
+        """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
+        self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
+        found = [self._presence_in(cost) for cost in self._cost.costs]
+        self._seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
+        if self._seeing:
+            return Presence.PERSON
+        return Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY
 
-    def _sight_of(self, silhouette_px: int, frontal_px: int) -> Sight:
-        share = silhouette_px / frontal_px
-        return sight_of(share, self._config.smallest_person, self._config.largest_person)
+    def _presence_in(self, cost: WholeBodyCost) -> Presence:
+        share = cost.silhouette_px / cost.frontal_px
+        return presence_of(share, self._config.smallest_person, self._config.largest_person)
 
-    def follow(self, terms: Sequence[Term]) -> Fit:
+    def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
-        self._observe(terms)
+        location = self._observe(frames, terms)
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             self._home_m = 0.0
             self._survivors[-1] = self._reference
-            place_m = self._sight * self._body.placement.distance_m
+            place_m = location.bearing * self._body.placement.distance_m
             self._survivors[-1, 0] = np.clip(place_m, *STATE_LIMITS[0])
         moved = self._survivors[0].copy()
-        moved[0] += self._step_m
-        if self._is_new or abs(self._step_m) > _STEP_M:
+        moved[0] += location.step_m
+        if self._is_new or abs(location.step_m) > _STEP_M:
             # Now it is known where the legs are.
-            self._see(moved)
+            self._cost.see([frame.silhouette for frame in frames], moved)
+            self._cost.choose(self._seeing)
         self._age += not self._is_new
         for _ in range(passes):
-            self._search()
+            self._search(frames, location)
         self._is_new = self._is_lost = False
-        return self._fit()
+        return self._fit(frames)
 
-    def _see(self, state: FloatArray) -> None:
-        """Take the silhouette of the frame, of a person about where ``state`` (14,) says."""
-        self._one.see(self._frame.silhouette, state)
+    def _observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Location:
+        """See what the terms say of the frames, and where the person is."""
+        seeing, cost = self._seeing, self._cost
+        self.refine.see(seeing)
+        location = self._locator.locate(frames, seeing, self._survivors[0])
+        cost.choose(seeing)
+        cost.observe(
+            [
+                [term.observe(frame) for term in some] if number in seeing else []
+                for number, (frame, some) in enumerate(zip(frames, terms, strict=True))
+            ]
+        )
+        return location
 
-    def _observe(self, terms: Sequence[Term]) -> None:
-        """See what the terms say of the frame, and where its silhouette is and has moved."""
-        self._one.terms = tuple(term.observe(self._frame) for term in terms)
-        self._sight = self._one.sight()
-        ahead_m = self._body.placement.distance_m - float(self._survivors[0, TORSO_X])
-        self._step_m = self._walk.see(self._frame.silhouette, self._sight, ahead_m)
-
-    def _search(self) -> None:
+    def _search(self, frames: Sequence[Frame], location: Location) -> None:
         """Run all stages once."""
         config, cost = self._config, self._cost
-        draws = Draws(self._rng, config, self.candidates)
+        draws = Draws(self._rng, config, self._plan.candidates)
         before = self._survivors[0].copy()
         self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
         self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
-        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m, self._walk.yaw_rad
+        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m, self._locator.yaw_rad
 
-        pool = self._torsos(before, draws)
+        pool = self._torsos(before, location, draws)
         ratings = cost.bodies(pool)[0]
         best = pool[np.argmin(ratings)]
         by_rating = moves.best_states(pool, ratings, min(len(pool), config.survivors))
@@ -165,17 +184,18 @@ class WholeBodyFilter:
         (left, left_ratings), (right, right_ratings) = (
             self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
-        pairs = moves.combine(best, left, left_ratings, right, right_ratings, _PAIRED_ARMS)
+        pairs = moves.combine(best, left, left_ratings, right, right_ratings, config.paired_arms)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
-        self._together(states, ratings, draws)
+        self._together(frames, states, ratings, draws)
 
-    def _torsos(self, before: FloatArray, draws: Draws) -> FloatArray:
+    def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
         """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
         config, cost = self._config, self._cost
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
         fresh = self._reference.copy()
-        fresh[TORSO_X], sight, fresh_x_m = self._upright(before, is_settled)
+        fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
+        fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = config.fresh_torsos if is_settled else config.torso_explorers
         torsos = moves.propose_torsos(
             self._survivors,
@@ -185,8 +205,8 @@ class WholeBodyFilter:
             upright,
             fresh,
             fresh_x_m,
-            sight,
-            self._step_m,
+            location.bearing,
+            location.step_m,
             self._body.placement.distance_m,
             STATE_LIMITS,
             *draws.for_torsos(config.torsos),
@@ -205,42 +225,15 @@ class WholeBodyFilter:
         # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
         return np.concatenate([pool, torsos[len(torsos) - upright :]])
 
-    def _upright(self, before: FloatArray, is_settled: bool) -> tuple[float, float, float]:
-        """Return x and direction of torsos that stand upright, and the deviation of x, m."""
-        return float(before[TORSO_X]), self._sight, _SETTLED_X_M if is_settled else _YOUNG_X_M
-
-    def _propose_arms(
-        self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
-    ) -> FloatArray:
-        """Return arms (N, 4), 0 left or 1 right, for the torso of the best state."""
-        return propose_arms(pool, arm, self._config, self._one, normals, uniforms)
-
-    def _arm(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
-        """Return arms (N, 4), 0 left or 1 right, for the torso of the best state, and ratings."""
-        config, cost = self._config, self._cost
-        arms = self._propose_arms(pool, arm, *draws.for_arms(self.candidates * config.arms))
-        ratings = cost.arms(arms, arm)
-        self._arm_spread[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
-            arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
-        )
-        near = moves.around_best(
-            arms,
-            ratings,
-            _BEST_ARMS,
-            _AGAIN_NOISE * config.arm_noise_rad,
-            ARM_LIMITS,
-            draws.for_near_arms(self.candidates * config.arms_again),
-        )
-        near = self._promising(near, arm)
-        return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)])
-
-    def _promising(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return one of each ``candidates`` arms (N, 4), 0 left or 1 right."""
-        return arms
-
-    def _together(self, states: FloatArray, ratings: FloatArray, draws: Draws) -> None:
+    def _together(
+        self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray, draws: Draws
+    ) -> None:
         """Move all joints of the best together; then choose who survives."""
         config, cost = self._config, self._cost
+        if self._plan.fits_outlines:
+            fitted = self._fitted(frames, states, ratings)
+            states = np.concatenate([states, fitted])
+            ratings = np.concatenate([ratings, cost.bodies(fitted)[0]])
         sigma = config.together_noise * self._sigma
         for number in range(config.rounds):
             if number == 0:
@@ -262,29 +255,42 @@ class WholeBodyFilter:
         self.states, self.ratings = states, ratings
         self._survivors = self._apart(states, ratings)
 
+    def _fitted(
+        self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray
+    ) -> FloatArray:
+        """Return a few states (N, 14) that differ, fitted to all outlines."""
+        cost, outline = self._cost, self.refine.outline
+        kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
+        fitted = [outline.fitted(frames, state, _FIT_STEPS) for state in states[kept]]
+        return np.clip(np.array(fitted), *STATE_LIMITS.T)
+
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
         c, cost = self._config, self._cost
         kept = (c.survivors, c.alike, c.apart_m)
         return states[moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
 
-    def _fit(self) -> Fit:
+    def _fit(self, frames: Sequence[Frame]) -> Fit:
         """Return the smoothed mean of the best states, and how far to believe it."""
-        config, cost, frame = self._config, self._cost, self._frame
+        config, cost, frame = self._config, self._cost, frames[0]
         rated = self.states, self.ratings
         mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
-        fitted = self.refine.outline(frame, self._output)
+        fitted = self.refine.outline(frames, self._output)
         _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
         fit_iou = iou_of(total, areas_px[1], costs_px[1])
         seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
-        evidence = loss.evidence_of(*seen, sum(self._arm_spread) / 4, stddev, mean, self._age)
+        evidence = loss.evidence_of(*seen, sum(self._arm.spreads_m) / 4, stddev, mean, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         search = Search(*rated, config.spread, evidence, self._chance)
         result = self.refine.corrected(frame, fitted, spread, fit_iou, search)
         _, (cost_px,), (area_px,) = cost.bodies(result[None])
         iou = iou_of(total, area_px, cost_px)
+        self._result = result
+        if self._plan.keeps_result:
+            # The last survivor is the worst one.
+            self._survivors[-1] = fitted
         keypoints_m = cost.keypoints(result)
         deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
         return Fit(
@@ -301,3 +307,15 @@ class WholeBodyFilter:
             seen_iou=fit_iou,
             particles=Particles(*rated, mean, config.spread, deviations / spread),
         )
+
+    def ious(self) -> list[float | None]:
+        """See :class:`~.pose_filter.PoseFilter`."""
+        found: list[float | None] = [None] * len(self._cost.costs)
+        if self._output is None or self._result is None:
+            return found
+        for number in self._seeing:
+            cost = self._cost.costs[number]
+            state = self._cost.to_views[number](self._result)
+            _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
+            found[number] = iou_of(cost.silhouette_px, drawn_px, differ_px)
+        return found

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -10,16 +12,40 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import check, setting
 
+# Numbers of states that `effort` scales, and the least that the search needs of each.
+_LEAST_TOTALS = MappingProxyType(
+    {"survivors": 4, "torsos": 2, "arms": 2, "arms_again": 1, "together": 2, "average": 1}
+)
+_LEAST_PARTS = MappingProxyType(
+    {
+        "alike": 1,
+        "torso_explorers": 0,
+        "fresh_torsos": 0,
+        "best_torsos": 1,
+        "arm_mirrors": 0,
+        "arm_tips": 0,
+        "banked_arms": 0,
+        "best_arms": 1,
+        "paired_arms": 1,
+    }
+)
+
 
 @dataclass(frozen=True)
 class WholeBodyConfig:
-    """Numbers of particles, noise, and thresholds; see ``docs/architecture.md`` for the steps.
+    """Numbers of states, noise, and thresholds; see ``docs/architecture.md`` for the steps.
 
     Attributes:
         cost: what is drawn and which postures are usual.
     """
 
     cost: WholeBodyCostConfig = WholeBodyCostConfig()
+    effort: float = setting(
+        1.0,
+        "factor on all numbers of states: time against accuracy",
+        limits=(0.25, 4.0),
+        restarts=True,
+    )
     survivors: int = setting(32, "states kept from frame to frame", limits=(4, 1000), restarts=True)
     alike: int = setting(
         12,
@@ -46,7 +72,7 @@ class WholeBodyConfig:
         limits=(1, 1000),
         restarts=True,
     )
-    arms: int = setting(90, "arms tried on either side", limits=(44, 100_000), restarts=True)
+    arms: int = setting(90, "arms tried on either side", limits=(2, 100_000), restarts=True)
     arm_mirrors: int = setting(
         8, "of these, survivors mirrored in depth", limits=(0, 100_000), restarts=True
     )
@@ -59,8 +85,14 @@ class WholeBodyConfig:
     banked_arms: int = setting(
         20, "of these, those drawn from the learned prior", limits=(0, 100_000), restarts=True
     )
+    best_arms: int = setting(
+        20, "best arms around which others are tried", limits=(1, 100_000), restarts=True
+    )
     arms_again: int = setting(
-        50, "arms tried around the best 20", limits=(1, 100_000), restarts=True
+        50, "arms tried around the best ones", limits=(1, 100_000), restarts=True
+    )
+    paired_arms: int = setting(
+        12, "best arms of either side that are paired", limits=(1, 100_000), restarts=True
     )
     rounds: int = setting(
         2, "rounds in which all joints move together", limits=(0, 100), restarts=True
@@ -137,21 +169,22 @@ class WholeBodyConfig:
         limits=(0, 20),
         restarts=True,
     )
-    learned_correction: bool = setting(
-        True,
-        "whether the learned correction is part of the result",
+    corrector: str = setting(
+        "learned",
+        "corrects the result. learned: the package's network; none: nothing; FILE.npz: a network "
+        "of the same kind; MODULE:FUNCTION: Python code, see docs/extending.md",
         restarts=True,
     )
     learned_deviations: bool = setting(
         True,
-        "whether deviations of the angles are learned ones, where results are corrected; no: those "
-        "of the particles",
+        "deviations of the angles are those that the corrector knows, if it knows any; false: "
+        "those of the particles",
         restarts=True,
     )
     output_smoothing_s: float = setting(
         0.08,
-        "time constant by which corrected results are steadied, and about which they are later; "
-        "0: not at all",
+        "time constant of a low-pass filter on corrected results, which delays them by about as "
+        "much; 0: none",
         unit="s",
         limits=(0.0, 10.0),
         restarts=True,
@@ -188,6 +221,28 @@ class WholeBodyConfig:
         torso = [self.y_noise_m, self.roll_noise_rad, self.pitch_noise_rad, self.yaw_noise_rad]
         return np.array([*torso, *[self.arm_noise_rad] * 8, self.x_noise_m, self.z_noise_m])
 
+    def scaled(self) -> WholeBodyConfig:
+        """Return the settings with ``effort`` times as many states, and an effort of 1.
+
+        Raises:
+            ValueError: a number of states is out of range then; the text names it and ``effort``.
+        """
+        if self.effort == 1.0:
+            return self
+        # Totals are rounded up and parts down, so parts stay within their totals.
+        totals = {
+            name: max(least, math.ceil(self.effort * getattr(self, name)))
+            for name, least in _LEAST_TOTALS.items()
+        }
+        parts = {
+            name: max(least, int(self.effort * getattr(self, name)))
+            for name, least in _LEAST_PARTS.items()
+        }
+        try:
+            return replace(self, effort=1.0, **totals, **parts)
+        except ValueError as error:
+            raise ValueError(f"effort is {self.effort:g}, so {error}") from None
+
     def __post_init__(self) -> None:
         """Check the ranges.
 
@@ -208,3 +263,7 @@ class WholeBodyConfig:
             raise ValueError(f"alike is {self.alike}; expected 1 to {self.survivors}")
         if self.best_torsos > self.torsos:
             raise ValueError(f"best_torsos is {self.best_torsos}; expected 1 to {self.torsos}")
+        for name in ("best_arms", "paired_arms"):
+            if getattr(self, name) > self.arms:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected 1 to {self.arms}")
+        self.scaled()

@@ -26,7 +26,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.estimation.filtering.pose_filter import Sight
+from cardbox_tracker.estimation.filtering.pose_filter import Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.initialization.outline import filled
 from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
@@ -204,8 +204,9 @@ class _Search:
         """Return the best states (n, 14) of a body, best first, and their costs (n,)."""
         silhouette = CompiledSilhouette(body, self._camera)
         search = WholeBodyFilter(self._config, silhouette, self._rng)
-        if search.look(silhouette.frame(self._seen)) is not Sight.PERSON:
+        frames = [silhouette.frame(self._seen)]
+        if search.look(frames) is not Presence.PERSON:
             return np.zeros((1, 14)), np.array([np.inf])
-        search.follow(())
+        search.follow(frames, [()])
         order = np.argsort(search.ratings, kind="stable")[:_POSTURES]
         return search.states[order], search.ratings[order]

@@ -1,4 +1,4 @@
-"""Joint angles from keypoints: what the 12 joints would be, were the truth a body of ours.
+"""Joint angles of the model from true keypoints.
 
 A limb hangs along -Z of its parent's frame turned by Rx(+-abduction) Ry(-flexion), so its direction
 in that frame is
@@ -56,7 +56,7 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
 def true_postures(session: RecordedSession) -> FloatArray:
     """Return the true postures (n, 12) of a session; ``torso_y`` is 0.
 
-    Where the torso's angles are not known they are taken for 0, and no angle of the arms is right.
+    Unknown angles of the torso are taken for 0, which makes the angles of the arms wrong.
     """
     postures = np.zeros((len(session.stamps_ns), 12))
     pitch_rad = float(np.radians(session.truth.pitch_deg))

@@ -12,11 +12,11 @@ from typing import Any
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.precompile import compile_all
-from cardbox_tracker.evaluation.paper.results import provenance, write_json
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, recovery_of, track_session
+from cardbox_tracker.evaluation.results import provenance, write_json
 from cardbox_tracker.files import atomic_path
 
 
@@ -41,13 +41,13 @@ def evaluate_sessions(
         progress: told the finished fraction.
 
     Returns:
-        What ``sessions.json`` holds.
+        The contents of ``sessions.json``.
 
     Raises:
         CardboxError: a folder is no session, or the results cannot be written.
     """
     for folder in folders:
-        load_session(folder)  # what is wrong shows before the work begins
+        load_session(folder)  # report errors before the work begins
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -101,8 +101,8 @@ def evaluate_session(
 ) -> dict[str, Any]:
     """Return the figures of one session: of each run, and MediaPipe's beside them.
 
-    Of several cameras all track, or the one that ``only`` names, without MediaPipe's figures. With
-    ``recovery`` the first seed's run also has how often it recovered from disturbances.
+    All cameras of the session track, or the one that ``only`` names, without MediaPipe's figures.
+    With ``recovery`` the first seed's run also counts the recoveries from disturbances.
     """
     session = load_session(folder)
     config = PRESETS[preset]()

@@ -24,7 +24,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
-from cardbox_tracker.recordings.silhouettes import Frame
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Recovery:
 
 def measure_recovery(
     session: RecordedSession,
-    frames: list[Frame],
+    frames: list[RecordedFrame],
     body: BodyModel,
     camera: Camera,
     config: TrackerConfig,
@@ -102,14 +102,14 @@ def measure_recovery(
     return result
 
 
-def _beginnings(frames: list[Frame]) -> list[float]:
+def _beginnings(frames: list[RecordedFrame]) -> list[float]:
     first, last = frames[0].time_s + _FIRST_S, frames[-1].time_s - PERIOD_S / 2
     return np.arange(first, max(last, first), PERIOD_S).tolist()
 
 
 def _disturbed(
-    frames: list[Frame], kind: str | None, truth: dict[int, FloatArray], camera: Camera
-) -> Iterator[tuple[Frame, Silhouette]]:
+    frames: list[RecordedFrame], kind: str | None, truth: dict[int, FloatArray], camera: Camera
+) -> Iterator[tuple[RecordedFrame, Silhouette]]:
     """Yield the frames that come, with what is seen of the person in each."""
     beginnings = _beginnings(frames) if kind is not None else []
     for frame in frames:
@@ -130,7 +130,7 @@ def _disturbed(
 
 
 def _without_forearm(
-    frame: Frame, truth: dict[int, FloatArray], camera: Camera, arm: int
+    frame: RecordedFrame, truth: dict[int, FloatArray], camera: Camera, arm: int
 ) -> Silhouette:
     """Return the silhouette without the left (0) or right (1) forearm and hand."""
     if frame.stamp_ns not in truth:

@@ -1,4 +1,4 @@
-"""``sessions.md``: what the tracker does on recorded sessions, in tables."""
+"""``sessions.md``: results of the tracker on recorded sessions, in tables."""
 
 from __future__ import annotations
 
@@ -129,9 +129,8 @@ def _steadiness(results: Results) -> list[str]:
         "",
         "Coverage: in how many images the true angle of a joint lies within two of its standard "
         "deviations; mean, least and most over the 11 angles. The acceleration error is that of "
-        "the joints' places, and of their places beside the middle of the shoulders: MediaPipe "
-        "Pose has no others, and `python -m tools.mediapipe_jitter` prints its. MediaPipe's time "
-        "is that of another run, so it compares roughly; `cardbox benchmark` compares in one run.",
+        "the joints' places, and of their places beside the middle of the shoulders. MediaPipe's "
+        "time is that of another run; `cardbox benchmark` compares in one run.",
         "",
         *_table(results, columns, "{:.1f}"),
     ]
@@ -173,7 +172,7 @@ def _deviations(results: Results, columns: Mapping[str, Callable[[Results], floa
 
 
 def _recovery(results: Results) -> list[str]:
-    """How often each kind of disturbance was recovered from; empty where it was not measured."""
+    """Recoveries from each kind of disturbance; empty where they were not measured."""
     kinds = dict.fromkeys(
         kind for s in results["sessions"] for run in s["runs"] for kind in run.get("recovery", {})
     )

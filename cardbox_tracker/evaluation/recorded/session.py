@@ -67,7 +67,7 @@ def load_session(folder: str | os.PathLike[str]) -> RecordedSession:
     """Read the ground truth of a session.
 
     Raises:
-        CardboxError: the folder is no such session; the text says what is missing.
+        CardboxError: the folder is no such session; the text names the missing part.
     """
     path = Path(folder)
     truth = load_ground_truth(path / "ground_truth.json")

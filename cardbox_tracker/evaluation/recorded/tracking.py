@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.depth import Depth
-from cardbox_tracker.estimation.cost.terms import DepthImage, Image
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
-from cardbox_tracker.recordings.cameras import STEREO, CameraSources, open_recording
 from cardbox_tracker.recordings.initialize import initialize_from_recording
+from cardbox_tracker.recordings.recording import STEREO, open_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 
 FloatArray = NDArray[np.float64]
@@ -43,7 +41,7 @@ class SessionRun:
         keypoints_m: (n, 6, 3), metres in the optical frame; nan where there is none.
         postures: (n, 12), rad and metres; nan where there is none.
         stddevs: standard deviations, (n, 12).
-        milliseconds: of each tracked image from silhouette to posture, (m,).
+        milliseconds: processor time of each tracked image from silhouette to posture, (m,).
     """
 
     body: BodyModel | None
@@ -80,21 +78,20 @@ def track_session(
     depth = None
     if only == WITH_DEPTH:
         depth, only = session.truth.depth_topic or STEREO, None
-        config = replace(config, terms=(*config.terms, Depth()))
+        config = config.with_depth()
     cameras, empty = session.truth.cameras, session.spans["empty"]
     if only is not None and only not in cameras:
         raise CardboxError(
             f"{session.name} has no camera {only}; expected one of {', '.join(cameras)}"
         )
     with open_recording(session.bag, empty, cameras, session.extrinsics, depth) as source:
-        others = source.others if isinstance(source, CameraSources) else ()
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
         bodies = [
             _measure(session, source.first, seed) if body is None else (body, "") for seed in seeds
         ]
         trackers = [
-            Tracker(tracked, camera, config, np.random.default_rng(seed), others=others)
+            Tracker(tracked, camera, config, np.random.default_rng(seed), others=source.others)
             if tracked
             else None
             for (tracked, _), seed in zip(bodies, seeds, strict=True)
@@ -102,47 +99,32 @@ def track_session(
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
         started_ns: int | None = None
-        for stamp_ns, silhouettes, images, depth_m in _seen(
-            source, session.start_s + offset_s, only
-        ):
-            if not has_images:
-                images = [None for _ in images]
+        for taken in source.frames(session.start_s + offset_s):
+            stamp_ns = taken.stamp_ns
             started_ns = stamp_ns if started_ns is None else started_ns
-            if covered and (number := covered((stamp_ns - started_ns) / 1e9)) is not None:
-                silhouettes[number] = images[number] = None
+            dark = covered((stamp_ns - started_ns) / 1e9) if covered else None
+            seen = [
+                replace(
+                    one,
+                    silhouette=one.silhouette if only in (None, name) and number != dark else None,
+                    image=one.image if has_images else None,
+                )
+                for number, (name, one) in enumerate(
+                    zip(source.names, taken.observations, strict=True)
+                )
+            ]
             for seed, tracker, estimates, spent in zip(seeds, trackers, found, times, strict=True):
                 if tracker is None:
                     continue
-                start = time.perf_counter()
-                estimates[stamp_ns] = tracker.track_views(silhouettes, images, depth_m, stamp_ns)
-                spent.append(1e3 * (time.perf_counter() - start))
+                start = time.process_time()
+                estimates[stamp_ns] = tracker.track(seen)
+                spent.append(1e3 * (time.process_time() - start))
                 if observe is not None:
                     observe(seed, stamp_ns, estimates[stamp_ns], tracker)
     return [
         _run(session, tracked, failure, estimates, spent)
         for (tracked, failure), estimates, spent in zip(bodies, found, times, strict=True)
     ]
-
-
-def _seen(
-    source: SilhouetteSource | CameraSources, start_s: float, only: str | None
-) -> Iterator[tuple[int, list[Image | None], list[Image | None], DepthImage | None]]:
-    """Yield stamp, silhouettes, images and depth of all cameras, or of one alone."""
-    if isinstance(source, SilhouetteSource):
-        for frame in source.frames(start_s):
-            yield frame.stamp_ns, [frame.silhouette], [frame.image], None
-        return
-    for taken in source.frames(start_s):
-        frames = [
-            frame if only in (None, name) else None
-            for name, frame in zip(source.cameras, taken.frames, strict=True)
-        ]
-        yield (
-            taken.stamp_ns,
-            [frame and frame.silhouette for frame in frames],
-            [frame and frame.image for frame in frames],
-            taken.depth_m,
-        )
 
 
 def recovery_of(

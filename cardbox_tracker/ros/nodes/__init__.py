@@ -1,4 +1,4 @@
-"""The nodes, one module each; ``single_process`` is all of them in one.
+"""The nodes, one module each: it converts, calls the core and publishes.
 
-A node converts, calls the core and publishes, in 200 lines or fewer.
+``single_process`` is all of them in one process.
 """

@@ -3,31 +3,111 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import BackgroundFileError, CameraError
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.background_advice import Findings, advice
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
-from cardbox_tracker.ros.nodes.node_parameters import BackgroundParameters
-from cardbox_tracker.ros.nodes.silhouette_output import SilhouetteOutput
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    image_transport_parameter,
+    max_megapixels_parameter,
+)
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
-from cardbox_tracker.vision.background import warm_up
+from cardbox_tracker.settings import settings_of
+from cardbox_tracker.vision.background import BackgroundConfig, warm_up
+from cardbox_tracker.vision.background_advice import Findings, advice
 from cardbox_tracker.vision.background_file import background_path
 from cardbox_tracker.vision.calibration_watch import CalibrationWatch
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M
 from cardbox_tracker.vision.kept_background import KeptBackground
 from cardbox_tracker.vision.learning import WAYS
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 _DOES = "Cut the person out of a camera's images: images in, silhouettes out."
+_NEXT_LEARNING = "next learning"
+
+
+@dataclass(frozen=True)
+class BackgroundParameters(NodeParameters):
+    """Cut the person out of the camera's images."""
+
+    image_transport: str = image_transport_parameter()
+    width: int = parameter(
+        320, "working resolution, width", unit="px", limits=(32, 4096), read_only=True
+    )
+    height: int = parameter(
+        240, "working resolution, height", unit="px", limits=(32, 4096), read_only=True
+    )
+    background_file: str = parameter(
+        "",
+        "file to keep the learned background in; if it exists at the start and fits the camera and "
+        "what it shows, nothing has to be learned, although somebody stands there; empty: none",
+        read_only=True,
+    )
+    within_m: float = parameter(
+        0.0,
+        "with depth images: pixels nearer than this are the person, and nothing has to be "
+        "learned; choose it between the person and the wall; 0: learn the empty scene",
+        unit="m",
+        limits=(0.0, WITHIN_LIMITS_M[1]),
+    )
+    depth: str = parameter(
+        "",
+        "topic of these depth images (16UC1, 32FC1 or compressedDepth) from where the camera is, "
+        "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
+        read_only=True,
+    )
+    learning: str = parameter(
+        next(iter(WAYS)),
+        "still: learn the empty scene once nothing moves in it; person_in_view: learn around a "
+        "person, and the rest when they step aside; always: learn from the first images, whatever "
+        "moves",
+        choices=tuple(WAYS),
+        effect=_NEXT_LEARNING,
+    )
+    max_megapixels: float = max_megapixels_parameter()
+    learn_images: int = shared(BackgroundConfig, "learn_images", effect=_NEXT_LEARNING)
+    threshold: float = shared(BackgroundConfig, "threshold")
+    min_stddev: float = shared(BackgroundConfig, "min_stddev")
+    clean_up: bool = shared(BackgroundConfig, "clean_up")
+    smoothing_px: float = shared(BackgroundConfig, "smoothing_px")
+    min_contrast: float = shared(BackgroundConfig, "min_contrast")
+    shadow: float = shared(BackgroundConfig, "shadow")
+    soft_shadow: float = shared(BackgroundConfig, "soft_shadow")
+    darkest_shadow: float = shared(BackgroundConfig, "darkest_shadow")
+    color: bool = shared(BackgroundConfig, "color")
+    min_color_contrast: float = shared(BackgroundConfig, "min_color_contrast")
+    color_edge: float = shared(BackgroundConfig, "color_edge")
+    edge: float = shared(BackgroundConfig, "edge")
+    flicker: float = shared(BackgroundConfig, "flicker")
+    follow: bool = shared(BackgroundConfig, "follow")
+    min_area: float = shared(BackgroundConfig, "min_area")
+    max_hole: float = shared(BackgroundConfig, "max_hole")
+    absorb_after: int = shared(BackgroundConfig, "absorb_after")
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        if self.within_m > 0.0 and not self.depth:
+            raise ValueError(
+                f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
+                "depth images, or within_m to 0"
+            )
+
+    def config(self) -> BackgroundConfig:
+        """Return the settings of the core."""
+        names = settings_of(BackgroundConfig)
+        return BackgroundConfig(**{name: getattr(self, name) for name in names})
 
 
 class BackgroundNode(CardboxNode):
@@ -45,7 +125,10 @@ class BackgroundNode(CardboxNode):
         self._image: conversions.ImageArray | None = None
         self._image_bytes = 0
         self._info: CameraInfo | None = None
-        self._output = SilhouetteOutput(self)
+        self._covered = 0.0
+        self._silhouettes = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
+        self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
+        self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
         compressed = settings.image_transport == "compressed"
@@ -123,13 +206,13 @@ class BackgroundNode(CardboxNode):
         self._image = image = pipeline.prepare(full)
         within_m = self.parameters.value.within_m
         if self._cut is not None and within_m > 0.0:
-            self._output.show(message.header, image)
+            self._send_image(message.header, image)
             self._cut.add(message.header, pipeline.camera, within_m, sent_ns)
             return
         if not pipeline.is_ready:
             self._prepare(message.header, pipeline, image)
         if pipeline.is_ready:
-            self._output.show(message.header, image)
+            self._send_image(message.header, image)
             silhouette = pipeline.silhouette(image, conversions.stamp_ns(message.header.stamp))
             self._send(message.header, silhouette, pipeline.camera, sent_ns)
 
@@ -155,16 +238,24 @@ class BackgroundNode(CardboxNode):
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
         self.get_logger().info(done)
 
+    def _send_image(self, header: Header, image: conversions.ImageArray) -> None:
+        """Publish an image, ahead of its silhouette, which the tracker pairs with it."""
+        if self._images.get_subscription_count():
+            self._images.publish(conversions.image_message(header, image))
+
     def _send(
         self, header: Header, silhouette: conversions.ImageArray, camera: Camera, sent_ns: int
     ) -> None:
-        self._output.send(header, silhouette, camera, self._info)
+        """Publish a silhouette (H, W), 0 or 255, and then its calibration, which rarely changes."""
+        self._silhouettes.publish(conversions.image_message(header, silhouette, "mono8"))
+        self._infos.publish(conversions.camera_info_message(header, camera, self._info))
+        self._covered = np.count_nonzero(silhouette) / silhouette.size
         self.diagnostics.working(sent_ns)
 
     def _values(self) -> dict[str, str]:
         values = {
             "background learned from": f"0/{self.parameters.value.learn_images}",
-            "foreground (% of the image)": f"{100 * self._output.covered:.1f}",
+            "foreground (% of the image)": f"{100 * self._covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
             "ignored CameraInfo": str(self._watch.ignored),
         }
@@ -185,7 +276,7 @@ class BackgroundNode(CardboxNode):
             self._image_bytes,
             self._drift(),
             settings.follow and settings.clean_up,
-            self._output.covered,
+            self._covered,
             settings.within_m,
         )
         return advice(findings) | self._single.remarks() | ({"": remark} if remark else {})

@@ -10,26 +10,30 @@ call ``initializer/capture_front``, and resume. The exit code is 0 at the end of
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import yaml
 from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
-from cardbox_tracker.errors import BagError
+from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes
-from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
-from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _PROGRESS_S = 5.0
 # The nodes of a second camera may start so much later.
@@ -37,6 +41,55 @@ _OTHER_CAMERAS_S = 3.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Recorded once, when they were published; a late subscriber needs them too.
 _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
+
+
+@dataclass(frozen=True)
+class PlayBagParameters(NodeParameters):
+    """Play a recording."""
+
+    bag: str = parameter("", "rosbag2 folder or .mcap file to play", read_only=True)
+    rate: float = parameter(
+        1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0), effect="at once"
+    )
+    loop: bool = parameter(
+        False, "play again and again; the stamps start over too", effect="end of the bag"
+    )
+    topics: list[str] = parameter([], "topics to play; all if empty", read_only=True)
+    start_s: float = parameter(
+        0.0,
+        "play from this time on, from the bag's start",
+        unit="s",
+        limits=(0.0, 1e6),
+        read_only=True,
+    )
+    duration_s: float = parameter(
+        0.0, "play this long; 0: to the end of the bag", unit="s", limits=(0.0, 1e6), read_only=True
+    )
+    pause_at: list[float] = parameter(
+        [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
+    )
+    wait_for_subscribers: bool = parameter(
+        True, "begin when somebody subscribes to a played image topic", read_only=True
+    )
+    wait_for_topics: list[str] = parameter(
+        [],
+        "begin when somebody publishes these topics, such as keypoints: at its very first start "
+        "the tracker compiles for half a minute",
+        read_only=True,
+    )
+    delay_s: float = parameter(
+        0.5,
+        "the first message is sent when no subscriber has come or gone for this time, so that "
+        "none misses the beginning; for 3 s while images of a further camera have none",
+        unit="s",
+        limits=(0.0, 600.0),
+        read_only=True,
+    )
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        if not self.bag:
+            raise ValueError("no bag is given; run 'play_bag BAG' or set the parameter 'bag'")
 
 
 class PlayBagNode(CardboxNode):
@@ -56,7 +109,7 @@ class PlayBagNode(CardboxNode):
         self._position_s = settings.start_s
         self._paused = False
         self._anchor = (0.0, 0.0)
-        self._executor = make_executor(self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
         self._status = self.advertise(String, "~/status", qos.LATCHED)
         self.offer("~/pause", self._pause)
@@ -187,6 +240,56 @@ class PlayBagNode(CardboxNode):
     def close(self) -> None:
         """Close the bag."""
         self._resources.close()
+
+
+def overrides_from(arguments: list[str]) -> list[Parameter]:
+    """Turn the command line (without ROS arguments) into values of the node's parameters.
+
+    Raises:
+        SystemExit: it is wrong, or asks for something to be printed.
+    """
+    parser = argparse.ArgumentParser(
+        prog="play_bag",
+        description="Play a rosbag2 recording (sqlite3 or mcap) with its original stamps.",
+        epilog="Every option is also a parameter: play_bag --ros-args -p bag:=BAG. Topics are "
+        "renamed with --ros-args -r /old:=/new.",
+    )
+    parser.add_argument("bag", nargs="?", help="rosbag2 folder or file")
+    parser.add_argument("--rate", type=float, help="speed, 1 by default")
+    parser.add_argument("--loop", action="store_true", default=None, help="play again and again")
+    parser.add_argument("--topics", nargs="+", help="play only these")
+    parser.add_argument("--start", dest="start_s", type=float, metavar="S", help="begin at S")
+    parser.add_argument("--duration", dest="duration_s", type=float, metavar="S", help="play S s")
+    parser.add_argument("--delay", dest="delay_s", type=float, metavar="S", help="wait S s first")
+    parser.add_argument("--pause-at", nargs="+", type=float, metavar="S", help="pause at S")
+    parser.add_argument(
+        "--no-wait",
+        dest="wait_for_subscribers",
+        action="store_false",
+        default=None,
+        help="do not wait for a subscriber",
+    )
+    parser.add_argument(
+        "--find-topics",
+        nargs="+",
+        choices=("image", "camera_info"),
+        help="print the names of these topics of the bag as YAML, and exit",
+    )
+    parser.add_argument(
+        "--below",
+        action="append",
+        metavar="NAMESPACE",
+        help="with --find-topics: of the camera below it; several times for several cameras",
+    )
+    given = vars(parser.parse_args(arguments))
+    wanted, cameras = given.pop("find_topics"), given.pop("below") or []
+    if wanted:
+        try:
+            print(yaml.safe_dump(find_topics(given["bag"] or "", wanted, cameras)), end="")
+        except CardboxError as error:
+            parser.exit(1, f"{error}\n")
+        parser.exit()
+    return [Parameter(name, value=value) for name, value in given.items() if value is not None]
 
 
 def main(args: list[str] | None = None) -> int:

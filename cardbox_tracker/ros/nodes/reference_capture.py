@@ -68,7 +68,7 @@ class ReferenceCapture:
         """Keep a silhouette as the latest one.
 
         Raises:
-            EncodingError: it is none.
+            EncodingError: it is no silhouette.
         """
         silhouette_of(message)
         self._recent.append(message)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from builtin_interfaces.msg import Duration
@@ -16,18 +17,60 @@ from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.files import user_path
+from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.retargeter import Command
 from cardbox_tracker.retargeting.setup import make_retargeter
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.results import posture_of
-from cardbox_tracker.ros.nodes.use_parameters import RetargetParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.settings import settings_of
 
 _DOES = "Move a robot arm as the tracked person moves theirs, within its limits."
 _CHECK_S = 0.1
+
+
+def _fixed(name: str) -> Any:
+    """Return a setting of the retargeting, which stays as it is while a robot moves."""
+    return shared(RetargetConfig, name, read_only=True)
+
+
+@dataclass(frozen=True)
+class RetargetParameters(NodeParameters):
+    """Move a robot arm as the tracked person moves theirs."""
+
+    robot_file: str = parameter("", "URDF of the robot; has to be given", read_only=True)
+    joint_map_file: str = parameter(
+        "",
+        "which joint moves which, as in config/example_joint_map.yaml; empty: the robot's hand "
+        "follows the person's by inverse kinematics",
+        read_only=True,
+    )
+    hand_link: str = parameter(
+        "", "the robot's hand; empty: the link with the most joints before it", read_only=True
+    )
+    timeout_s: float = parameter(
+        0.5,
+        "dead-man: without a posture for so long the robot stands still",
+        unit="s",
+        limits=(0.05, 10.0),
+        read_only=True,
+    )
+    side: str = _fixed("side")
+    max_speed: float = _fixed("max_speed")
+    max_stddev_rad: float = _fixed("max_stddev_rad")
+    longest_step_s: float = _fixed("longest_step_s")
+    reach: float = _fixed("reach")
+    mount_roll_deg: float = _fixed("mount_roll_deg")
+    mount_pitch_deg: float = _fixed("mount_pitch_deg")
+    mount_yaw_deg: float = _fixed("mount_yaw_deg")
+
+    def config(self) -> RetargetConfig:
+        """Return the settings of the core."""
+        return RetargetConfig(**{name: getattr(self, name) for name in settings_of(RetargetConfig)})
 
 
 class RetargetNode(CardboxNode):

@@ -21,7 +21,7 @@ from cardbox_tracker.estimation.initialization.scale import (
 from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_distance import DepthDistance
-from cardbox_tracker.ros.nodes.node_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import (
     KEPT,
     ONE_POSTURE_NS,

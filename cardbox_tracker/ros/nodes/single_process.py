@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.utilities import try_shutdown
 
 from cardbox_tracker.errors import CardboxError
@@ -30,7 +30,6 @@ from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _STOP_S = 5.0
 SOURCES = ("camera", "play_bag")
@@ -65,7 +64,7 @@ class AllNodes:
 
     def work(self) -> None:
         """Serve all nodes until they are told to stop."""
-        executor = make_executor()
+        executor = SingleThreadedExecutor()
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:

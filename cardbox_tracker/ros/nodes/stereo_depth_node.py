@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,21 +11,48 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.input_parameters import StereoDepthParameters
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    image_transport_parameter,
+    max_megapixels_parameter,
+)
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.extrinsics_sources import of_rectified_pair
 from cardbox_tracker.vision.resize import to_working_size
-from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
+from cardbox_tracker.vision.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 
 _DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
 # Images of either side that wait for one of the other.
 _KEPT = 4
+
+
+@dataclass(frozen=True)
+class StereoDepthParameters(NodeParameters):
+    """Measure depth in a rectified pair of cameras."""
+
+    image_transport: str = image_transport_parameter()
+    width: int = parameter(
+        320, "width at which depth is measured", unit="px", limits=(32, 4096), read_only=True
+    )
+    nearest_m: float = parameter(
+        NEAREST_M,
+        "nearer things are not found; the time grows with what this costs",
+        unit="m",
+        limits=(0.1, 20.0),
+    )
+    tolerance_s: float = parameter(
+        0.005,
+        "a left and a right image whose stamps differ by no more are a pair",
+        unit="s",
+        limits=(0.0, 1.0),
+    )
+    max_megapixels: float = max_megapixels_parameter()
 
 
 class _Pair(NamedTuple):

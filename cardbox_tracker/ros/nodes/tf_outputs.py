@@ -1,4 +1,4 @@
-"""What the tracker publishes on ``/tf``, for those without robot_state_publisher.
+"""The tracker's output on ``/tf``, in place of robot_state_publisher.
 
 The message is one of the package tf2_msgs, which may be missing: ROS has it, PyPI has not.
 """

@@ -7,36 +7,34 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import String
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model, loads_body_model
 from cardbox_tracker.errors import CameraError
+from cardbox_tracker.estimation.agreement_watch import AgreementWatch
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.nodes.camera_views import Seen
-from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
-from cardbox_tracker.ros.nodes.several_cameras import SeveralCameras
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.nodes.tracker_report import TrackerReport
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.stream import Step
 from cardbox_tracker.settings import restarts
+from cardbox_tracker.tracking_report import TrackingReport
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.stamps import StampOrder
 
 _DOES = "Follow the measured person: silhouettes in, joint states out."
 
 
 class TrackerNode(CardboxNode):
-    """Follows one measured person from silhouette to silhouette."""
+    """Follows one measured person from silhouette to silhouette, with one camera or several."""
 
     def __init__(self, **options: Any) -> None:
         """Subscribe to silhouettes and wait for a body model."""
@@ -47,56 +45,22 @@ class TrackerNode(CardboxNode):
         compile_all()
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
-        self._tracker: Tracker | None = None
         self._others: Sequence[OtherCamera] = ()
-        self._several: SeveralCameras | None = None
+        self._tracker: Tracker | None = None
+        self._report = TrackingReport()
 
-        self._outputs = TrackerOutputs(self, self.parameters.value)
+        settings = self.parameters.value
+        self._outputs = TrackerOutputs(self, settings)
         self._model_topic = self.resolve("body_model")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
-        self._pairing: ImagePairing | SeveralCameras
-        settings = self.parameters.value
-        if settings.cameras or settings.depth:
-            several = SeveralCameras(self, settings, self._on_cameras, self._on_views)
-            self._pairing = self._several = several
-            self._silhouette_topic, self._info_topic = several.source, several.missing
-        else:
-            info = "silhouette/camera_info"
-            self._silhouette_topic, self._info_topic = map(self.resolve, ("silhouette", info))
-            self.subscribe(CameraInfo, info, self._on_info, qos.SILHOUETTE_INPUT)
-            self._pairing = pairing = ImagePairing(self._on_silhouette)
-            if settings.use_image:
-                image = "silhouette/image"
-                self.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
-            self.subscribe(Image, "silhouette", pairing.add_silhouette, qos.SILHOUETTE_INPUT)
+        self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
+        self._agreement = AgreementWatch([name.strip("/") for name in settings.cameras])
         self.offer("~/reset", self._reset)
-        self.diagnostics.source = f"silhouettes on {self._silhouette_topic}"
-        self._report = TrackerReport(self, self._several)
-        if self.parameters.value.model_file:
-            self._use(load_body_model(user_path(self.parameters.value.model_file)))
+        self.diagnostics.source = f"silhouettes on {self._inputs.source}"
+        self.diagnostics.extra = self._values
+        if settings.model_file:
+            self._use(load_body_model(user_path(settings.model_file)))
         self._wait()
-
-    def _wait(self) -> None:
-        if self._body is None:
-            self.diagnostics.wait_for(
-                f"a body model on {self._model_topic} (call initializer/initialize, or give "
-                "model_file)"
-            )
-        elif self._camera is None:
-            info_topic = self._info_topic if self._several is None else self._several.missing
-            self.diagnostics.wait_for(
-                f"silhouettes on {self._silhouette_topic} and their CameraInfo on "
-                f"{info_topic} (is the background node running, and has it learned?)"
-            )
-
-    def _changed(self, settings: TrackerParameters) -> None:
-        if self._tracker is None:
-            return
-        config = settings.config()
-        if restarts(self._tracker.config, config):
-            self._build("other settings of the particles")
-        else:
-            self._tracker.configure(config)
 
     def _on_model(self, message: String, _: int) -> None:
         body = loads_body_model(message.data, source=self._model_topic)
@@ -105,25 +69,32 @@ class TrackerNode(CardboxNode):
 
     def _use(self, body: BodyModel) -> None:
         self._body = body
-        self._pairing.waits = body.appearance is not None or bool(body.unknown)
+        self._inputs.wait_for_images(body.appearance is not None or bool(body.unknown))
         if body.doubt:
             self.get_logger().warning(body.doubt)
         self._build("new body model")
         self._wait()
 
-    def _on_info(self, message: CameraInfo, _: int) -> None:
-        camera = conversions.camera_of(message)
-        if camera != self._camera:
-            self._camera = camera
-            self._build("new camera")
-
     def _on_cameras(self, first: Camera | None, others: Sequence[OtherCamera]) -> None:
+        """Take the cameras, when all are known or one is another than before."""
+        if not (others or self._others) and first == self._camera:
+            return
         self._camera, self._others = first, others
         self._tracker = None
-        self._build("new cameras")
+        self._build("new cameras" if others else "new camera")
+
+    def _changed(self, settings: TrackerParameters) -> None:
+        """Take parameters that were set."""
+        if self._tracker is None:
+            return
+        config = settings.config()
+        if restarts(self._tracker.config, config):
+            self._build("other settings of the particles")
+        else:
+            self._tracker.configure(config)
 
     def _build(self, reason: str) -> None:
-        """Set the tracker up for the body, the camera and the parameters of now.
+        """Set the tracker up for the body, the cameras and the parameters of now.
 
         The same seed and images then give the same results, also after a reset.
         """
@@ -138,57 +109,58 @@ class TrackerNode(CardboxNode):
         self.diagnostics.say(reason, f"{reason}: tracking starts from the front reference posture")
 
     def _reset(self) -> str:
+        """Answer the service ``reset``."""
         if self._tracker is None:
-            missing = self._model_topic if self._body is None else self._info_topic
+            missing = self._model_topic if self._body is None else self._inputs.missing
             raise CameraError(
                 f"nothing to reset: the tracker has not started, it waits for {missing}"
             )
         self._build("reset")
         return "tracking starts again from the front reference posture"
 
-    def _is_next(self, message: Image) -> bool:
-        """Return whether a silhouette can be used; one of a time before starts tracking anew."""
-        self._now_ns = conversions.stamp_ns(message.header.stamp)
-        step = self.diagnostics.input.add(self._now_ns)
-        if step is Step.RESTART:
-            self._build("an image is older than the one before (a bag that loops?)")
-        return step.is_usable
-
-    def _on_silhouette(self, message: Image, seen: Image | None, sent_ns: int) -> None:
-        if not self._is_next(message):
-            return
-        if self._tracker is None or self._body is None or self._camera is None:
-            self._wait()
-            self._outputs.waiting(message, seen, "no body model yet: call initializer/initialize")
-            return
-        height, width = (silhouette := conversions.silhouette_of(message)).shape
-        if (width, height) != (self._camera.width, self._camera.height):
-            raise CameraError(
-                f"the silhouette is {width}x{height} but {self._info_topic} describes "
-                f"{self._camera.width}x{self._camera.height}; expected the same size"
+    def _wait(self) -> None:
+        """Say what is missing, if anything is."""
+        if self._body is None:
+            self.diagnostics.wait_for(
+                f"a body model on {self._model_topic} (call initializer/initialize, or give "
+                "model_file)"
             )
-        image = conversions.image_behind(silhouette, seen)
-        estimate = self._tracker.track(silhouette, image, self._now_ns)
-        picture = silhouette if image is None else image
-        self._outputs.publish(message.header, estimate, picture, self._tracker)
-        self._report.add(estimate, self._tracker.body)
-        self.diagnostics.working(sent_ns)
+        elif self._camera is None:
+            self.diagnostics.wait_for(
+                f"silhouettes on {self._inputs.source} and their CameraInfo on "
+                f"{self._inputs.missing} (is the background node running, and has it learned?)"
+            )
 
-    def _on_views(self, lead: Image, seen: Sequence[Seen | None]) -> None:
-        assert self._several is not None
-        if not self._is_next(lead):
+    def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
+        """Track what all cameras show at one time; ``lead`` has the stamp that stands for all."""
+        step = self.diagnostics.input.add(conversions.stamp_ns(lead.message.header.stamp))
+        if step is StampOrder.RESTART:
+            self._build("an image is older than the one before (a bag that loops?)")
+        if not step.is_usable:
             return
         if self._tracker is None:
-            self._several.check()
+            self._inputs.check()
             self._wait()
-            self._outputs.waiting(lead, None, "no body model yet: call initializer/initialize")
+            text = "no body model yet: call initializer/initialize"
+            self._outputs.waiting(lead.message, lead.image, text)
             return
-        views = self._several.views(seen)
-        estimate = self._tracker.track_views(*views.seen, self._now_ns)
-        self._outputs.publish(views.header, estimate, views.picture, self._tracker)
-        self._report.add(estimate, self._tracker.body)
-        self._several.done(views, estimate, self._tracker)
-        self.diagnostics.working(views.sent_ns)
+        seen = self._inputs.observed(received)
+        estimate = self._tracker.track(seen.observations)
+        self._outputs.publish(seen, estimate, self._tracker)
+        for kind, text in self._report.add(estimate, self._tracker.body).items():
+            self.diagnostics.say(kind, text)
+        self._agreement.see(self._tracker.agreement)
+        self.diagnostics.advice = self._warnings
+        self.diagnostics.working(seen.sent_ns)
+
+    def _warnings(self) -> dict[str, str]:
+        """Return what is wrong, for the diagnostics."""
+        return self._inputs.warnings() | self._agreement.warnings() | self._report.warnings()
+
+    def _values(self) -> dict[str, str]:
+        """Return the values of the diagnostics."""
+        ious = [] if self._tracker is None else self._tracker.camera_ious()
+        return self._report.values(self._inputs.values(ious) | self._agreement.values())
 
 
 def main(args: list[str] | None = None) -> int:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from sensor_msgs.msg import Image
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool
 
-from cardbox_tracker.drawing.overlay import draw_message, draw_overlay
+from cardbox_tracker.drawing.camera_overlay import draw_camera_overlay
+from cardbox_tracker.drawing.overlay import draw_message
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import Output, OutputStream, outputs
 from cardbox_tracker.ros.messages import conversions, results
+from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.rep155_outputs import Rep155Outputs
 from cardbox_tracker.ros.nodes.tf_outputs import TfOutputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -37,6 +39,10 @@ class TrackerOutputs:
         }
         self._stream = OutputStream(topics)
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)
+        self._camera_overlays = [
+            node.advertise(Image, f"{camera.rstrip('/')}/overlay", qos.SENSOR_DATA)
+            for camera in settings.cameras
+        ]
         self._human = Rep155Outputs(node, settings) if settings.rep155_id else None
         self._tf = TfOutputs(node, settings) if settings.publish_tf else None
         self._guided = False
@@ -45,17 +51,9 @@ class TrackerOutputs:
     def _on_guiding(self, message: Bool, _: int) -> None:
         self._guided = message.data
 
-    def publish(
-        self,
-        header: Header,
-        estimate: Estimate,
-        picture: conversions.ImageArray,
-        tracker: Tracker,
-    ) -> None:
-        """Publish the outputs of an image; without a posture, no old one under its stamp.
-
-        ``picture`` is what the overlay is drawn on: the camera's image, or else the silhouette.
-        """
+    def publish(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> None:
+        """Publish the outputs of a time; without a posture, no old one under its stamp."""
+        header = seen.header
         for output, value in self._stream.values(estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
@@ -63,8 +61,13 @@ class TrackerOutputs:
         if self._tf is not None:
             self._tf.publish(header, estimate, tracker)
         if _wanted(self._overlay) and not self._guided:
-            image = draw_overlay(picture, tracker.body, tracker.camera, estimate)
+            image = draw_camera_overlay(seen.picture(), 0, estimate, tracker)
             self._overlay.publish(conversions.image_message(header, image, "bgr8"))
+        for number, publisher in enumerate(self._camera_overlays):
+            own = seen.headers[number]
+            if own is not None and _wanted(publisher):
+                image = draw_camera_overlay(seen.picture(number), number, estimate, tracker)
+                publisher.publish(conversions.image_message(own, image, "bgr8"))
 
     def _is_wanted(self, output: Output) -> bool:
         return _wanted(self._publishers[output.topic])

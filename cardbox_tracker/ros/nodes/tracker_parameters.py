@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
-from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
@@ -54,6 +54,10 @@ def _chosen(text: str, preset: bool) -> bool:
 class TrackerParameters(NodeParameters):
     """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
 
+    retired = MappingProxyType(
+        {"refine_sizes": "breadths stay as they were measured; for others measure again"}
+    )
+
     preset: str = parameter(
         "default",
         "paper: its Table I; default: what tracks best",
@@ -87,7 +91,6 @@ class TrackerParameters(NodeParameters):
     select_person: str = shared(
         TrackerConfig, "select_person", default="preset", choices=("preset", "always", "never")
     )
-    refine_sizes: bool = shared(TrackerConfig, "refine_sizes")
     lost_iou: float = shared(TrackerConfig, "lost_iou")
     lost_frames: int = shared(TrackerConfig, "lost_frames")
     seed: int = parameter(0, "seed of the random draws", limits=(0, 2**31 - 1), effect=_NEXT_START)
@@ -139,7 +142,7 @@ class TrackerParameters(NodeParameters):
         """Return the settings of the core; raises ValueError where they do not go together."""
         base = PRESETS[self.preset]()
         if self.depth:
-            base = replace(base, terms=(*base.terms, Depth()))
+            base = base.with_depth()
         if self.particles:
             base = base.with_particles(self.particles)
         return replace(
@@ -151,7 +154,6 @@ class TrackerParameters(NodeParameters):
             average=self.average or base.average,
             relocalize=_chosen(self.relocalize, base.relocalize),
             select_person=_chosen(self.select_person, base.select_person),
-            refine_sizes=self.refine_sizes,
             lost_iou=self.lost_iou,
             lost_frames=self.lost_frames,
         )

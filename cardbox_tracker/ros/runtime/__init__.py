@@ -1,1 +1,1 @@
-"""What all nodes run on: executor, parameters, QoS, diagnostics, processes."""
+"""Infrastructure of the nodes: parameters, QoS, diagnostics, processes."""

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import rclpy
 from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
@@ -17,7 +18,6 @@ from std_srvs.srv import Trigger
 
 from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 
 _FIND_S = 10.0
 _TELL_S = 1.0
@@ -31,8 +31,7 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
 
     Args:
         service: its name, such as ``initializer/initialize``.
-        say: is given what the same node publishes on its topic ``status`` meanwhile, and what is
-            waited for.
+        say: gets each line of the node's topic ``status``, and a line while the service is awaited.
 
     Raises:
         CardboxError: ``service`` is no name, nobody offers it, or it refused; the text says why.
@@ -40,7 +39,7 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
     rclpy.init(args=[])
     try:
         node = rclpy.create_node("cardbox_call", enable_rosout=False)
-        executor = make_executor()
+        executor = SingleThreadedExecutor()
         executor.add_node(node)
         client = _client(node, service)
         begun_s, told = time.monotonic(), False

@@ -1,4 +1,4 @@
-"""The command line of a node that has parameters only: help for a person, no stray words."""
+"""The command line of a node that has parameters only: it prints help and refuses other words."""
 
 from __future__ import annotations
 

@@ -19,20 +19,20 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
-from cardbox_tracker.ros.runtime.stream import WINDOW, StreamStatistics
+from cardbox_tracker.vision.stamps import WINDOW, StreamStatistics
 
 PERIOD_S = 1.0
 # Without input for so long, and for so many periods, it has ceased.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
-# Results whose latency says something.
+# With fewer results the median latency is not judged.
 _ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
 _PLAYED = (
     "play_bag plays a recording, which may be paused; if not, is every node in between running?"
 )
-# Only a node play_bag has it.
+# Only the node play_bag has this topic.
 _PLAYING = "/play_bag/status"
 
 STATUS = "status"
@@ -78,7 +78,7 @@ class NodeDiagnostics:
             DiagnosticArray, "/diagnostics", QoSProfile(depth=10)
         )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD_S, self._tick, clock=steady)
+        self._timer = node.create_timer(PERIOD_S, self.publish, clock=steady)
 
     def wait_for(self, text: str) -> None:
         """Report that the node publishes nothing until ``text`` arrives."""
@@ -93,7 +93,7 @@ class NodeDiagnostics:
             self._node.get_logger().error(text)
 
     def say(self, kind: str, text: str, *, warning: bool = False) -> None:
-        """Log what anybody can cause as often as they like."""
+        """Log an event that other programs can cause at any rate, within the log limit."""
         if self._log.allows(kind, text):
             # rclpy refuses another level from the same line.
             if warning:
@@ -164,18 +164,20 @@ class NodeDiagnostics:
                 self._node.get_logger().warning(text)
         return [*self._warnings, *self.remarks(), *found.values()]
 
-    def _tick(self) -> None:
+    def publish(self) -> None:
+        """Publish the status, and log what has changed; the timer calls it once a second."""
         self._look_for_silence()
         if self._problem and not self._silence:
             self.problem(self._problem, self._kind)
         elif self._waiting and not self._silence:
             self.wait_for(self._waiting)
-        status = self._status()
+        status = self.status()
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
-    def _status(self) -> DiagnosticStatus:
+    def status(self) -> DiagnosticStatus:
+        """Return the status, with the rates since the last call."""
         now, received, published = time.monotonic(), self.input.received, self._published
         before, received_before, published_before = self._before
         self._before = (now, received, published)

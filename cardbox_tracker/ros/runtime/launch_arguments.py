@@ -1,4 +1,4 @@
-"""Arguments of the launch files: their types, and what is said of a value that is none.
+"""Arguments of the launch files: their types, checks and error texts.
 
 ``ros2 launch`` runs under the system's Python, which does not see the virtual environment that the
 nodes run in. Hence only the standard library is imported here.

@@ -1,4 +1,4 @@
-"""Which of the messages of one kind are logged, so that no input can fill a disk."""
+"""A limit on repeated log messages, so that no input can fill a disk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the nodes share: parameters, QoS, diagnostics, and callbacks that no message can kill."""
+"""Base class of the nodes: topics, services and diagnostics that no bad message can end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 import rclpy
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ROSInterruptException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -24,7 +24,6 @@ from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcessPublisher
-from cardbox_tracker.ros.runtime.static_executor import make_executor
 from cardbox_tracker.ros.runtime.topic_types import TopicTypes
 
 Callback = Callable[[Any, int], None]
@@ -42,7 +41,7 @@ N = TypeVar("N", bound=Closable)
 
 
 class CardboxNode(Node):
-    """A node that says what it does, what it waits for, and what is wrong."""
+    """A node that reports what it does, what it waits for, and what is wrong."""
 
     def __init__(
         self, name: str, intra_process: IntraProcess | None = None, **options: Any
@@ -91,7 +90,9 @@ class CardboxNode(Node):
     ) -> Publisher | IntraProcessPublisher:
         """As :meth:`advertise`, but nodes of this process are handed the messages themselves."""
         publisher = self.advertise(kind, topic, profile)
-        return publisher if self._intra_process is None else self._intra_process.offer(publisher)
+        if self._intra_process is None:
+            return publisher
+        return self._intra_process.advertise(publisher)
 
     def subscribe(
         self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
@@ -111,7 +112,7 @@ class CardboxNode(Node):
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
         self._types.add(self.resolve(topic), kind)
-        if self._intra_process is not None and self._intra_process.take(
+        if self._intra_process is not None and self._intra_process.subscribe(
             self.resolve(topic), guarded
         ):
             return
@@ -162,7 +163,7 @@ class CardboxNode(Node):
 
 def spin(node: CardboxNode) -> None:
     """Serve the node until it is told to stop."""
-    executor = make_executor(node.context)
+    executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     executor.spin()
 
@@ -187,27 +188,23 @@ def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -
 
 
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
-    """Create what works until it is told to stop; return the process's exit code."""
-    with interrupts.only_noted():
-        return _run(create, args, work)
-
-
-def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
+    """Create one node or several, serve them until ROS ends; return the process's exit code."""
     try:
         rclpy.init(args=args)
     except Exception as error:
-        if interrupts.were_received():
-            return 0
         print(f"cannot start: {error}", file=sys.stderr)
         return 2
-    node: N | None = None
     try:
         node = create()
-        # Objects made so far stay as long as the process, compiled code above all; a garbage
+        # Objects made so far, compiled code above all, live as long as the process; a garbage
         # collection that visits them takes a tenth of a second.
         gc.collect()
         gc.freeze()
-        work(node)
+        with interrupts.only_noted():
+            try:
+                work(node)
+            finally:
+                node.close()
     except CardboxError as error:
         if ok():
             get_logger("cardbox_tracker").fatal(str(error))
@@ -216,10 +213,8 @@ def _run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], No
         pass
     except Exception:
         # A signal shuts ROS down at any point; exceptions that follow from it are expected.
-        if ok() and not interrupts.were_received():
+        if ok() and not interrupts.received():
             raise
     finally:
-        if node is not None:
-            node.close()
         try_shutdown()
     return 0

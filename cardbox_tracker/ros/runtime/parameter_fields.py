@@ -6,25 +6,27 @@ does while the node runs; one made by :func:`shared` takes most of that from a s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, get_type_hints
+from types import MappingProxyType
+from typing import Any, ClassVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from cardbox_tracker.settings import Setting, settings_of
 
 NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
-"""What a live change does: it holds from the next image on, or tracking starts again."""
+"""Effects of a live change: it holds from the next image on, or tracking starts again."""
 
 
 @dataclass(frozen=True)
 class ParameterSpec(Setting):
-    """What is known of one parameter besides its name, type and default.
+    """Description, range and behaviour of one parameter.
 
     Attributes:
         read_only: True if it can only be given at the start.
         effect: when a live change takes effect.
-        was: name of the version before, which still works; empty if it was not renamed.
+        was: former name, which still works; empty if it was not renamed.
     """
 
     read_only: bool = False
@@ -74,7 +76,13 @@ def shared(kind: Any, name: str, **changes: Any) -> Any:
 
 @dataclass(frozen=True)
 class NodeParameters:
-    """Base of the parameter dataclasses; every field is made by :func:`parameter`."""
+    """Base of the parameter dataclasses; every field is made by :func:`parameter`.
+
+    Attributes:
+        retired: names of former versions, and what to do instead of giving each.
+    """
+
+    retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
         """Raise ValueError where values do not go together; ranges are checked before."""

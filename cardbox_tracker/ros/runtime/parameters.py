@@ -130,13 +130,15 @@ class LiveParameters(Generic[T]):
         )
 
     def _warn_of_unknown(self) -> None:
-        """Say which names given at the start are no parameters: ROS leaves them out without a word.
+        """Warn of names given at the start that are no parameters, which ROS ignores in silence.
 
-        No error, for a file may be for several nodes.
+        It is no error, since a file may be for several nodes; only a removed parameter is refused.
         """
         # rclpy has no public name for what was given.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:
+            if name in self._kind.retired:
+                raise self._refusal(f"'{name}' was removed: {self._kind.retired[name]}")
             if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
             near = difflib.get_close_matches(name, self._specs, 1)

@@ -1,4 +1,4 @@
-"""The demo's nodes, each a process of its own, on a DDS domain of their own."""
+"""Nodes as child processes, on a DDS domain of their own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who publishes a topic: two publishers of one camera's images or calibration are a mistake."""
+"""Two publishers of one camera's images or calibration are a mistake; here they are found."""
 
 from __future__ import annotations
 

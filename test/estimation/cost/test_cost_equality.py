@@ -365,13 +365,13 @@ def test_read_only_and_strided_silhouettes_are_taken(term: SilhouetteTerm) -> No
 def test_a_silhouette_of_another_size_is_refused(
     term: SilhouetteTerm, shape: tuple[int, ...]
 ) -> None:
-    with pytest.raises(ValueError, match=r"silhouette has shape .*; the camera's is \(48, 64\)"):
+    with pytest.raises(ValueError, match=r"silhouette .*\(48, 64\)"):
         term.look(np.zeros(shape, np.uint8))
 
 
 @pytest.mark.parametrize("shape", [(48, 65), (48, 64, 3, 1), (96, 128, 3)])
 def test_an_image_of_another_size_is_refused(term: SilhouetteTerm, shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match=r"image has shape .*; the camera's is \(48, 64\)"):
+    with pytest.raises(ValueError, match=r"image .*\(48, 64\)"):
         term.frame(hand_full(), np.zeros(shape, np.uint8))
 
 

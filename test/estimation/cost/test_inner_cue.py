@@ -314,7 +314,7 @@ def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None
     What was learned of people, of whom this drawing is none, is switched off.
     """
     preset = default_preset()
-    preset = replace(preset, whole_body=replace(preset.whole_body, learned_correction=False))
+    preset = replace(preset, whole_body=replace(preset.whole_body, corrector="none"))
     body, low, high = measured(), FRONT.copy(), FRONT.copy()
     low[4:8] = np.radians((-10, 30, -40, 40))
     high[4:8] = np.radians((-10, 30, -110, 40))

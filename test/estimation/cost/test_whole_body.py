@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
-from cardbox_tracker.estimation.cost.pose_prior import ArmPrior
-from cardbox_tracker.estimation.cost.prior import RestPrior
+from cardbox_tracker.estimation.cost.pose_prior import FLOOR_NATS, load_gmm, nats_of
+from cardbox_tracker.estimation.cost.terms import Silence
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
@@ -208,9 +208,14 @@ def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:
         found: float = kernels.priors(one, of.anchor, of.parts, of.girdle, of._rules, of._gmm)[1]
         return found / 0.012
 
-    learned = ArmPrior()
-    assert of_left(free) == pytest.approx(learned(free[None, 4:8])[0])
-    assert of_left(inside) > learned(inside[None, 4:8])[0] + 0.5
+    def learned(one: np.ndarray) -> float:
+        arm = forward_kinematics(BODY, one[:12]).left
+        limbs = [arm.elbow - arm.shoulder, arm.hand - arm.elbow]
+        directions = np.concatenate([limb / np.linalg.norm(limb) for limb in limbs])
+        return float(nats_of(directions, load_gmm(), np.exp(-FLOOR_NATS), np.empty(6)))
+
+    assert of_left(free) == pytest.approx(learned(free))
+    assert of_left(inside) > learned(inside) + 0.5
 
 
 def test_how_deep_a_point_is_inside_by_hand() -> None:
@@ -240,6 +245,13 @@ def test_rows_below_the_hips_count_but_not_the_legs() -> None:
     assert of.silhouette_px == 160 * of.rows - legs * (of.rows - hip_row)
 
 
+class Squares(Silence):
+    """An observation that costs 10 px for each squared rad or metre."""
+
+    def postures(self, postures: np.ndarray) -> np.ndarray:
+        return 10.0 * np.sum(postures**2, axis=1)
+
+
 def test_further_terms_add_their_pixels_to_arms_and_bodies() -> None:
     of = cost()
     person = np.zeros((120, 160), np.uint8)
@@ -248,16 +260,13 @@ def test_further_terms_add_their_pixels_to_arms_and_bodies() -> None:
     states = random_states(5, 3)
     of.fix_torso(states[0])
     bodies, arms = of.bodies(states)[0], of.arms(states[:, 4:8].copy(), 0)
-    frame = type("Frame", (), {"foreground_px": 1000})()
-    prior = RestPrior(0.01).observe(frame)
-    of.terms = (prior,)
+    squares = Squares()
+    of.terms = (squares,)
     of.fix_torso(states[0])
-    more = prior.postures(states) / of.silhouette_px
+    more = squares.postures(states) / of.silhouette_px
     np.testing.assert_allclose(of.bodies(states)[0], bodies + more)
-    more = prior.arms_beside(states[0, :6])("left", states[:, 4:8].copy()) / of.silhouette_px
+    more = squares.arms_beside(states[0, :6])("left", states[:, 4:8].copy()) / of.silhouette_px
     np.testing.assert_allclose(of.arms(states[:, 4:8].copy(), 0), arms + more)
-    # Places have no rest: the last two do not count.
-    np.testing.assert_array_equal(prior.postures(states), prior.postures(states[:, :12].copy()))
 
 
 def test_the_median_column_is_where_the_person_is() -> None:
@@ -266,7 +275,7 @@ def test_the_median_column_is_where_the_person_is() -> None:
         person = np.zeros((120, 160), np.uint8)
         person[10:90, column - 10 : column + 10] = 255
         of.see(person, state())
-        assert of.sight() == pytest.approx((column - 79.5) / 165, abs=4 / 165)
+        assert of.bearing() == pytest.approx((column - 79.5) / 165, abs=4 / 165)
 
 
 def test_the_front_reference_has_the_pixels_of_the_front() -> None:

@@ -18,12 +18,14 @@ from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.correction import (
     DATA,
     DATA_OF_SEVERAL,
-    Correction,
+    learned,
     moved,
     network_for,
 )
+from cardbox_tracker.estimation.filtering.corrector import Result
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
+from cardbox_tracker.estimation.filtering.posing import SmoothedPosing
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.vision.camera import Camera
@@ -51,22 +53,43 @@ def search(state: np.ndarray, chance: float = 0.1) -> Search:
     return Search(states, np.array([0.1, 0.12, 0.12]), 0.02, evidence, chance)
 
 
+class Correction:
+    """The learned corrector, and the body posed at its keypoints."""
+
+    def __init__(self, smoothing_s: float = 0.0, cameras: int = 1) -> None:
+        self.corrector = learned(COST, CAMERA, cameras)
+        self.posing = SmoothedPosing(COST, smoothing_s)
+
+    def __call__(
+        self,
+        frame: Frame,
+        state: np.ndarray,
+        stddev: np.ndarray,
+        iou: float,
+        found_by: Search,
+        viewpoints: Viewpoints,
+    ) -> np.ndarray:
+        points_m = COST.keypoints(state)
+        found = Result(frame, state, stddev, points_m, iou, found_by, viewpoints)
+        return self.posing(state, self.corrector(found), frame.interval_s)
+
+
 def test_joints_and_turns_are_steadied(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(_: object, features: np.ndarray, memory: object) -> tuple[np.ndarray, object]:
-        return np.zeros((2, 9)), memory
+    def nothing(_: object, features: np.ndarray, hidden: object) -> tuple[np.ndarray, object]:
+        return np.zeros((2, 9)), hidden
 
     monkeypatch.setattr(RecurrentNetwork, "__call__", nothing)
     later = FRONT.copy()
     later[[0, 1, 4]] += 0.2, 0.1, 0.3
     frame = replace(NOBODY, interval_s=0.05)
     for smoothing_s, kept in ((0.0, 0.0), (0.1, np.exp(-0.5))):
-        correction = Correction(COST, CAMERA, smoothing_s)
+        correction = Correction(smoothing_s)
         for state in (FRONT, later):
             found = correction(frame, state, STDDEV, 0.9, search(state), VIEWPOINTS)
         points, before, after = (COST.keypoints(one) for one in (found, FRONT, later))
         assert found[1] == pytest.approx(kept * FRONT[1] + (1.0 - kept) * later[1])
         assert np.allclose(points, kept * before + (1.0 - kept) * after, atol=0.02)
-    correction.forget()
+    correction.posing.forget()
     found = correction(frame, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS)
     assert np.allclose(COST.keypoints(found), COST.keypoints(FRONT), atol=0.003)
 
@@ -92,9 +115,7 @@ def test_answers_are_beside_the_middle_of_the_shoulders_and_bones_keep_their_len
 @settings(max_examples=50, deadline=None)
 @given(STATES, st.floats(0.0, 1.0))
 def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou: float) -> None:
-    found = Correction(COST, CAMERA)(
-        NOBODY, state, np.full(14, 0.2), iou, search(state), VIEWPOINTS
-    )
+    found = Correction()(NOBODY, state, np.full(14, 0.2), iou, search(state), VIEWPOINTS)
     assert np.isfinite(found).all()
     assert (found >= STATE_LIMITS[:, 0]).all() and (found <= STATE_LIMITS[:, 1]).all()
     assert np.array_equal(found[1:4], state[1:4])
@@ -108,7 +129,7 @@ def test_whatever_the_state_the_result_is_finite_and_near(state: np.ndarray, iou
 @given(st.integers(0, 2**32 - 1))
 def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    here, there = Correction(COST, CAMERA), Correction(COST, CAMERA)
+    here, there = Correction(), Correction()
     for _ in range(3):
         state = FRONT + 0.1 * rng.standard_normal(14)
         other = MIRROR * state[OTHER_ARM]
@@ -123,10 +144,10 @@ def test_results_come_near_what_the_network_says() -> None:
     state = FRONT.copy()
     # Where a joint is at its limit, such as a straight elbow, it cannot go on.
     state[[7, 11]] = 0.6
-    correction = Correction(COST, CAMERA)
+    correction = Correction()
     found = COST.keypoints(correction(NOBODY, state, STDDEV, 0.9, search(state), VIEWPOINTS))
     network = load_recurrent_network(DATA)
-    answers_m, _ = network(correction.features, network.new_memory(2))
+    answers_m, _ = network(correction.corrector.features, network.initial_hidden(2))
     points = COST.keypoints(state)
     wanted = moved(points, answers_m)
     off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
@@ -137,9 +158,7 @@ def test_several_cameras_have_a_network_of_their_own() -> None:
     assert network_for(1) is load_recurrent_network(DATA)
     assert network_for(2) is network_for(4) is load_recurrent_network(DATA_OF_SEVERAL)
     one, two = (
-        Correction(COST, CAMERA, cameras=cameras)(
-            *(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS)
-        )
+        Correction(cameras=cameras)(*(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS))
         for cameras in (1, 2)
     )
     assert not np.allclose(one, two)
@@ -147,8 +166,8 @@ def test_several_cameras_have_a_network_of_their_own() -> None:
 
 def test_what_was_before_counts() -> None:
     first, second = FRONT, np.append(reference_posture("arms"), [0.0, 0.0])
-    alone = Correction(COST, CAMERA)(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS)
-    correction = Correction(COST, CAMERA)
+    alone = Correction()(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS)
+    correction = Correction()
     correction(NOBODY, first, STDDEV, 0.5, search(first), VIEWPOINTS)
     assert not np.allclose(
         correction(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS), alone
@@ -157,9 +176,7 @@ def test_what_was_before_counts() -> None:
 
 def test_cameras_that_show_depth_count() -> None:
     several, one = (
-        Correction(COST, CAMERA)(
-            NOBODY, FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True)
-        )
+        Correction()(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True))
         for yaws in ([0.0, 1.2], [0.0])
     )
     assert not np.allclose(several, one)

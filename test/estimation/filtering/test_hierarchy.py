@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +19,6 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.estimation.config import TrackerConfig, paper_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.prior import RestPrior, RestPriorObservation
 from cardbox_tracker.estimation.cost.terms import ArmCosts, SumOfTerms, TorsoCosts
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
 from cardbox_tracker.vision.camera import Camera
@@ -30,9 +28,20 @@ CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 FRONT = reference_posture("front")
 IMAGE_PX = 320 * 240
-SEVERAL_CYCLES = TrackerConfig(
-    cycles=2, noise_decay=0.5, terms=(RestPrior(0.012),), average=20, explore=0.2
-)
+SEVERAL_CYCLES = TrackerConfig(cycles=2, average=20)
+
+
+class FarFromRest:
+    """An observation that rates angles by their squares, 10 px for each rad^2."""
+
+    def torsos_beside(self, arms: np.ndarray | None) -> TorsoCosts:
+        return self.postures
+
+    def arms_beside(self, torso: np.ndarray) -> ArmCosts:
+        return lambda side, arms: self.postures(arms)
+
+    def postures(self, postures: np.ndarray) -> np.ndarray:
+        return 10.0 * np.sum(postures**2, axis=1)
 
 
 class ConstantCost:
@@ -71,8 +80,8 @@ class Stepped:
         self.filters.initialize(self.observation, posture, noise_scale)
         return self.filters.estimate()
 
-    def iterate(self, noise_scale: float = 1.0, explore: float = 0.0) -> np.ndarray:
-        self.filters.iterate(self.observation, noise_scale, explore)
+    def iterate(self, noise_scale: float = 1.0) -> np.ndarray:
+        self.filters.iterate(self.observation, noise_scale)
         return self.filters.estimate()
 
 
@@ -80,7 +89,6 @@ def on_constant_cost(
     config: TrackerConfig, image_px: int = IMAGE_PX
 ) -> tuple[Stepped, ConstantCost]:
     cost = ConstantCost()
-    config = replace(config, parallel_from=None)
     filters = HierarchicalFilter(config, image_px, np.random.default_rng(0))
     return Stepped(filters, cost), cost
 
@@ -92,66 +100,6 @@ def before_somebody(config: TrackerConfig, seed: int, posture: np.ndarray = FRON
     rng = np.random.default_rng(seed)
     filters = HierarchicalFilter(config, CAMERA.width * CAMERA.height, rng)
     return Stepped(filters, SumOfTerms((term.observe(frame), *others)))
-
-
-@pytest.mark.parametrize("make_config", [paper_preset, lambda: SEVERAL_CYCLES])
-@pytest.mark.parametrize("strategy", ["drs", "srs"])
-@pytest.mark.parametrize("seed", range(3))
-def test_arms_in_threads_give_what_they_give_one_after_the_other(
-    make_config: Any, strategy: str, seed: int
-) -> None:
-    results = []
-    for parallel_from in (0, None):
-        config = replace(make_config(), strategy=strategy, parallel_from=parallel_from)
-        filters = before_somebody(config, seed)
-        postures = [filters.initialize(FRONT)]
-        for cycle in range(8):
-            postures.append(filters.iterate(0.6 ** (cycle % 3), 0.15 if cycle % 3 == 0 else 0.0))
-        results.append(
-            (
-                np.array(postures),
-                filters.filters.stddev(),
-                filters.torso.particles,
-                *(arm.particles for arm in filters.arms.values()),
-            )
-        )
-    for parallel, sequential in zip(*results, strict=True):
-        np.testing.assert_array_equal(parallel, sequential)
-
-
-@pytest.mark.parametrize(
-    ("particles", "parallel_from", "threads"), [(499, 500, 1), (500, 500, 2), (999, None, 1)]
-)
-def test_both_arms_run_at_once_where_there_is_enough_to_do(
-    particles: int, parallel_from: int | None, threads: int
-) -> None:
-    _, cost = on_constant_cost(paper_preset())
-    config = replace(paper_preset().with_particles(particles), parallel_from=parallel_from)
-    filters = HierarchicalFilter(config, IMAGE_PX, np.random.default_rng(0))
-    seen = set()
-
-    def rate(side: str, arm_postures: np.ndarray) -> np.ndarray:
-        seen.add(threading.get_ident())
-        return np.zeros(len(arm_postures))
-
-    cost.arms_beside = lambda torso: rate  # type: ignore[method-assign]
-    filters.initialize(cost, FRONT)
-    assert len(seen) == threads
-
-
-def test_an_error_in_the_other_thread_is_not_lost() -> None:
-    filters, cost = on_constant_cost(paper_preset())
-    config = replace(paper_preset(), parallel_from=0)
-    filters = HierarchicalFilter(config, IMAGE_PX, np.random.default_rng(0))
-
-    def fail(side: str, arm_postures: np.ndarray) -> np.ndarray:
-        if side == "left":
-            raise RuntimeError("left arm")
-        return np.zeros(len(arm_postures))
-
-    cost.arms_beside = lambda torso: fail  # type: ignore[method-assign]
-    with pytest.raises(RuntimeError, match="left arm"):
-        filters.initialize(cost, FRONT)
 
 
 def test_the_torso_is_fixed_before_the_arms_are_rated() -> None:
@@ -182,7 +130,7 @@ def test_particles_lie_around_the_posture_within_the_joint_limits() -> None:
     filters, cost = on_constant_cost(paper_preset())
     filters.initialize(posture)
     for _ in range(5):
-        filters.iterate(2.0, 0.2)
+        filters.iterate(2.0)
     joints = {"torso": TORSO, "left": LEFT_ARM, "right": RIGHT_ARM}
     first = {name: particles for name, particles in reversed(cost.calls) if name in joints}
     for name, particles in cost.calls:
@@ -215,30 +163,12 @@ def test_every_filter_has_noise_of_its_own() -> None:
     assert abs(np.corrcoef(*steps)[0, 1]) < 5 / np.sqrt(left.size)
 
 
-@pytest.mark.parametrize(("explore", "explorers"), [(0.0, 0), (0.15, 30), (0.9, 180)])
-def test_a_fraction_of_the_arms_explores_and_the_torso_never_does(
-    explore: float, explorers: int
-) -> None:
-    still = replace(
-        paper_preset(),
-        torso=replace(paper_preset().torso, rotation_noise_rad=0.0, translation_noise_m=0.0),
-        arm=replace(paper_preset().arm, rotation_noise_rad=0.0),
-    )
-    filters, _ = on_constant_cost(still)
-    filters.initialize(FRONT)
-    filters.iterate(1.0, explore)
-    assert np.all(filters.torso.particles == FRONT[TORSO])
-    for side, joints in (("left", LEFT_ARM), ("right", RIGHT_ARM)):
-        elsewhere = np.any(filters.arms[side].particles != FRONT[joints], axis=1)
-        assert np.flatnonzero(elsewhere).tolist() == list(range(200 - explorers, 200))
-
-
 def test_the_estimate_is_the_best_or_the_mean_of_the_best() -> None:
-    """The prior makes costs differ; an image of four times the pixels spreads them four times."""
+    """An image of four times the pixels spreads them four times."""
     for average, image_px, scale in ((1, IMAGE_PX, 1.0), (20, 4 * IMAGE_PX, 4.0)):
-        config = replace(paper_preset(), parallel_from=None, average=average)
+        config = replace(paper_preset(), average=average)
         of = HierarchicalFilter(config, image_px, np.random.default_rng(0))
-        filters = Stepped(of, RestPriorObservation(10.0))
+        filters = Stepped(of, FarFromRest())
         filters.initialize(FRONT)
         posture = filters.iterate()
         np.testing.assert_array_equal(posture[TORSO], filters.torso.mean(average, scale))
@@ -257,19 +187,7 @@ def test_the_seed_decides_the_estimate(strategy: str) -> None:
     def run(seed: int) -> np.ndarray:
         filters = before_somebody(replace(SEVERAL_CYCLES, strategy=strategy), seed)
         filters.initialize(FRONT)
-        return filters.iterate(1.0, 0.15)
+        return filters.iterate()
 
     np.testing.assert_array_equal(run(1), run(1))
     assert not np.any(run(1) == run(2))
-
-
-def test_an_arm_that_was_lost_is_found_by_exploring() -> None:
-    """The arms are raised to where no noise of 0.25 rad reaches in a few cycles."""
-    raised = FRONT.copy()
-    raised[4] = raised[8] = np.radians(150)
-    for seed in range(3):
-        filters = before_somebody(SEVERAL_CYCLES, seed, raised)
-        filters.initialize(FRONT, 0.1)
-        for _ in range(10):
-            posture = filters.iterate(0.1, 0.3)
-        assert filters.observation.parts[0].overlap(posture)[1] > 0.75

@@ -44,50 +44,53 @@ def recurrent(rng: np.random.Generator, networks: int = 2) -> RecurrentNetwork:
     )
 
 
-def test_the_memory_by_hand() -> None:
+def test_the_hidden_state_by_hand() -> None:
     """One node: half of the new value enters, and the gate for what was before is open."""
     ones, nothing = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
-    # To reset, update, candidate: only the candidate sees the feature and, half, the memory.
-    receive = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
-    keep = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
-    only_memory = np.array([[[1.0], [0.0]]]), nothing
+    # To reset, update, candidate: only the candidate sees the feature and, half, the hidden.
+    gru_input = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
+    gru_hidden = np.array([[[0.0, 0.0, 1.0]]]), np.zeros((1, 1, 3))
+    only_hidden = np.array([[[1.0], [0.0]]]), nothing
     network = RecurrentNetwork(
         np.zeros(1),
         np.ones(1),
         2.5,
         (ones, nothing),
-        receive,
-        keep,
-        (only_memory, (ones, nothing)),
+        gru_input,
+        gru_hidden,
+        (only_hidden, (ones, nothing)),
         np.array([10.0]),
     )
-    answers, memory = network(np.array([[0.5]]), network.new_memory(1))
+    answers, hidden = network(np.array([[0.5]]), network.initial_hidden(1))
     first = 0.5 * np.tanh(0.5)
-    assert memory == pytest.approx(first) and answers == pytest.approx(10.0 * first)
-    answers, memory = network(np.array([[0.5]]), memory)
+    assert hidden == pytest.approx(first) and answers == pytest.approx(10.0 * first)
+    answers, hidden = network(np.array([[0.5]]), hidden)
     second = 0.5 * np.tanh(0.5 + 0.5 * first) + 0.5 * first
-    assert memory == pytest.approx(second) and answers == pytest.approx(10.0 * second)
+    assert hidden == pytest.approx(second) and answers == pytest.approx(10.0 * second)
 
 
 def test_rows_and_networks_do_not_mix() -> None:
     rng = np.random.default_rng(0)
     network = recurrent(rng)
     features = rng.standard_normal((3, 5, 3))
-    memory = network.new_memory(5)
-    alone = network.new_memory(1)
+    hidden = network.initial_hidden(5)
+    alone = network.initial_hidden(1)
     for row in features:
-        answers, memory = network(row, memory)
+        answers, hidden = network(row, hidden)
         one, alone = network(row[2:3], alone)
     assert np.allclose(answers[2], one[0])
     singles = []
     for i in (0, 1):
-        layers = [(w[i : i + 1], b[i : i + 1]) for w, b in (*network[3:6], *network.leave)]
+        layers = [(w[i : i + 1], b[i : i + 1]) for w, b in (*network[3:6], *network.output_layers)]
         single = network._replace(
-            enter=layers[0], receive=layers[1], keep=layers[2], leave=(layers[3], layers[4])
+            input_layer=layers[0],
+            gru_input=layers[1],
+            gru_hidden=layers[2],
+            output_layers=(layers[3], layers[4]),
         )
-        memory = single.new_memory(5)
+        hidden = single.initial_hidden(5)
         for row in features:
-            found, memory = single(row, memory)
+            found, hidden = single(row, hidden)
         singles.append(found)
     assert np.allclose(answers, np.mean(singles, axis=0))
 
@@ -95,5 +98,5 @@ def test_rows_and_networks_do_not_mix() -> None:
 def test_features_far_from_the_mean_count_as_the_most() -> None:
     network = recurrent(np.random.default_rng(1))
     far, most = np.array([[1e6, -1e6, 0.0]]), np.array([[2.5, -2.5, 0.0]])
-    found, expected = (network(f, network.new_memory(1))[0] for f in (far, most))
+    found, expected = (network(f, network.initial_hidden(1))[0] for f in (far, most))
     assert np.array_equal(found, expected) and np.isfinite(found).all()

@@ -60,14 +60,14 @@ def test_it_comes_nearer_to_the_truth(wrong: dict[int, float], camera: Camera) -
     for joint, off in wrong.items():
         begin[joint] += off
     fit = OutlineFit(COST, camera, 5)
-    assert error_m(fit(frame(drawn(camera), camera), begin)) < 0.85 * error_m(begin)
+    assert error_m(fit([frame(drawn(camera), camera)], begin)) < 0.85 * error_m(begin)
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=14, max_size=14))
 def test_whatever_the_state_it_moves_by_little_and_stays_finite(off: list[float]) -> None:
     begin = np.clip(TRUTH + off, *STATE_LIMITS.T)
-    found = OutlineFit(COST, CAMERA, 2)(frame(drawn()), begin)
+    found = OutlineFit(COST, CAMERA, 2)([frame(drawn())], begin)
     assert np.isfinite(found).all()
     assert np.abs(found - begin).max() <= 2 * 0.25 + 1e-9
 
@@ -77,12 +77,12 @@ def test_what_hair_adds_is_not_followed() -> None:
     rows, columns = np.nonzero(silhouette)
     top, middle = int(rows.min()), int(np.median(columns[rows == rows.min()]))
     cv2.circle(silhouette, (middle, top), 18, 255, -1)
-    assert error_m(OutlineFit(COST, CAMERA, 3)(frame(silhouette), TRUTH)) < 0.03
+    assert error_m(OutlineFit(COST, CAMERA, 3)([frame(silhouette)], TRUTH)) < 0.03
 
 
 @pytest.mark.parametrize("silhouette", [np.zeros((240, 320)), np.full((240, 320), 255)])
 def test_nobody_and_everything_change_nothing_much(silhouette: np.ndarray) -> None:
-    found = OutlineFit(COST, CAMERA, 2)(frame(silhouette.astype(np.uint8)), TRUTH)
+    found = OutlineFit(COST, CAMERA, 2)([frame(silhouette.astype(np.uint8))], TRUTH)
     np.testing.assert_allclose(found, TRUTH, atol=0.02)
 
 
@@ -90,9 +90,9 @@ def test_with_depth_or_without_steps_the_state_stays() -> None:
     begin = TRUTH.copy()
     begin[12] += 0.08
     seen = frame(drawn())
-    np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 0)(seen, begin), begin)
+    np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 0)([seen], begin), begin)
     deep = replace(seen, depth_m=np.full((240, 320), 2.3, np.float32))
-    np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 3)(deep, begin), begin)
+    np.testing.assert_array_equal(OutlineFit(COST, CAMERA, 3)([deep], begin), begin)
 
 
 def aside() -> View:
@@ -111,10 +111,10 @@ def test_a_second_camera_shows_what_the_first_one_does_not() -> None:
     truth[5] += 0.3
     begin = truth.copy()
     begin[[3, 5, 12]] += 0.1, 0.2, 0.06
-    seen = replace(
+    seen = [
         frame(drawn(state=truth)),
-        others=(frame(drawn(view.camera, view.states(truth), there), view.camera),),
-    )
+        frame(drawn(view.camera, view.states(truth), there), view.camera),
+    ]
 
     def error(fit: OutlineFit) -> float:
         found = COST.keypoints(fit(seen, begin)) - COST.keypoints(truth)
@@ -129,12 +129,12 @@ def test_a_second_camera_shows_what_the_first_one_does_not() -> None:
     # The first camera alone is what one camera is.
     np.testing.assert_array_equal(
         first.fitted(seen, begin, 2),
-        OutlineFit(COST, CAMERA, 2).fitted(frame(seen.silhouette), begin, 2),
+        OutlineFit(COST, CAMERA, 2).fitted(seen[:1], begin, 2),
     )
 
 
 def test_corrections_are_smoothed_until_it_is_forgotten() -> None:
-    begin, seen = TRUTH.copy(), frame(drawn())
+    begin, seen = TRUTH.copy(), [frame(drawn())]
     begin[12] += 0.08
     fit = OutlineFit(COST, CAMERA, 3)
     first = fit(seen, begin) - begin

@@ -16,6 +16,7 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering.correction import NetworkCorrector
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES
 from cardbox_tracker.estimation.filtering.loss import Evidence
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
@@ -45,17 +46,17 @@ def seen(depth_m: np.ndarray | None = None) -> Frame:
 def fitted(depth_m: np.ndarray | None = None) -> np.ndarray:
     frame = seen(depth_m)
     COST.see(frame.silhouette, STATE)
-    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)(frame, STATE)
+    return OutlineFit(COST, CAMERA, CONFIG.outline_steps)([frame], STATE)
 
 
 def refined(refine: Refinement, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """The state that fits the outlines, and the result."""
-    fit = refine.outline(frame, STATE)
+    fit = refine.outline([frame], STATE)
     return fit, refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
 
 
 def test_with_one_camera_the_result_is_corrected() -> None:
-    assert CONFIG.learned_correction
+    assert CONFIG.corrector == "learned"
     expected = fitted()
     fit, result = refined(Refinement(COST, CAMERA, CONFIG), seen())
     assert np.array_equal(fit, expected)
@@ -63,7 +64,7 @@ def test_with_one_camera_the_result_is_corrected() -> None:
 
 
 def test_without_the_correction_the_result_is_only_fitted() -> None:
-    config = replace(CONFIG, learned_correction=False)
+    config = replace(CONFIG, corrector="none")
     expected = fitted()
     assert np.array_equal(refined(Refinement(COST, CAMERA, config), seen())[1], expected)
 
@@ -74,14 +75,14 @@ def test_with_one_camera_a_depth_image_counts() -> None:
     fit, _ = refined(refine, seen(depth_m))
     # What was measured says more of the distance than an outline.
     assert np.array_equal(fit, STATE)
-    assert refine.correction is not None
-    assert refine.correction.features[:, OF_CAMERAS][:, -1].tolist() == [1.0, 1.0]
-    measured = refine.correction.features[:, -DEPTH_FEATURES:]
+    assert isinstance(refine.corrector, NetworkCorrector)
+    assert refine.corrector.features[:, OF_CAMERAS][:, -1].tolist() == [1.0, 1.0]
+    measured = refine.corrector.features[:, -DEPTH_FEATURES:]
     assert measured[:, 3:].all()
     # The arms are in the plane of the shoulders.
     assert np.allclose(measured[:, :3], 2.3 - COST.keypoints(STATE)[:, 2].reshape(2, 3), atol=1e-6)
     refined(refine, seen())
-    assert not refine.correction.features[:, -DEPTH_FEATURES:].any()
+    assert not refine.corrector.features[:, -DEPTH_FEATURES:].any()
 
 
 def test_with_further_cameras_those_that_see_count() -> None:
@@ -95,15 +96,16 @@ def test_with_further_cameras_those_that_see_count() -> None:
     frame = seen()
     both = refined(refine, frame), refined(alone, frame)
     assert np.array_equal(both[0][0], both[1][0])
-    assert refine.correction is not None and alone.correction is not None
+    assert isinstance(refine.corrector, NetworkCorrector)
+    assert isinstance(alone.corrector, NetworkCorrector)
     # The network of several cameras sees what that of one would.
-    assert np.array_equal(refine.correction.features, alone.correction.features)
+    assert np.array_equal(refine.corrector.features, alone.corrector.features)
     assert not np.array_equal(both[0][1], both[1][1])
     fit = fitted()
     refine.see([0, 1])
     refine.corrected(frame, fit, STDDEV, 0.9, SEARCH)
     shown = [1.0 + np.cos(1.0) ** 2, np.sin(1.0) ** 2]
-    assert np.allclose(refine.correction.features[0, OF_CAMERAS][:2], shown)
+    assert np.allclose(refine.corrector.features[0, OF_CAMERAS][:2], shown)
 
 
 def test_with_further_cameras_a_depth_image_changes_nothing() -> None:
@@ -125,6 +127,8 @@ def test_a_body_that_nobody_measured_is_known_as_such() -> None:
     for body in (BODY, guessed):
         refine = Refinement(WholeBodyCost(body, CAMERA, WholeBodyCostConfig()), CAMERA, CONFIG)
         keypoints_m = COST.keypoints(STATE)
+        refine.corrected(seen(), STATE, STDDEV, 0.9, SEARCH)
         refine.deviations(seen(), STATE, STDDEV, keypoints_m, 0.9)
-        told.append(refine.features[:, OF_CAMERAS][:, -2].tolist())
+        assert isinstance(refine.corrector, NetworkCorrector)
+        told.append(refine.corrector.result_features[:, OF_CAMERAS][:, -2].tolist())
     assert told == [[1.0, 1.0], [0.0, 0.0]]

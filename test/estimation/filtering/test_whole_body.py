@@ -19,7 +19,7 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.loss import Evidence, chance_of_loss, state_stddev
-from cardbox_tracker.estimation.filtering.pose_filter import Sight
+from cardbox_tracker.estimation.filtering.pose_filter import Presence
 from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS, WholeBodyFilter
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
@@ -42,9 +42,9 @@ def made(seed: int = 0, config: TrackerConfig | None = None) -> WholeBodyFilter:
 
 
 def follow(of: WholeBodyFilter, silhouette: np.ndarray) -> Any:
-    frame = CompiledSilhouette(BODY, CAMERA).frame(silhouette)
-    assert of.look(frame) is Sight.PERSON
-    return of.follow(())
+    frames = [CompiledSilhouette(BODY, CAMERA).frame(silhouette)]
+    assert of.look(frames) is Presence.PERSON
+    return of.follow(frames, [()])
 
 
 def upright() -> np.ndarray:
@@ -222,14 +222,14 @@ def test_a_wider_search_starts_where_the_person_is() -> None:
 def test_too_much_and_too_little_are_seen() -> None:
     of = made()
     frame = CompiledSilhouette(BODY, CAMERA).frame
-    assert of.look(frame(np.full((120, 160), 255, np.uint8))) is Sight.TOO_MUCH
-    assert of.look(frame(np.zeros((120, 160), np.uint8))) is Sight.NOBODY
+    assert of.look([frame(np.full((120, 160), 255, np.uint8))]) is Presence.TOO_MUCH
+    assert of.look([frame(np.zeros((120, 160), np.uint8))]) is Presence.NOBODY
 
 
 def test_smoothing_is_a_share_of_the_last_result() -> None:
     """With a still particle cloud, as after a jump, each frame leaves so much of the old place."""
     whole_body = replace(
-        default_preset().whole_body, smoothing=0.5, outline_steps=0, learned_correction=False
+        default_preset().whole_body, smoothing=0.5, outline_steps=0, corrector="none"
     )
     of = made(0, replace(default_preset(), whole_body=whole_body))
     first = follow(of, seen(wave(0.0)))

@@ -255,10 +255,9 @@ def test_a_poor_fit_is_refused_with_its_numbers() -> None:
     with pytest.raises(InitializationError) as caught:
         initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
     text = str(caught.value)
-    assert text.startswith("the model fits the references poorly (IoU front 0.")
-    for part in ("mean 0.", "expected 0.60 or more", "person_distance_m (2 m)", "pitch (0 degrees"):
+    assert "IoU front 0." in text
+    for part in ("mean 0.", "0.60", "person_distance_m (2 m)", "pitch (0 degrees", "(left)"):
         assert part in text
-    assert "turned (left)" in text
 
 
 def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
@@ -269,18 +268,17 @@ def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
     with pytest.raises(InitializationError) as caught:
         measure(body, least_iou=least)
     text = str(caught.value)
-    assert text.startswith("the model fits '")
     for name in poor:
         assert f"'{name}'" in text.split("poorly")[0]
-    assert f"expected {least:.2f} or more" in text
+    assert f"{least:.2f}" in text
 
 
 @pytest.mark.parametrize(
     ("swapped", "text"),
     [
-        (("front", "side"), "'front' and 'side' look swapped"),
-        (("front", "arms"), "'front' and 'arms' look swapped"),
-        (("side", "arms"), "'side' and 'arms' look swapped"),
+        (("front", "side"), "'front' and 'side' .*swapped"),
+        (("front", "arms"), "'front' and 'arms' .*swapped"),
+        (("side", "arms"), "'side' and 'arms' .*swapped"),
     ],
 )
 def test_swapped_references_are_refused_before_any_work(
@@ -309,7 +307,7 @@ def test_without_arms_nothing_is_measured() -> None:
     arms = references["arms"]
     arms[:] = 0
     arms[20:, 150:169] = 255
-    with pytest.raises(InitializationError, match=r"'arms'.* capture it again"):
+    with pytest.raises(InitializationError, match=r"'arms': no arms .*; capture"):
         initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
 
 
@@ -317,7 +315,7 @@ def test_arms_of_another_posture_are_measured_where_the_check_is_off() -> None:
     references = references_of(BodyModel.of(hip_height_m=-0.51))
     columns = np.flatnonzero(references["arms"].any(axis=0))
     references["arms"][:, columns[-1] - 45 :] = 0
-    with pytest.raises(InitializationError, match="the left arm is bent"):
+    with pytest.raises(InitializationError, match=r"left arm .*bent"):
         initialize_body(references, CAMERA, InitializationConfig())
     config = InitializationConfig(check_postures=False, least_iou=0.3)
     assert initialize_body(references, CAMERA, config).mean_iou > 0.6
@@ -326,7 +324,7 @@ def test_arms_of_another_posture_are_measured_where_the_check_is_off() -> None:
 @pytest.mark.parametrize("iou", [0.5999, 0.595, 0.6 - 1e-6])
 def test_a_fit_below_its_bound_is_not_told_as_the_bound(iou: float) -> None:
     result = InitializationResult(BodyModel(), {"front": iou, "side": iou, "arms": iou}, {}, {})
-    with pytest.raises(InitializationError, match=r"mean 0\.59, expected 0\.60 or more"):
+    with pytest.raises(InitializationError, match=r"mean 0\.59,.* 0\.60"):
         check_fit(result, InitializationConfig())
 
 
@@ -349,9 +347,9 @@ def test_the_required_fit_is_a_setting() -> None:
 @pytest.mark.parametrize(
     ("name", "replacement", "text"),
     [
-        ("front", None, "reference 'front': nobody is in the image"),
-        ("side", "front", "'front' and 'side' are too alike"),
-        ("arms", "front", "'front' and 'arms' are too alike"),
+        ("front", None, "'front': nobody"),
+        ("side", "front", "'front' and 'side' .*alike"),
+        ("arms", "front", "'front' and 'arms' .*alike"),
     ],
 )
 def test_unusable_references_are_refused_before_any_work(
@@ -367,5 +365,5 @@ def test_unusable_references_are_refused_before_any_work(
 
 
 def test_a_person_cut_off_at_the_border_is_refused() -> None:
-    with pytest.raises(InitializationError, match="'arms': the person is cut off at the right"):
+    with pytest.raises(InitializationError, match=r"'arms': .*cut off .*right"):
         measure(BodyModel.of(hip_height_m=-0.51, lateral_m=0.3))

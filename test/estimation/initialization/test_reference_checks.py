@@ -135,7 +135,7 @@ def test_arms_that_are_not_stretched_are_named(arms_deg: dict[str, float], text:
 
 def test_how_far_an_arm_is_off_is_told() -> None:
     found = problems(all_seen(arms=seen("arms", arms_deg=both(abduction=130.0))))
-    assert "40 degrees above" in found[0] and "expected 10 below" in found[0]
+    assert "40 degrees above" in found[0] and "10 below" in found[0]
 
 
 def test_an_arm_cut_short_is_named() -> None:
@@ -188,7 +188,7 @@ def test_another_posture_is_named_at_its_capture(name: str, other: str, factor: 
     if name == other:
         assert check_asked(name, silhouette, CAMERA, config) == ""
         return
-    with pytest.raises(InitializationError, match=f"'{name}': it looks like '{other}'"):
+    with pytest.raises(InitializationError, match=f"'{name}': .*'{other}'"):
         check_asked(name, silhouette, CAMERA, config)
     unchecked = replace(config, check_postures=False)
     assert check_asked(name, silhouette, CAMERA, unchecked) == ""
@@ -199,12 +199,11 @@ def test_what_looks_like_no_posture_is_warned_of_at_its_capture() -> None:
     silhouette = np.zeros((240, 320), np.uint8)
     silhouette[60:, 60:260] = 255
     text = check_asked("front", silhouette, CAMERA, config)
-    assert "warning" in text and "'front'" in text
-    assert "expected 0.60 or more" in text
+    assert "'front'" in text and "IoU" in text and "0.60" in text
 
 
 def test_all_of_it_is_an_error() -> None:
     right = all_seen()
     references = all_seen(front=right["side"], side=right["front"])
-    with pytest.raises(InitializationError, match="'front' and 'side' look swapped"):
+    with pytest.raises(InitializationError, match=r"'front' and 'side' .*swapped"):
         check_postures(references, CAMERA, BODY.placement.distance_m)

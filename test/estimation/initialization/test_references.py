@@ -56,22 +56,22 @@ def test_the_average_is_the_majority() -> None:
 
 
 def test_no_silhouette_at_all_is_refused() -> None:
-    with pytest.raises(InitializationError, match="no silhouette was captured; check the times"):
+    with pytest.raises(InitializationError, match=r"no silhouette.*times"):
         average_silhouette([])
 
 
 @pytest.mark.parametrize(
     ("name", "advice"),
     [
-        ("front", "step in front of the camera and face the camera, arms 20 degrees away"),
-        ("side", "step in front of the camera and turn by 90 degrees, arms as before"),
-        ("arms", "step in front of the camera and face the camera, both arms stretched sideways"),
+        ("front", "face the camera, arms 20 degrees away"),
+        ("side", "turn by 90 degrees"),
+        ("arms", "both arms stretched sideways"),
     ],
 )
 def test_nobody_in_the_image_is_refused(name: str, advice: str) -> None:
     # 2 % of 160 x 120 px are 384; these are 380, which is never told as 2.0 %.
     references = all_seen() | {name: block(slice(10, 20), slice(10, 48))}
-    expected = rf"reference '{name}': nobody is in the image \(1.9 % foreground, .*{advice}"
+    expected = rf"'{name}': nobody .*1\.9 % .*{advice}"
     with pytest.raises(InitializationError, match=expected):
         check_references(references)
     check_reference(name, block(slice(10, 26), slice(10, 34)))  # 384 px
@@ -80,7 +80,7 @@ def test_nobody_in_the_image_is_refused(name: str, advice: str) -> None:
 def test_an_image_full_of_foreground_is_refused() -> None:
     with pytest.raises(
         InitializationError,
-        match=r"reference 'front': 81 % .*background/learn",
+        match=r"'front': 81 % .*learn it again",
     ):
         check_reference("front", block(slice(6, 114), slice(8, 152)))
 
@@ -99,8 +99,7 @@ def test_a_person_cut_off_at_a_border_is_refused(
 ) -> None:
     with pytest.raises(
         InitializationError,
-        match=f"reference '{name}': the person is cut off at the {border} border of the image; "
-        "step back or to the middle, and ",
+        match=f"'{name}': .*cut off .*{border} border.*; step back",
     ):
         check_reference(name, block(rows, columns))
 
@@ -110,7 +109,7 @@ def test_legs_may_leave_the_image() -> None:
 
 
 def test_an_arm_that_reaches_the_border_is_refused() -> None:
-    with pytest.raises(InitializationError, match="'arms': the person is cut off at the right"):
+    with pytest.raises(InitializationError, match=r"'arms': .*cut off .*right"):
         check_references({name: seen(name, 0.35) for name in REFERENCE_NAMES})
 
 
@@ -118,8 +117,7 @@ def test_whoever_did_not_turn_is_told_so() -> None:
     references = all_seen() | {"side": seen("front", 0.1)}
     with pytest.raises(
         InitializationError,
-        match=r"references 'front' and 'side' are too alike \(IoU .*, expected below 0.80\): the "
-        "person did not turn; capture 'side' again: turn by 90 degrees",
+        match=r"'front' and 'side' .*IoU .*0\.80.* turn;.*'side' again: turn by 90 degrees",
     ):
         check_references(references)
 
@@ -127,8 +125,7 @@ def test_whoever_did_not_turn_is_told_so() -> None:
 def test_whoever_did_not_raise_the_arms_is_told_so() -> None:
     with pytest.raises(
         InitializationError,
-        match=r"references 'front' and 'arms' are too alike \(IoU .*: the arms were not raised; "
-        "capture 'arms' again: face the camera, both arms stretched sideways",
+        match=r"'front' and 'arms' .*IoU .* raised; .*'arms' again: .*arms stretched sideways",
     ):
         check_references(all_seen() | {"arms": seen("front")})
 
@@ -136,7 +133,7 @@ def test_whoever_did_not_raise_the_arms_is_told_so() -> None:
 def test_missing_references_are_named() -> None:
     references = all_seen()
     del references["front"], references["arms"]
-    with pytest.raises(InitializationError, match="missing references: front, arms; capture them"):
+    with pytest.raises(InitializationError, match=r"missing.* front, arms; capture"):
         check_references(references)
 
 
@@ -144,13 +141,13 @@ def test_references_of_several_cameras_are_refused() -> None:
     references = all_seen() | {"side": np.zeros((240, 320), np.uint8)}
     with pytest.raises(
         InitializationError,
-        match=r"different sizes \[\(120, 160\), \(240, 320\)\]; capture all with one camera",
+        match=r"\(120, 160\), \(240, 320\).*one camera",
     ):
         check_references(references)
 
 
 def test_an_unknown_reference_is_an_error_of_the_program() -> None:
-    with pytest.raises(ValueError, match="reference 'back' is unknown"):
+    with pytest.raises(ValueError, match="'back'"):
         check_reference("back", seen("front"))
 
 

@@ -80,7 +80,7 @@ def test_a_session_with_depth_images_is_tracked_with_them_too(
             new.write_image("/camera/depth", entry["stamp_ns"], "camera", depth, "16UC1")
     results = evaluate_sessions([folder], tmp_path / "out", "default", (0,), jobs=1)
     alone, ranged = results["sessions"]
-    with pytest.raises(CardboxError, match="ranged has no camera left; expected one of camera"):
+    with pytest.raises(CardboxError, match=r"ranged .*left; .*camera"):
         track_session(load_session(folder), default_preset(), (0,), only="left")
     assert (alone["name"], ranged["name"]) == ("ranged", "ranged, with depth")
     assert alone["runs"][0]["aligned"] != ranged["runs"][0]["aligned"] < LARGEST_ERROR_CM
@@ -94,19 +94,19 @@ def test_the_same_seed_gives_the_same_figures(session: Path) -> None:
 
 
 def test_a_folder_that_is_no_session_is_refused(session: Path, tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match=r"cannot read the ground truth"):
+    with pytest.raises(CardboxError, match="ground truth"):
         load_session(tmp_path)
     truth = json.loads((session / "ground_truth.json").read_text())
     truth["segments"] = [s for s in truth["segments"] if s["name"] != "side"]
     (tmp_path / "ground_truth.json").write_text(json.dumps(truth))
-    with pytest.raises(CardboxError, match="has no segment side"):
+    with pytest.raises(CardboxError, match="segment side"):
         load_session(tmp_path)
 
 
 def test_figures_of_mediapipe_that_are_none_are_refused(session: Path, tmp_path: Path) -> None:
     (tmp_path / "ground_truth.json").write_text((session / "ground_truth.json").read_text())
     (tmp_path / "peer_mediapipe.json").write_text("[]")
-    with pytest.raises(CardboxError, match=r"is not what peer_mediapipe\.json should be"):
+    with pytest.raises(CardboxError, match=r"peer_mediapipe\.json"):
         load_session(tmp_path)
 
 

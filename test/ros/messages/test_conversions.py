@@ -37,7 +37,7 @@ def info(**changes: object) -> CameraInfo:
 def test_the_camera_of_a_silhouette_is_no_larger_than_can_be_worked_on(
     width: int, height: int
 ) -> None:
-    with pytest.raises(CameraError, match=f"{width}x{height} px; expected a working size"):
+    with pytest.raises(CameraError, match=f"{width}x{height} px; expected"):
         conversions.camera_of(info(width=width, height=height))
 
 
@@ -46,10 +46,10 @@ def test_an_image_is_not_much_larger_than_its_camera_info_says() -> None:
     assert conversions.most_pixels_of(calibration, 100.0) == 16 * 640 * 480
     assert conversions.most_pixels_of(calibration, 1.0) == 1e6
     data = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
-    with pytest.raises(EncodingError, match=r"64x48 is larger than the 0\.002 million"):
+    with pytest.raises(EncodingError, match=r"64x48 .*0\.002 million"):
         conversions.image_of(CompressedImage(format="png", data=data), 2000)
     raw = conversions.image_message(HEADER, np.zeros((48, 64), np.uint8))
-    with pytest.raises(EncodingError, match=r"64x48 is larger than the 0\.002 million"):
+    with pytest.raises(EncodingError, match=r"64x48 .*0\.002 million"):
         conversions.image_of(raw, 2000)
 
 

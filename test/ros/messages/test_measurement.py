@@ -30,5 +30,5 @@ def test_a_measurement_has_the_fit_of_each_reference_and_their_mean() -> None:
 def test_a_refusal_has_the_reason_and_no_fit() -> None:
     message = refused_message("nobody is in the image")
     assert (message.level, message.values) == (DiagnosticStatus.ERROR, [])
-    with pytest.raises(ValueError, match="nobody is in the image"):
+    with pytest.raises(ValueError, match="nobody"):
         mean_iou_of(message)

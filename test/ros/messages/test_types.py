@@ -22,7 +22,7 @@ def test_topics_without_a_class_are_left_out_and_said() -> None:
     said: list[str] = []
     assert message_classes(KINDS, [], said.append) == {"/image": Image}
     assert len(said) == 2
-    assert "/tf_static has the type no_such_msgs/msg/TF, which is not installed" in said[0]
+    assert "/tf_static" in said[0] and "no_such_msgs/msg/TF" in said[0]
     assert "'no_such_msgs' (ros-jazzy-no-such-msgs)" in said[0]
     assert message_classes({}, [], said.append) == {}
 
@@ -30,20 +30,20 @@ def test_topics_without_a_class_are_left_out_and_said() -> None:
 @pytest.mark.parametrize("chosen", [["/image", "/tf_static"], []])
 def test_what_was_chosen_has_to_have_one_and_so_has_some_topic(chosen: list[str]) -> None:
     kinds = KINDS if chosen else {"/tf_static": KINDS["/tf_static"]}
-    with pytest.raises(BagError, match=r"/tf_static has the type no_such_msgs/msg/TF"):
+    with pytest.raises(BagError, match=r"/tf_static .*no_such_msgs/msg/TF"):
         message_classes(kinds, chosen, lambda text: None)
 
 
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("sensor_msgs/msg/Nothing", "is not installed; install the package 'sensor_msgs'"),
-        ("no_such_msgs/msg/Image", "is not installed"),
-        ("Image", "expected one such as sensor_msgs/msg/Image"),
-        ("sensor_msgs/Image", "expected one such as"),
-        ("os.path/msg/Image", "expected one such as"),
-        ("sensor_msgs/msg/__doc__", "expected one such as"),
-        ("x" * 100_000, "expected one such as"),
+        ("sensor_msgs/msg/Nothing", "install .*'sensor_msgs'"),
+        ("no_such_msgs/msg/Image", "no_such_msgs/msg/Image.*installed"),
+        ("Image", "sensor_msgs/msg/Image"),
+        ("sensor_msgs/Image", "expected"),
+        ("os.path/msg/Image", "expected"),
+        ("sensor_msgs/msg/__doc__", "expected"),
+        ("x" * 100_000, "expected"),
     ],
 )
 def test_a_type_that_is_none_is_refused(kind: str, words: str) -> None:

@@ -1,8 +1,10 @@
-"""What the tests of nodes that use a measured posture share."""
+"""A bus in place of DDS, on which tests talk to a node, and messages for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,19 +12,81 @@ import pytest
 from cardbox_tracker.body.posture import JOINT_NAMES
 
 
-class Heard:
-    """Stands in for a publisher; keeps what it is given."""
+class Bus:
+    """Hands messages to the subscriptions of nodes, and keeps what they publish.
 
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
+    Attributes:
+        sent: the messages that were published, by the topic's full name.
+    """
 
-    def publish(self, message: Any) -> None:
-        self.messages.append(message)
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        from cardbox_tracker.ros.runtime.node import CardboxNode
+
+        self.sent: dict[str, list[Any]] = defaultdict(list)
+        self._subscribers: dict[str, Callable[..., None]] = {}
+        self._timers: list[Callable[[], None]] = []
+        self._nodes: list[Any] = []
+
+        def publisher(node: Any, _: Any, topic: str, *__: Any, **___: Any) -> Any:
+            name = node.resolve_topic_name(topic)
+            return SimpleNamespace(
+                publish=self.sent[name].append, get_subscription_count=lambda: 1, topic_name=name
+            )
+
+        monkeypatch.setattr(CardboxNode, "create_publisher", publisher)
+        monkeypatch.setattr(
+            CardboxNode,
+            "create_timer",
+            lambda _, __, callback, **___: self._timers.append(callback),
+        )
+
+    def start(self, kind: Callable[..., Any], **parameters: Any) -> Any:
+        """Start a node with ``parameters`` on this bus."""
+        from rclpy.parameter import Parameter
+
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        node = kind(intra_process=self, parameter_overrides=overrides, enable_rosout=False)
+        self._nodes.append(node)
+        return node
+
+    def send(self, topic: str, message: Any) -> None:
+        """Hand a message to the node that subscribes to ``topic``."""
+        self._subscribers[topic](message, {"source_timestamp": 0})
+
+    def tick(self) -> Any:
+        """Run every timer once; return the status that a node has published of itself."""
+        for callback in self._timers:
+            callback()
+        return self.sent["/diagnostics"][-1].status[0]
+
+    def texts(self, topic: str) -> list[Any]:
+        """Return what the messages on ``topic`` hold."""
+        return [message.data for message in self.sent[topic]]
+
+    def advertise(self, publisher: Any) -> Any:
+        """As of IntraProcess; the publisher keeps the messages here already."""
+        return publisher
+
+    def subscribe(self, topic: str, subscriber: Callable[..., None]) -> bool:
+        """As of IntraProcess: every subscription is this bus's."""
+        self._subscribers[topic] = subscriber
+        return True
+
+    def close(self) -> None:
+        for node in self._nodes:
+            node.close()
+            node.destroy_node()
 
 
 @pytest.fixture
-def heard() -> Callable[[], Heard]:
-    return Heard
+def bus(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bus]:
+    import rclpy
+
+    rclpy.init(args=[])
+    made = Bus(monkeypatch)
+    yield made
+    made.close()
+    rclpy.shutdown()
 
 
 @pytest.fixture

@@ -79,5 +79,5 @@ def test_without_depth_images_it_says_what_it_waits_for(
 def test_what_is_no_depth_is_refused_by_its_topic(node: Node, cut: DepthCut) -> None:
     grey = np.zeros((48, 64), np.uint8)
     node.heard["depth"](image_message(header(1), grey, "mono8"), 1)
-    with pytest.raises(EncodingError, match="/depth: encoding 'mono8' is no depth; expected 16UC1"):
+    with pytest.raises(EncodingError, match=r"/depth: .*'mono8' .*16UC1"):
         cut.add(header(1), CAMERA, 2.0, 1)

@@ -89,12 +89,12 @@ def test_the_distance_is_that_of_the_depth_images(node: Node, distance: DepthDis
 
 
 def test_what_is_missing_is_said(node: Node, distance: DepthDistance) -> None:
-    with pytest.raises(InitializationError, match="no depth image was received yet on /depth"):
+    with pytest.raises(InitializationError, match=r"no depth image .*/depth"):
         distance.check()
     distance.capture("side", 5, SECOND)
     node.see(1, 1.9)
-    with pytest.raises(InitializationError, match="'front': no depth image has come on /depth at"):
+    with pytest.raises(InitializationError, match=r"'front': no depth image .*/depth"):
         distance.capture("front", 5, 9 * SECOND)
     distance.capture("front", 5, SECOND)
-    with pytest.raises(InitializationError, match="no depth images of the references front and"):
+    with pytest.raises(InitializationError, match=r"no depth image.* front and"):
         distance.measure(measure, InitializationConfig())

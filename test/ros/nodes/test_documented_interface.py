@@ -291,7 +291,7 @@ def test_commands_give_nodes_in_one_process_what_they_have(
 
 
 def test_command_lines_of_play_bag_parse() -> None:
-    from cardbox_tracker.ros.nodes.play_bag_arguments import overrides_from
+    from cardbox_tracker.ros.nodes.play_bag_node import overrides_from
 
     for line in lines_that_start("play_bag"):
         own = line.split("play_bag", 1)[1].partition("--ros-args")[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,60 +9,61 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
 from cardbox_tracker.body.model_file import dumps_body_model  # noqa: E402
 from cardbox_tracker.body.proportions import body_from_proportions  # noqa: E402
-from cardbox_tracker.errors import CardboxError  # noqa: E402
 from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))
 
 
-@pytest.fixture
-def node(heard: Any) -> Iterator[Any]:
-    rclpy.init(args=[])
-    made = RulaNode(enable_rosout=False)
-    made._score, made._chances, made._report = heard(), heard(), heard()
-    yield made
-    made.destroy_node()
-    rclpy.shutdown()
+@pytest.fixture(autouse=True)
+def node(bus: Any) -> None:
+    bus.start(RulaNode)
 
 
-def test_a_pair_is_scored_under_its_stamp(node: Any, joints: Any) -> None:
-    node._on_model(MODEL, 0)
-    node._on_joints(joints(7, {"left_shoulder_abduction": 1.75, "torso_pitch": 0.6}), 0)
-    node._on_stddev(joints(7, {}, other=0.001), 0)
-    (report,) = node._report.messages
+def send(bus: Any, joints: JointState, stddev: JointState) -> None:
+    bus.send("/joint_states", joints)
+    bus.send("/joint_states_stddev", stddev)
+
+
+def test_a_pair_is_scored_under_its_stamp(bus: Any, joints: Any) -> None:
+    bus.send("/body_model", MODEL)
+    bent = {"left_shoulder_abduction": 1.75, "torso_pitch": 0.6}
+    send(bus, joints(7, bent), joints(7, {}, other=0.001))
+    (report,) = bus.sent["/rula/report"]
     assert report.header.stamp.nanosec == 7 * 10**8
     values = {value.key: value.value for value in report.status[0].values}
     assert values["likeliest score"] == "5"
     assert float(values["score with the right arm"]) < float(values["score with the left arm"])
-    assert node._score.messages[0].data == pytest.approx(float(values["score"]), abs=0.01)
-    chances = np.array(node._chances.messages[0].data)
+    (score,), (chances,) = bus.texts("/rula/score"), map(np.array, bus.texts("/rula/chances"))
+    assert score == pytest.approx(float(values["score"]), abs=0.01)
     assert chances.argmax() + 1 == 5
     assert chances.sum() == pytest.approx(1)
 
 
-def test_deviations_of_another_image_are_not_taken(node: Any, joints: Any) -> None:
-    node._on_model(MODEL, 0)
-    node._on_joints(joints(7, {}), 0)
-    node._on_stddev(joints(8, {}), 0)
-    assert not node._score.messages
+def test_deviations_of_another_image_are_not_taken(bus: Any, joints: Any) -> None:
+    bus.send("/body_model", MODEL)
+    send(bus, joints(7, {}), joints(8, {}))
+    assert not bus.sent["/rula/score"]
 
 
-def test_without_a_body_nothing_is_said(node: Any, joints: Any) -> None:
-    node._on_joints(joints(7, {}), 0)
-    node._on_stddev(joints(7, {}), 0)
-    assert not node._score.messages
+def test_without_a_body_nothing_is_said(bus: Any, joints: Any) -> None:
+    send(bus, joints(7, {}), joints(7, {}))
+    assert not bus.sent["/rula/score"]
 
 
-def test_what_is_no_posture_is_refused(node: Any, joints: Any) -> None:
-    node._on_model(MODEL, 0)
-    node._on_joints(JointState(name=["elbow"], position=[0.0]), 0)
-    with pytest.raises(CardboxError, match="not the tracker's: joints torso_y"):
-        node._on_stddev(JointState(), 0)
-    node._on_joints(joints(9, {"torso_pitch": float("nan")}), 0)
-    with pytest.raises(CardboxError, match="not finite"):
-        node._on_stddev(joints(9, {}), 0)
+def test_what_is_no_posture_is_refused(bus: Any, joints: Any) -> None:
+    bus.send("/body_model", MODEL)
+    for posture, stddev, word in (
+        (JointState(name=["elbow"], position=[0.0]), JointState(), "torso_y"),
+        (joints(9, {"torso_pitch": float("nan")}), joints(9, {}), "finite"),
+    ):
+        send(bus, posture, stddev)
+        status = bus.tick()
+        assert status.level == DiagnosticStatus.ERROR
+        assert word in status.message
+    assert not bus.sent["/rula/score"]

@@ -27,6 +27,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -34,26 +35,39 @@ EMPTY = np.zeros((120, 160), np.uint8)
 S = 10**9
 
 
+class Hands(IntraProcess):
+    """Hands messages to the node inside this process."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.takers: dict[str, Any] = {}
+
+    def take(self, topic: str, taker: Any) -> bool:
+        self.takers[topic] = taker
+        return True
+
+    def give(self, topic: str, message: Any) -> None:
+        self.takers[topic](message, {"source_timestamp": 0})
+
+
 class Fed:
     """A tracker node that is handed silhouettes; what it tracked, and how often it began."""
 
-    def __init__(self, node: TrackerNode, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.node = node
+    def __init__(self, node: TrackerNode, hands: Hands, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.node, self._hands = node, hands
         self.trackers: list[Tracker] = []
 
-        def track(
-            tracker: Tracker, silhouette: Any, image: Any = None, stamp_ns: Any = None
-        ) -> Estimate:
+        def track(tracker: Tracker, observations: Any) -> Estimate:
             self.trackers.append(tracker)
             return Estimate("no_person")
 
         monkeypatch.setattr(Tracker, "track", track)
-        node._on_info(camera_info_message(Header(), CAMERA), 0)
+        hands.give("/silhouette/camera_info", camera_info_message(Header(), CAMERA))
 
     def show(self, *stamps_ns: int) -> None:
         for stamp in stamps_ns:
             header = Header(stamp=Time(sec=stamp // S, nanosec=stamp % S))
-            self.node._pairing.add_silhouette(image_message(header, EMPTY, "mono8"), 0)
+            self._hands.give("/silhouette", image_message(header, EMPTY, "mono8"))
 
     @property
     def starts(self) -> int:
@@ -66,12 +80,14 @@ def fed(
 ) -> Iterator[Fed]:
     path = tmp_path / "body.yaml"
     save_body_model(BodyModel(), path)
+    hands = Hands()
     node = TrackerNode(
+        intra_process=hands,
         context=make_node().context,
         enable_rosout=False,
         parameter_overrides=[Parameter("model_file", value=str(path))],
     )
-    yield Fed(node, monkeypatch)
+    yield Fed(node, hands, monkeypatch)
     node.destroy_node()
 
 
@@ -79,7 +95,7 @@ def fed(
 def test_images_without_stamps_are_tracked_in_one_go(fed: Fed) -> None:
     fed.show(*[0] * 10)
     assert (len(fed.trackers), fed.starts) == (10, 1)
-    status = fed.node.diagnostics._status()
+    status = fed.node.diagnostics.status()
     assert any("the images have no stamp" in value.value for value in status.values)
 
 

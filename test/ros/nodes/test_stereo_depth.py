@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,9 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from builtin_interfaces.msg import Time  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
-from cardbox_tracker.errors import CameraError  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
@@ -27,38 +25,20 @@ BASELINE_M, DEPTH_M = 0.12, 1.5
 DISPARITY = round(250.0 * BASELINE_M / DEPTH_M)
 
 
-class Kept:
-    """In place of a publisher."""
-
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
-
-    def publish(self, message: Any) -> None:
-        self.messages.append(message)
-
-
-@pytest.fixture
-def node() -> Iterator[StereoDepthNode]:
-    rclpy.init(args=[])
-    made = StereoDepthNode(
-        parameter_overrides=[Parameter("tolerance_s", value=0.002)], enable_rosout=False
-    )
-    made._depth = made._depth_info = Kept()
-    yield made
-    made.close()
-    made.destroy_node()
-    rclpy.shutdown()
+@pytest.fixture(autouse=True)
+def node(bus: Any) -> None:
+    bus.start(StereoDepthNode, tolerance_s=0.002)
 
 
 def header(stamp_ms: int, frame: str = "left_optical_frame") -> Header:
     return Header(stamp=Time(sec=1, nanosec=1_000_000 * stamp_ms), frame_id=frame)
 
 
-def give_infos(node: StereoDepthNode, p03: float = -250.0 * BASELINE_M) -> None:
+def give_infos(bus: Any, p03: float = -250.0 * BASELINE_M) -> None:
     left, right = (camera_info_message(header(0), CAMERA) for _ in range(2))
     right.p[3] = p03
-    node._on_left_info(left, 0)
-    node._on_right_info(right, 0)
+    bus.send("/left/camera_info", left)
+    bus.send("/right/camera_info", right)
 
 
 def pair(left_ms: int, right_ms: int) -> tuple[Any, Any]:
@@ -67,12 +47,12 @@ def pair(left_ms: int, right_ms: int) -> tuple[Any, Any]:
     return image_message(header(left_ms), left), image_message(header(right_ms, "right"), right)
 
 
-def test_depth_of_a_wall(node: StereoDepthNode) -> None:
-    give_infos(node)
+def test_depth_of_a_wall(bus: Any) -> None:
+    give_infos(bus)
     left, right = pair(40, 41)
-    node._on_right(right, 0)
-    node._on_left(left, 0)
-    depth, info = node._depth.messages
+    bus.send("/right/image_raw", right)
+    bus.send("/left/image_raw", left)
+    (depth,), (info,) = bus.sent["/depth"], bus.sent["/depth/camera_info"]
     assert (depth.encoding, depth.width, depth.height) == ("32FC1", 320, 240)
     assert depth.header == left.header == info.header
     assert info.k[0] == CAMERA.fx
@@ -83,27 +63,29 @@ def test_depth_of_a_wall(node: StereoDepthNode) -> None:
     assert np.isfinite(metres[20:-20, 60:-20]).mean() > 0.9
 
 
-def test_only_images_of_one_time_are_a_pair_and_each_is_used_once(node: StereoDepthNode) -> None:
-    give_infos(node)
+def test_only_images_of_one_time_are_a_pair_and_each_is_used_once(bus: Any) -> None:
+    give_infos(bus)
     left, right = pair(40, 45)
-    node._on_left(left, 0)
-    node._on_right(right, 0)
-    assert node._depth.messages == []
+    bus.send("/left/image_raw", left)
+    bus.send("/right/image_raw", right)
+    assert bus.sent["/depth"] == []
     later, same = pair(45, 45)
-    node._on_left(later, 0)
-    assert node._depth.messages[0].header == later.header
-    node._on_right(same, 0)
-    assert len(node._depth.messages) == 2
+    bus.send("/left/image_raw", later)
+    assert bus.sent["/depth"][0].header == later.header
+    bus.send("/right/image_raw", same)
+    assert len(bus.sent["/depth"]) == 1
 
 
-def test_what_is_no_rectified_pair_is_said(node: StereoDepthNode) -> None:
+def test_what_is_no_rectified_pair_is_said(bus: Any) -> None:
     left, right = pair(40, 40)
-    node._on_left(left, 0)
-    node._on_right(right, 0)
-    assert node._depth.messages == []
+    bus.send("/left/image_raw", left)
+    bus.send("/right/image_raw", right)
+    assert bus.sent["/depth"] == []
     for stamp_ms, p03, text in ((80, 0.0, "no rectified pair"), (120, 30.0, "left camera the")):
-        give_infos(node, p03)
+        give_infos(bus, p03)
         left, right = pair(stamp_ms, stamp_ms)
-        node._on_left(left, 0)
-        with pytest.raises(CameraError, match=text):
-            node._on_right(right, 0)
+        bus.send("/left/image_raw", left)
+        bus.send("/right/image_raw", right)
+        status = bus.tick()
+        assert status.level == DiagnosticStatus.ERROR
+        assert text in status.message

@@ -85,5 +85,5 @@ def test_what_another_node_says_can_be_left_out(setting: str, link: str) -> None
 
 def test_without_tf2_msgs_the_text_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
-    with pytest.raises(CardboxError, match="publish_tf needs the package tf2_msgs, which is not"):
+    with pytest.raises(CardboxError, match=r"publish_tf .*tf2_msgs"):
         published()

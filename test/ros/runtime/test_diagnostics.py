@@ -16,7 +16,7 @@ from cardbox_tracker.ros.runtime.diagnostics import (
     WORKING,
     NodeDiagnostics,
 )
-from cardbox_tracker.ros.runtime.stream import Step, StreamStatistics
+from cardbox_tracker.vision.stamps import StampOrder, StreamStatistics
 
 PERIOD_NS = 66_666_667
 
@@ -64,23 +64,23 @@ def test_the_period_is_that_of_the_latest_stamps() -> None:
 
 def test_stamps_that_go_back_are_noticed() -> None:
     statistics = fed(list(range(40)))
-    assert statistics.add(1_000_000_000) is Step.RESTART
+    assert statistics.add(1_000_000_000) is StampOrder.RESTART
     assert statistics.out_of_order == 1
-    assert statistics.add(1_000_000_000 + PERIOD_NS) is Step.NEXT
+    assert statistics.add(1_000_000_000 + PERIOD_NS) is StampOrder.NEXT
 
 
 def test_status_says_what_the_node_waits_for_and_what_is_wrong(make_node: Callable) -> None:
     diagnostics = NodeDiagnostics(make_node())
     diagnostics.wait_for("images on /image_raw")
-    status = diagnostics._status()
+    status = diagnostics.status()
     assert (status.level, status.message) == (
         DiagnosticStatus.WARN,
         "waiting for images on /image_raw",
     )
     diagnostics.problem("the image has encoding '16UC3'")
-    assert diagnostics._status().level == DiagnosticStatus.ERROR
+    assert diagnostics.status().level == DiagnosticStatus.ERROR
     diagnostics.working(sent_ns=1)
-    status = diagnostics._status()
+    status = diagnostics.status()
     assert (status.level, status.message) == (DiagnosticStatus.OK, "working")
     assert {value.key for value in status.values} >= {
         "rate in (Hz)",
@@ -94,7 +94,7 @@ def test_programs_read_the_state_of_a_node_from_a_value(make_node: Callable) -> 
     diagnostics = NodeDiagnostics(make_node())
 
     def state() -> str:
-        return {v.key: v.value for v in diagnostics._status().values}[STATUS]
+        return {v.key: v.value for v in diagnostics.status().values}[STATUS]
 
     diagnostics.wait_for("images")
     assert state() == WAITING
@@ -110,7 +110,7 @@ def test_a_warning_stays_until_the_end(make_node: Callable) -> None:
     diagnostics = NodeDiagnostics(make_node())
     diagnostics.warn("incompatible QoS on /silhouette")
     diagnostics.working()
-    status = diagnostics._status()
+    status = diagnostics.status()
     assert status.level == DiagnosticStatus.WARN
     assert "incompatible QoS on /silhouette" in [value.value for value in status.values]
 
@@ -121,7 +121,7 @@ def test_a_result_that_takes_longer_than_a_period_is_late(make_node: Callable) -
         diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
     diagnostics.working(sent_ns=time.time_ns() - 60 * PERIOD_NS)
     diagnostics.working(sent_ns=time.time_ns() + 60 * PERIOD_NS)
-    values = {value.key: value.value for value in diagnostics._status().values}
+    values = {value.key: value.value for value in diagnostics.status().values}
     assert (values["late"], values["published"], values["received"]) == ("1", "2", "10")
 
 
@@ -154,8 +154,8 @@ def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
 
     def second() -> tuple[str, str]:
         now[0] += 1.0
-        diagnostics._tick()
-        status = diagnostics._status()
+        diagnostics.publish()
+        status = diagnostics.status()
         return status.message, {v.key: v.value for v in status.values}[STATUS]
 
     for _ in range(10):
@@ -188,15 +188,15 @@ def test_the_pause_of_a_recording_is_no_fault(
     diagnostics.input.add(1)
     for _ in range(6):
         now[0] += 1.0
-        diagnostics._tick()
+        diagnostics.publish()
     assert logged.lines[0].startswith(
         "images on /image_raw have ceased: play_bag plays a recording"
     )
     assert len(logged.lines) == 1 and not warned
-    assert diagnostics._status().level == DiagnosticStatus.WARN
+    assert diagnostics.status().level == DiagnosticStatus.WARN
     topics.clear()
-    diagnostics._tick()
-    assert diagnostics._status().level == DiagnosticStatus.ERROR
+    diagnostics.publish()
+    assert diagnostics.status().level == DiagnosticStatus.ERROR
 
 
 def test_a_slow_camera_is_not_silent(make_node: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,13 +206,13 @@ def test_a_slow_camera_is_not_silent(make_node: Callable, monkeypatch: pytest.Mo
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     for frame in range(10):
         diagnostics.input.add(1 + frame * 1_500_000_000)
-    diagnostics._tick()
+    diagnostics.publish()
     now[0] += 7.0
-    diagnostics._tick()
-    assert not diagnostics._silence
+    diagnostics.publish()
+    assert diagnostics.status().level == DiagnosticStatus.OK
     now[0] += 1.0
-    diagnostics._tick()
-    assert diagnostics._silence
+    diagnostics.publish()
+    assert "have ceased" in diagnostics.status().message
 
 
 def test_what_only_the_diagnostics_said_is_logged_once(
@@ -224,7 +224,7 @@ def test_what_only_the_diagnostics_said_is_logged_once(
     loss = [11]
     diagnostics.advice = lambda: {"loss": f"{loss[0]} % are lost", "": "logged by the node"}
     for loss[0] in range(11, 30):
-        status = diagnostics._status()
+        status = diagnostics.status()
     assert logged.lines == ["11 % are lost"]
     assert status.message == "logged by the node"
     assert "29 % are lost" in [value.value for value in status.values]
@@ -250,4 +250,4 @@ def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
     for frame in range(40):
         diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
         diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
-    assert ("fewer particles" in diagnostics._status().message) is slow
+    assert ("fewer particles" in diagnostics.status().message) is slow

@@ -73,7 +73,7 @@ def test_an_error_of_one_taker_is_its_own(make: Callable[..., Any]) -> None:
     )
     publisher.publish(String(data="hello"))
     assert taken[0].data == "hello"
-    assert failing.diagnostics._problem == "as told"
+    assert failing.diagnostics.status().message == "as told"
 
 
 @pytest.mark.parametrize("shared", [True, False])

@@ -53,7 +53,7 @@ def test_a_topic_that_ros_does_not_allow_is_told(topic: str, ros_domain: int) ->
     rclpy.init(context=context, domain_id=ros_domain)
     node = CardboxNode("tested", context=context, enable_rosout=False)
     try:
-        with pytest.raises(CardboxError, match="ROS does not allow a topic named"):
+        with pytest.raises(CardboxError, match="topic"):
             node.advertise(String, topic, qos.RESULT)
     finally:
         node.destroy_node()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, get_type_hints
 
 import pytest
@@ -15,13 +15,11 @@ from rclpy.parameter import Parameter
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
-from cardbox_tracker.ros.nodes.input_parameters import PlayBagParameters
-from cardbox_tracker.ros.nodes.node_parameters import (
-    NODES,
-    BackgroundParameters,
-    InitializerParameters,
-    TrackerParameters,
-)
+from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
     NEXT_IMAGE,
     RESTARTS,
@@ -39,6 +37,8 @@ ROOT = Path(__file__).resolve().parents[3]
 @dataclass(frozen=True)
 class Sample(NodeParameters):
     """Parameters of a test."""
+
+    retired = MappingProxyType({"middle": "give low and high"})
 
     low: float = parameter(1.0, "lower end", unit="m", limits=(0.0, 10.0))
     high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
@@ -71,8 +71,13 @@ def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     assert LiveParameters(node, Sample).value == Sample(fresh=0.7)
     said = [line for line in said if "no parameter" in line]
     assert len(said) == 2
-    assert "'lo' is no parameter of node 'tested'" in said[0] and "mean 'low'?" in said[0]
+    assert all(name in said[0] for name in ("'lo'", "'tested'", "'low'"))
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
+
+
+def test_a_name_of_a_former_version_is_refused_with_what_to_do(make_node: Callable) -> None:
+    with pytest.raises(CardboxError, match=r"middle.*removed.*give low and high"):
+        LiveParameters(make_node("-p", "middle:=1.5"), Sample)
 
 
 def test_defaults_are_declared_with_description_unit_and_range(make_node: Callable) -> None:
@@ -206,7 +211,7 @@ def test_the_old_name_works_at_the_start_and_live_with_a_hint(
 
 def test_the_old_name_beside_the_new_one_is_refused_at_the_start(make_node: Callable) -> None:
     node = make_node("-p", "stale:=0.1", "-p", "fresh:=0.2")
-    with pytest.raises(CardboxError, match=r"tested.*'stale' and 'fresh'.*give 'fresh' only"):
+    with pytest.raises(CardboxError, match=r"tested.*'stale' and 'fresh'.*'fresh'"):
         LiveParameters(node, Sample)
 
 
@@ -349,11 +354,8 @@ def test_yaml_floats_stay_floats(value: float) -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"particles": 200_000, "cycles": 20}, "particles is 200000; expected 0 to 20000"),
-        (
-            {"particles": 20_000, "cycles": 2},
-            "20000 particles x 2 cycles are 40000; expected 20000",
-        ),
+        ({"particles": 200_000, "cycles": 20}, "particles is 200000; .*20000"),
+        ({"particles": 20_000, "cycles": 2}, "40000; .*20000"),
         ({"preset": "paper", "particles": 1000, "cycles": 100}, "cardbox track"),
     ],
 )

@@ -1,0 +1,181 @@
+"""The benchmark's report in Markdown, and the README's figures of speed, from its JSON file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.nodes import PERCENTILES
+from cardbox_tracker.files import atomic_path
+
+BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
+COMMAND = "make benchmark"
+
+_STREAM = "mono8 320x240 at 30 Hz"
+
+_FRAMES = {
+    "paper": "silhouette to posture, the paper's settings",
+    "opencv": "the same with OpenCV drawing the patches",
+    "default": "silhouette to posture, preset `default`",
+    "image_to_posture": "image to posture, the paper's settings",
+}
+
+
+def write_report(results: Mapping[str, Any], path: Path) -> None:
+    """Write the report of ``results``, as ``benchmark.json`` holds them, to ``path``."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(report(results), encoding="utf-8")
+
+
+def report(results: Mapping[str, Any]) -> str:
+    """Return the whole report."""
+    versions = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
+    parts = [
+        "# Benchmarks",
+        f"Made by `{COMMAND}` on {results['cpu']} with {results['cores']} cores; {versions}; "
+        f"commit {results['commit']}. Numbers: [benchmarks.json](benchmarks.json).",
+        "The first four tables were measured on one core, on "
+        f"{results['measured_frames']} images (320x240) of a synthetic person who waves. What is "
+        "compared takes turns of ten images. p95 is the 95th percentile.",
+        "## One image",
+        _table(
+            ("600 particles unless the preset says otherwise", "median", "p95"),
+            [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
+        ),
+        f"The compiled cost makes an image {results['ratio_opencv']:.0f} times faster than "
+        "`fillConvexPoly`, XOR and `countNonZero` do. Drawn by the same compiled code, the "
+        f"volumetric model of 42 planes takes {results['ratio_volumetric']:.1f} times as long as "
+        f"the cardbox model of 15. {_mediapipe(results)} The process holds "
+        f"{results['rss_mb']:.0f} MB.",
+        "## Stages",
+        _table(
+            ("step", "median", "p95"),
+            [(name, *_ms(times)) for name, times in results["stages"].items()],
+        ),
+        "## Resolution",
+        "The time of a particle grows with the rows of its outline, not with its area: twice the "
+        f"width and height take {results['ratio_double_resolution']:.2f} times as long.",
+        _table(
+            ("image", "median", "p95"),
+            [(name, *_ms(times)) for name, times in results["resolutions"].items()],
+        ),
+        "## Particles",
+        f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
+        _table(
+            ("particles in all filters", "median"),
+            [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
+        ),
+        *_nodes(results["nodes"]),
+        "A live node waits between images; meanwhile the processor slows down and its caches lose "
+        "the node's data. Image to posture, preset `default`, takes "
+        f"{results['after_pauses']['without_ms']:.1f} ms if images follow each other without a "
+        f"pause, and {results['after_pauses']['with_ms']:.1f} ms after a pause of a thirtieth of a "
+        "second, on the same core. The rest of the latency is DDS and the waking of processes.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def readme_section(results: Mapping[str, Any]) -> str:
+    """Return the README's table of speed."""
+    rows = [
+        (
+            "silhouette to posture, 600 particles, one core",
+            _ms(results["frames"]["paper"])[0],
+        ),
+        (
+            "the same with OpenCV drawing the patches takes",
+            f"{results['ratio_opencv']:.0f} times as long",
+        ),
+    ]
+    if results["ratio_mediapipe"] is not None:
+        measured = results["mediapipe"]
+        rows += [
+            (
+                "MediaPipe Pose (full) on the same synthetic images, one core, takes (it finds a "
+                f"person in {100 * measured['found']:.0f} % of them)",
+                f"{measured['ratio']:.0f} times as long",
+            ),
+            (
+                "the same, compared with image to posture",
+                f"{measured['ratio_from_image']:.1f} times as long",
+            ),
+        ]
+    rows.append(
+        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}")
+    )
+    nodes = results["nodes"]
+    for words, measured in (
+        (("all nodes in one process", nodes["single_process"]), ("each in its own", nodes))
+        if nodes
+        else ()
+    ):
+        stream = measured["streams"][_STREAM]
+        text = f"{stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95"
+        rows.append((f"image stamp to JointState over DDS, {_STREAM}, {words}", text))
+    return _table(("speed", f"on {results['cpu']}"), rows)
+
+
+def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
+    if nodes is None:
+        return ["## Nodes", "Not measured: ROS 2 was not installed."]
+    return [
+        "## Nodes",
+        "Time from the image's stamp until the callback of a Python subscriber has the JointState, "
+        "over DDS, preset `default`; in brackets until the message is in the subscriber's process. "
+        "The publisher runs on the same machine. Large images use "
+        "`config/fastdds_large_images.xml`. Processor time is in percent of one core.",
+        "### Each node a process of its own",
+        *_streams(nodes),
+        "### All nodes in one process (`cardbox_nodes`)",
+        *_streams(nodes["single_process"]),
+    ]
+
+
+def _streams(measured: Mapping[str, Any]) -> list[str]:
+    ready = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in measured["ready_s"].items())
+    memory = ", ".join(f"{name} {value:.0f} MB" for name, value in measured["rss_mb"].items())
+    processes = list(measured["ready_s"])
+    several = len(processes) > 1
+    rows = [
+        (
+            name,
+            *(
+                f"{stream[f'p{p}_ms']:.1f} ms ({stream[f'received_p{p}_ms']:.1f})"
+                for p in PERCENTILES
+            ),
+            f"{stream['received']}/{stream['sent']}",
+            *(f"{stream['cpu_percent'][process]:.0f} %" for process in processes),
+            *([f"{stream['cpu_percent_sum']:.0f} %"] if several else []),
+        )
+        for name, stream in measured["streams"].items()
+    ]
+    titles = (*(f"p{p}" for p in PERCENTILES), "arrived", *processes)
+    return [
+        _table(("stream", *titles, *(["all three"] if several else [])), rows),
+        f"Ready after: {ready} (from the start of the process, with compiled code in the cache). "
+        f"Memory: {memory}.",
+    ]
+
+
+def _mediapipe(results: Mapping[str, Any]) -> str:
+    measured = results["mediapipe"]
+    if measured is None:
+        return "MediaPipe was not installed."
+    return (
+        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms per image: "
+        f"{measured['ratio']:.0f} times as long as silhouette to posture, "
+        f"{measured['ratio_from_image']:.1f} times as long as image to posture. It finds a person "
+        f"in {100 * measured['found']:.0f} % of these synthetic images, and its time depends on "
+        "whether it does."
+    )
+
+
+def _ms(times: Mapping[str, float]) -> tuple[str, str]:
+    return f"{times['median_ms']:.3g} ms", f"{times['p95_ms']:.3g} ms"
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(cells) + " |" for cells in (header, *rows)]
+    lines.insert(1, "|" + "---|" * len(header))
+    return "\n".join(lines)

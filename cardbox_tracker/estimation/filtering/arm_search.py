@@ -1,0 +1,96 @@
+"""The whole-body filter's search of one arm beside the torso that was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
+from cardbox_tracker.estimation.filtering.draws import Draws
+from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
+
+# Noise around the best arms, as a share of that of all.
+_AGAIN_NOISE = 0.45
+
+
+class ArmSearch:
+    """Searches arms (N, 4) before all cameras of a cost, whose torso is fixed.
+
+    Attributes:
+        spreads_m: of left elbow and hand, right elbow and hand, in the last frame, metres.
+    """
+
+    def __init__(self, cost: MultiViewCost, plan: SearchPlan) -> None:
+        """Prepare to search by ``cost``."""
+        self._cost, self._config, self._candidates = cost, plan.config, plan.candidates
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.spreads_m: list[float] = [0.0, 0.0, 0.0, 0.0]
+
+    def __call__(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
+        """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
+
+        Args:
+            pool: states (M, 14), the best first, to whose torso the arms belong.
+            arm: 0 left, 1 right.
+            draws: random numbers.
+        """
+        config, cost = self._config, self._cost
+        arms = self._proposed(pool, arm, *draws.for_arms(self._candidates * config.arms))
+        ratings = cost.arms(arms, arm)
+        self.spreads_m[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
+            arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
+        )
+        near = moves.around_best(
+            arms,
+            ratings,
+            config.best_arms,
+            _AGAIN_NOISE * config.arm_noise_rad,
+            ARM_LIMITS,
+            draws.for_near_arms(self._candidates * config.arms_again),
+        )
+        near = self.promising(near, arm)
+        return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)])
+
+    def _proposed(
+        self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
+    ) -> FloatArray:
+        """Return arms (N, 4): each camera that sees proposes its part, for what is uncovered there.
+
+        Mirrored arms are mirrored along that camera's line of sight.
+        """
+        cost, times = self._cost, self._candidates
+        seeing: Sequence[int] = cost.seeing
+        count = len(seeing)
+        ends = [times * (self._config.arms * part // count) for part in range(count + 1)]
+        arms = np.concatenate(
+            [
+                propose_arms(
+                    cost.to_views[number](pool),
+                    arm,
+                    self._config,
+                    cost.costs[number],
+                    normals[begin:end],
+                    uniforms[begin:end],
+                    count,
+                    times,
+                )
+                for number, begin, end in zip(seeing, ends, ends[1:], strict=False)
+            ]
+        )
+        return self.promising(arms, arm)
+
+    def promising(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return the one of each ``candidates`` arms (N, 4) that seems to cost least."""
+        if self._candidates == 1:
+            return arms
+        # Neighbours are of one kind, so each kind stays.
+        costs = self._cost.arms_by_points(arms, arm).reshape(-1, self._candidates)
+        best: FloatArray = arms[self._candidates * np.arange(len(costs)) + costs.argmin(axis=1)]
+        return best

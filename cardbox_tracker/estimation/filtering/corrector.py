@@ -1,0 +1,53 @@
+"""A corrector says where the joints of a result really are; it is the setting ``corrector``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering.result_features import Viewpoints
+from cardbox_tracker.estimation.filtering.search_features import Search
+from cardbox_tracker.vision.camera import Camera
+
+
+class Result(NamedTuple):
+    """A result of the whole-body filter in one frame.
+
+    Attributes:
+        frame: silhouette, image, depth image, stamp and the interval to the frame before.
+        state: d1..d12, ``torso_x`` and ``torso_z``, (14,), rad and metres.
+        stddev: standard deviations of the state, from the spread of the particles, (14,).
+        keypoints_m: left shoulder, elbow, hand, then the right ones, (6, 3), metres in the optical
+            frame of the first camera.
+        iou: intersection over union of model and silhouette.
+        search: the rated states, and the evidence for the result.
+        viewpoints: how the cameras see the person.
+    """
+
+    frame: Frame
+    state: FloatArray
+    stddev: FloatArray
+    keypoints_m: FloatArray
+    iou: float
+    search: Search
+    viewpoints: Viewpoints
+
+
+class Corrector(Protocol):
+    """Corrects the results of one body; it may remember frames."""
+
+    def __call__(self, found: Result) -> FloatArray:
+        """Return where the keypoints are, (6, 3), metres in the optical frame.
+
+        The tracker smooths them and poses the body to them, with the bones' own lengths.
+        """
+
+    def deviations(self, corrected: Result) -> FloatArray | None:
+        """Return standard deviations (14,) of the corrected result; None: as before it."""
+
+
+MakeCorrector = Callable[[WholeBodyCost, Camera, int], Corrector]
+"""Takes the body as the first camera sees it, that camera, and the number of cameras."""

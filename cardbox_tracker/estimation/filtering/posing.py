@@ -1,0 +1,49 @@
+"""The posture whose keypoints are nearest to given ones, smoothed over time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
+from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
+from cardbox_tracker.estimation.filtering.low_pass import LowPass
+
+# Place and arms move; the torso keeps its angles.
+_STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
+_STEPS = 1
+# Roll, pitch and yaw of the torso in a state.
+_TURNS = slice(1, 4)
+
+
+class SmoothedPosing:
+    """Poses one body at keypoints; low-pass filters smooth these and the torso's angles."""
+
+    def __init__(self, cost: WholeBodyCost, time_constant_s: float) -> None:
+        """Prepare for the body of ``cost``; a time constant of 0 smooths nothing."""
+        self._cost = cost
+        self._keypoints, self._turns = LowPass(time_constant_s), LowPass(time_constant_s)
+
+    def forget(self) -> None:
+        """Begin anew: the next state may be of another place."""
+        self._keypoints.forget()
+        self._turns.forget()
+
+    def __call__(self, state: FloatArray, keypoints_m: FloatArray, interval_s: float) -> FloatArray:
+        """Return the state (14,) near ``state`` whose keypoints are nearest to smoothed ones.
+
+        Args:
+            state: (14,), from which the torso's angles are.
+            keypoints_m: (6, 3), metres in the optical frame.
+            interval_s: since the frame before, s.
+        """
+        cost = self._cost
+        posed = state.copy()
+        posed[_TURNS] = self._turns(state[_TURNS], interval_s)
+        figure = cost.parts, cost.girdle, cost.place, cost.view
+        wanted_m = self._keypoints(keypoints_m, interval_s)
+        pose_at_keypoints(posed, *figure, wanted_m, STATE_LIMITS)
+        fit_keypoints(posed, *figure, wanted_m, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
+        return posed

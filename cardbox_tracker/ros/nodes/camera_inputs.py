@@ -1,0 +1,310 @@
+"""The tracker's input: what its cameras, and a depth image, show at one time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+from cardbox_tracker.errors import CameraError, CardboxError
+from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.observation import Observation
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.conversions import ImageArray
+from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
+from cardbox_tracker.ros.nodes.depth_input import DepthInput
+from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.depth_image import DepthImage
+from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
+from cardbox_tracker.vision.stamps import StreamStatistics
+
+_SILENT_S = 3.0
+# The stamps of cameras are compared only while all of them send: one that pauses is behind.
+_RECENT_S = 0.5
+_OTHER_CLOCK_NS = 1_000_000_000
+
+
+class Received(NamedTuple):
+    """A silhouette with its image, or a depth image, as they came."""
+
+    message: Image
+    image: Image | None
+    sent_ns: int
+
+
+@dataclass(frozen=True)
+class ObservationSet:
+    """What all cameras saw at one time.
+
+    Attributes:
+        header: stamp of the first camera's image, or of the earliest one, in the first camera's
+            frame.
+        headers: of each camera's silhouette, the first camera's first; None of one without.
+        observations: of each camera, as a tracker takes them.
+        sent_ns: when the last silhouette left its sender, ns since the epoch.
+        nothing: (H, W), a black image of the first camera.
+    """
+
+    header: Header
+    headers: list[Header | None]
+    observations: list[Observation]
+    sent_ns: int
+    nothing: ImageArray
+
+    def picture(self, number: int = 0) -> ImageArray:
+        """Return a camera's image, or else its silhouette; black if it has neither."""
+        one = self.observations[number]
+        seen = one.silhouette if one.image is None else one.image
+        return self.nothing if seen is None else seen
+
+
+class _Stream:
+    """Messages of one camera, or depth images: how they arrive, and what is wrong with them."""
+
+    def __init__(self, name: str, topic: str) -> None:
+        self.name, self.topic = name, topic
+        self.statistics = StreamStatistics()
+        self.problem = ""
+        self.newest_ns = 0
+        self._arrived_s = self._counted_s = time.monotonic()
+        self._counted = 0
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since the last message came, or since the start."""
+        return time.monotonic() - self._arrived_s
+
+    def arrived(self, stamp_ns: int) -> bool:
+        """Take note of a message; return whether it can be used."""
+        self._arrived_s, self.newest_ns = time.monotonic(), stamp_ns
+        return self.statistics.add(stamp_ns).is_usable
+
+    def values(self) -> dict[str, str]:
+        """Return the rate since the last call, and the age of what came last."""
+        now_s, count = time.monotonic(), self.statistics.received
+        rate = (count - self._counted) / max(now_s - self._counted_s, 1e-3)
+        self._counted_s, self._counted = now_s, count
+        return {
+            f"{self.name} rate (Hz)": f"{rate:.1f}",
+            f"{self.name} age (s)": f"{self.age_s:.1f}" if count else "never",
+        }
+
+
+class CameraInputs:
+    """Subscribes to all cameras, and hands on what belongs to one time, in order.
+
+    Each silhouette is put together with its image (:class:`ImagePairing`). Those of several
+    cameras, and depth images, then find each other by their stamps
+    (:class:`~cardbox_tracker.vision.pairing.Arrivals`); a camera alone has nothing to wait for.
+    """
+
+    def __init__(
+        self,
+        node: CardboxNode,
+        settings: TrackerParameters,
+        changed: Callable[[Camera | None, Sequence[OtherCamera]], None],
+        deliver: Callable[[Received, Sequence[Received | None]], None],
+    ) -> None:
+        """Subscribe with ``node``.
+
+        Args:
+            node: the tracker.
+            settings: its parameters.
+            changed: called with the first camera and the further ones when all are known, or
+                others than before; with None where nothing says any more where they stand.
+            deliver: called with what belongs to one time, for :meth:`observed`, and before it the
+                silhouette whose stamp stands for all.
+
+        Raises:
+            CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
+        """
+        cameras = settings.cameras or [""]
+        self._changed, self._deliver = changed, deliver
+        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
+        topics = silhouettes_of(cameras)
+        self._streams = [
+            _Stream(camera.strip("/") or "camera", node.resolve(topic))
+            for camera, topic in zip(cameras, topics, strict=True)
+        ]
+        self._count = len(self._streams)
+        if settings.depth:
+            self._streams.append(_Stream("depth", node.resolve(settings.depth)))
+        self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
+        self._pairings = [ImagePairing(partial(self._add, number)) for number in range(self._count)]
+        for topic, pairing in zip(topics, self._pairings, strict=True):
+            if settings.use_image:
+                image = f"{topic}/image"
+                node.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
+            node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
+        if settings.depth:
+            self._depth_input = DepthInput(node, settings.depth, self._on_depth)
+
+    @property
+    def source(self) -> str:
+        """Topics of the silhouettes."""
+        return ", ".join(stream.topic for stream in self._streams[: self._count])
+
+    @property
+    def missing(self) -> str:
+        """Topics of CameraInfo on which nothing was received yet."""
+        return ", ".join(self._poses.missing)
+
+    def wait_for_images(self, waits: bool) -> None:
+        """Say whether silhouettes wait for the images that they are cut out of."""
+        for pairing in self._pairings:
+            pairing.waits = waits
+
+    def check(self) -> None:
+        """Raise CameraError if all cameras are there, but nothing says where they stand."""
+        self._poses.check()
+
+    def _on_poses(self) -> None:
+        self._changed(self._poses.first, self._poses.others)
+
+    def _on_depth(self, message: Any, sent_ns: int) -> None:
+        self._add(self._count, message, None, sent_ns)
+
+    def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:
+        stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
+        is_usable = self._streams[number].arrived(stamp_ns)
+        if len(self._streams) == 1:
+            # The node itself leaves out and counts what comes twice or too late.
+            self._deliver(received, [received])
+            return
+        if not is_usable:
+            return
+        self._arrivals.tolerance_ns = self._streams[0].statistics.period_ns // 2 or TOLERANCE_NS
+        self._arrivals.add(number, stamp_ns, received)
+        for one_time in self._arrivals.sets():
+            # The last one may be a depth image, which says nothing alone.
+            if any(one is not None for one in one_time[: self._count]):
+                self._deliver(self._lead_of(one_time), one_time)
+
+    def _lead_of(self, received: Sequence[Received | None]) -> Received:
+        """Return the silhouette whose stamp stands for all: the first camera's, or the earliest."""
+        first = received[0]
+        there = [one for one in received[: self._count] if one is not None]
+        return first or min(there, key=lambda one: _stamp_ns(one.message))
+
+    def observed(self, received: Sequence[Received | None]) -> ObservationSet:
+        """Return what was delivered, once the cameras are known, as arrays.
+
+        A message that cannot be read is left out, and said.
+
+        Raises:
+            CameraError: none of the silhouettes can be read.
+        """
+        first = self._poses.first
+        assert first is not None
+        lead, messages = self._lead_of(received), received[: self._count]
+        cameras = [first, *(other.camera for other in self._poses.others)]
+        streams = self._streams[: self._count]
+        observations = [
+            Observation(*_picture(*each)) for each in zip(streams, messages, cameras, strict=True)
+        ]
+        if all(one.silhouette is None for one in observations):
+            problems = [stream.problem for stream in streams if stream.problem]
+            raise CameraError("; ".join(problems))
+        depth_m = self._depth(received[self._count :], first)
+        stamp_ns = _stamp_ns(lead.message)
+        observations[0] = replace(observations[0], depth_m=depth_m, stamp_ns=stamp_ns)
+        header = lead.message.header
+        if received[0] is None:
+            header = Header(stamp=header.stamp, frame_id=self._poses.frame_id)
+        return ObservationSet(
+            header,
+            [
+                one.message.header if one is not None and seen.silhouette is not None else None
+                for one, seen in zip(messages, observations, strict=True)
+            ],
+            observations,
+            max(one.sent_ns for one in messages if one is not None),
+            np.zeros((first.height, first.width), np.uint8),
+        )
+
+    def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
+        if not received or received[0] is None:
+            return None
+        stream = self._streams[-1]
+        try:
+            depth_m = self._depth_input.seen_by(camera, received[0].message)
+        except CardboxError as error:
+            stream.problem = str(error)
+            return None
+        stream.problem = ""
+        return depth_m
+
+    def values(self, ious: Sequence[float | None]) -> dict[str, str]:
+        """Return rate, age and fit of each stream, for the diagnostics; a camera alone has none."""
+        values: dict[str, str] = {}
+        if len(self._streams) == 1:
+            return values
+        for number, stream in enumerate(self._streams):
+            values |= stream.values()
+            if self._count > 1 and number < min(len(ious), self._count):
+                iou = ious[number]
+                values[f"{stream.name} iou"] = "sees nobody" if iou is None else f"{iou:.3f}"
+            values[f"{stream.name} late"] = str(self._arrivals.late[number])
+        return values
+
+    def warnings(self) -> dict[str, str]:
+        """Return what is wrong with single streams while the others go on, by kind."""
+        if len(self._streams) == 1:
+            return {}
+        first, *others = self._streams
+        texts = {}
+        for stream in self._streams:
+            if stream.age_s > _SILENT_S:
+                texts[f"silence of {stream.name}"] = (
+                    f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
+                    "on without it: is that camera running, and every node behind it?"
+                )
+            elif stream.problem:
+                texts[f"{stream.name} cannot be read"] = f"{stream.topic}: {stream.problem}"
+        for stream in others:
+            apart_ns = abs(stream.newest_ns - first.newest_ns)
+            is_stamped = stream.newest_ns and first.newest_ns
+            is_recent = max(stream.age_s, first.age_s) < _RECENT_S
+            if is_stamped and is_recent and apart_ns > _OTHER_CLOCK_NS:
+                texts[f"clock of {stream.name}"] = (
+                    f"the stamps on {stream.topic} and {first.topic} are {apart_ns / 1e9:.1f} s "
+                    "apart, so that nothing belongs together; set the clocks of both computers by "
+                    "one, such as with chrony"
+                )
+        return texts
+
+
+def _picture(
+    stream: _Stream, received: Received | None, camera: Camera
+) -> tuple[ImageArray | None, ImageArray | None]:
+    """Return silhouette and image of a camera; None for what it lacks or cannot be read."""
+    if received is None:
+        return None, None
+    try:
+        silhouette = conversions.silhouette_of(received.message)
+        height, width = silhouette.shape
+        if (width, height) != (camera.width, camera.height):
+            raise CameraError(
+                f"the silhouette is {width}x{height} but {stream.topic}/camera_info describes "
+                f"{camera.width}x{camera.height}; expected the same size"
+            )
+        image = conversions.image_behind(silhouette, received.image)
+    except CardboxError as error:
+        stream.problem = str(error)
+        return None, None
+    stream.problem = ""
+    return silhouette, image
+
+
+def _stamp_ns(message: Image) -> int:
+    return conversions.stamp_ns(message.header.stamp)

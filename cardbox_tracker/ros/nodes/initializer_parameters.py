@@ -1,0 +1,117 @@
+"""The parameters of the node ``initializer``, which its sources of the distance read, too."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cardbox_tracker.estimation.initialization.config import (
+    MAX_PITCH_RAD,
+    InitializationConfig,
+)
+from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.vision.pairing import camera_names
+
+_MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
+_NEXT_GUIDANCE, _NEXT_CAPTURE = "next guidance", "next capture"
+_NEXT_MEASUREMENT = "next measurement"
+
+
+@dataclass(frozen=True)
+class InitializerParameters(NodeParameters):
+    """Measure the person from three reference postures."""
+
+    person_distance_m: float = shared(InitializationConfig, "distance_m", effect=_NEXT_MEASUREMENT)
+    camera_pitch_deg: float = shared(
+        InitializationConfig,
+        "camera_pitch_rad",
+        default=math.degrees(InitializationConfig.camera_pitch_rad),
+        unit="deg",
+        limits=(-_MAX_PITCH_DEG, _MAX_PITCH_DEG),
+        effect=_NEXT_MEASUREMENT,
+    )
+    side_turn: str = shared(InitializationConfig, "side_turn", effect=_NEXT_GUIDANCE)
+    hypotheses: int = shared(InitializationConfig, "hypotheses", effect=_NEXT_MEASUREMENT)
+    max_rounds: int = shared(InitializationConfig, "max_rounds", effect=_NEXT_MEASUREMENT)
+    seed: int = shared(InitializationConfig, "seed", effect=_NEXT_MEASUREMENT)
+    check_postures: bool = shared(InitializationConfig, "check_postures", effect=_NEXT_MEASUREMENT)
+    least_iou: float = shared(InitializationConfig, "least_iou", effect=_NEXT_MEASUREMENT)
+    capture_frames: int = parameter(
+        5,
+        "silhouettes a capture combines, each pixel by majority; more of them remove more noise, "
+        "but the person must stand still for longer",
+        limits=(1, 30),
+        effect=_NEXT_CAPTURE,
+    )
+    count_down_s: int = parameter(
+        5,
+        "time the guidance gives the person for each posture",
+        unit="s",
+        limits=(1, 60),
+        effect=_NEXT_GUIDANCE,
+    )
+    attempts: int = parameter(
+        3,
+        "times the guidance tries each posture before it gives up",
+        limits=(1, 20),
+        effect=_NEXT_GUIDANCE,
+    )
+    mirror: bool = parameter(
+        True,
+        "the guidance shows the person as in a mirror; false: as the camera does",
+    )
+    bell: bool = parameter(
+        False,
+        "ring the terminal's bell when the guidance has captured a posture, or could not",
+    )
+    model_file: str = parameter(
+        "",
+        "file to save the body model to; if it exists at the start, it is published; empty: none",
+        read_only=True,
+    )
+    optical_frame_in_urdf: bool = parameter(
+        True,
+        "also put the camera's optical frame into robot_description; false if another node "
+        "already publishes where it is",
+        effect=_NEXT_MEASUREMENT,
+    )
+    torso_place_in_urdf: bool = parameter(
+        True,
+        "robot_description has the joints torso_x and torso_z; must be the same as the tracker's "
+        "torso_place",
+        effect=_NEXT_MEASUREMENT,
+    )
+
+    cameras: list[str] = cameras_parameter()
+    extrinsics_file: str = extrinsics_parameter()
+    depth: str = parameter(
+        "",
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the (first) camera is, "
+        "of its view or with a CameraInfo on TOPIC/camera_info, which measure how far away the "
+        "person is; empty: none",
+        read_only=True,
+    )
+    measure_distance: bool = parameter(
+        True,
+        "depth images, or with two cameras or more the second one, measure how far away the person "
+        "is; false: person_distance_m is that",
+        effect=_NEXT_MEASUREMENT,
+    )
+
+    def check(self) -> None:
+        """Raise ValueError where values do not go together."""
+        camera_names(self.cameras)
+
+    def config(self) -> InitializationConfig:
+        """Return the settings of the core."""
+        return InitializationConfig(
+            distance_m=self.person_distance_m,
+            camera_pitch_rad=math.radians(self.camera_pitch_deg),
+            side_turn=self.side_turn,
+            hypotheses=self.hypotheses,
+            max_rounds=self.max_rounds,
+            seed=self.seed,
+            check_postures=self.check_postures,
+            least_iou=self.least_iou,
+        )

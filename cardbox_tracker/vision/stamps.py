@@ -1,0 +1,182 @@
+"""Order and losses of a stream of images, judged by their stamps.
+
+A camera that sets no stamps, or one whose clock jumps, must neither stop the nodes nor make
+tracking start again with every image.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections import Counter, deque
+from enum import Enum
+
+WINDOW = 120
+_PAUSE_NS = 2_000_000_000
+# Further back than the network reorders messages: the source has started again.
+_RESTART_NS = 1_000_000_000
+# After this many images of one clock in a row the other clock is forgotten.
+_PATIENCE = 5
+
+
+class StampOrder(Enum):
+    """How the stamp of an image follows the one before."""
+
+    NEXT = "later than the one before, or the first"
+    GAP = "more than two seconds later"
+    RESTART = "more than a second older: the source has started again"
+    LATE = "older, by a second at most: it was overtaken on the way"
+    REPEATED = "the stamp of the one before"
+    FOREIGN = "of another clock, which another publisher has"
+    UNSTAMPED = "without a stamp: the order of arrival counts"
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the image may be processed as the next one."""
+        return self not in (StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
+
+
+class StampSequence:
+    """Classifies each stamp by those before it.
+
+    A jump is followed at once. If the next image continues the time before the jump, that time goes
+    on and images of the other time are foreign: two publishers with different clocks, or one wrong
+    stamp.
+    """
+
+    def __init__(self) -> None:
+        """Start before the first image."""
+        self._last_ns: int | None = None
+        # Where the stamps were before they jumped.
+        self._left_ns: int | None = None
+        self._has_jumped = False
+        self._foreign = 0
+
+    def add(self, stamp_ns: int) -> StampOrder:
+        """Return how the next stamp follows; 0 stands for none."""
+        if stamp_ns == 0:
+            return StampOrder.UNSTAMPED
+        last_ns = self._last_ns
+        if last_ns is None:
+            self._last_ns = stamp_ns
+            return StampOrder.NEXT
+        spacing_ns = stamp_ns - last_ns
+        if -_RESTART_NS <= spacing_ns < _PAUSE_NS:
+            self._foreign, self._has_jumped = 0, False
+            if spacing_ns <= 0:
+                return StampOrder.LATE if spacing_ns else StampOrder.REPEATED
+            self._last_ns = stamp_ns
+            return StampOrder.NEXT
+        if self._has_jumped and self._left_ns is not None:
+            if 0 < stamp_ns - self._left_ns < _PAUSE_NS:
+                self._has_jumped, self._left_ns, self._last_ns = False, last_ns, stamp_ns
+                return StampOrder.NEXT
+        elif self._is_foreign(stamp_ns):
+            return StampOrder.FOREIGN
+        self._has_jumped, self._left_ns, self._last_ns = True, last_ns, stamp_ns
+        return StampOrder.GAP if spacing_ns > 0 else StampOrder.RESTART
+
+    def _is_foreign(self, stamp_ns: int) -> bool:
+        """Return whether a stamp continues those before the jump."""
+        left_ns = self._left_ns
+        if left_ns is None or not -_RESTART_NS <= stamp_ns - left_ns < _PAUSE_NS:
+            return False
+        self._foreign += 1
+        if self._foreign > _PATIENCE:
+            # The jump was an error of one image, or the other publisher has ended.
+            self._foreign, self._left_ns = 0, None
+            return False
+        self._left_ns = stamp_ns
+        return True
+
+
+class StreamStatistics:
+    """Counts the messages of a stream and, by their stamps, those that never arrived."""
+
+    def __init__(self) -> None:
+        """Start with nothing received."""
+        self.received = 0
+        self.dropped = 0
+        self.counts: dict[StampOrder, int] = dict.fromkeys(StampOrder, 0)
+        self._sequence = StampSequence()
+        self._last_ns: int | None = None
+        self._spacings_ns: deque[int] = deque()
+        # The same, sorted: the period is needed with every image.
+        self._ordered_ns: list[int] = []
+        self._latest: deque[StampOrder] = deque(maxlen=WINDOW)
+
+    def add(self, stamp_ns: int) -> StampOrder:
+        """Count a message of that stamp and return how it follows those before."""
+        self.received += 1
+        order = self._sequence.add(stamp_ns)
+        self.counts[order] += 1
+        self._latest.append(order)
+        if not order.is_usable or order is StampOrder.UNSTAMPED:
+            return order
+        last_ns, self._last_ns = self._last_ns, stamp_ns
+        if order is StampOrder.RESTART:
+            self._spacings_ns.clear()
+            self._ordered_ns.clear()
+        elif order is StampOrder.NEXT and last_ns is not None:
+            self._note(spacing_ns := stamp_ns - last_ns)
+            if len(self._spacings_ns) >= 5:
+                self.dropped += max(round(spacing_ns / self.period_ns) - 1, 0)
+        return order
+
+    def _note(self, spacing_ns: int) -> None:
+        if len(self._spacings_ns) == WINDOW:
+            del self._ordered_ns[bisect_left(self._ordered_ns, self._spacings_ns.popleft())]
+        self._spacings_ns.append(spacing_ns)
+        insort(self._ordered_ns, spacing_ns)
+
+    @property
+    def out_of_order(self) -> int:
+        """Number of messages that were not later than the one before."""
+        return sum(
+            self.counts[s]
+            for s in (StampOrder.RESTART, StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
+        )
+
+    @property
+    def period_ns(self) -> int:
+        """Spacing of the stamps without losses, ns.
+
+        A low percentile: where most images are lost, the median is a multiple of the period.
+        """
+        return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
+
+    @property
+    def loss(self) -> float:
+        """Fraction of the latest messages that never arrived, judged by their stamps."""
+        if len(self._spacings_ns) < 5:
+            return 0.0
+        expected = max(round(sum(self._spacings_ns) / self.period_ns), 1)
+        return max(1.0 - len(self._spacings_ns) / expected, 0.0)
+
+    def remarks(self) -> dict[str, str]:
+        """Return the faults of the latest stamps, a text by kind; a single late image is none."""
+        texts = {}
+        latest = Counter(self._latest)
+        count = len(self._latest)
+        if latest[StampOrder.UNSTAMPED]:
+            texts["stamps that are zero"] = (
+                "the images have no stamp (it is zero), so they are used in the order of arrival "
+                "and losses are not seen; set header.stamp in the camera's driver"
+            )
+        if latest[StampOrder.REPEATED] > count // 10 + 1:
+            texts["stamps that repeat"] = (
+                f"{latest[StampOrder.REPEATED]} of the latest {count} images repeat the stamp of "
+                "the one before and are left out; does the driver send them twice, or are there "
+                "two publishers?"
+            )
+        if latest[StampOrder.FOREIGN]:
+            texts["stamps of two clocks"] = (
+                "the stamps jump to and fro between two times, and images of one of them are left "
+                "out; expected one camera with one clock: see 'ros2 topic info --verbose'"
+            )
+        if latest[StampOrder.RESTART] > 2:
+            texts["stamps that go back"] = (
+                f"the stamps of the latest {count} images went back {latest[StampOrder.RESTART]} "
+                "times by more than a second, and tracking started again each time; is "
+                "the clock of the camera's computer being set?"
+            )
+        return texts

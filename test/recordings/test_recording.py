@@ -1,0 +1,181 @@
+"""The cameras of a recording, whose topics are below namespaces if there are several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from cardbox_tracker.errors import BagError, CameraError, CardboxError
+from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.depth_silhouettes import Within
+from cardbox_tracker.recordings.recording import Recording, open_recording
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
+
+PERIOD_NS = 100_000_000
+LATER_NS = 8_000_000
+EMPTY = TimeSpan(0.0, 0.55)
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten images of an empty scene and something in it; the second camera lacks the eighth."""
+    folder = tmp_path_factory.mktemp("two") / "bag"
+    rng = np.random.default_rng(0)
+    with BagWriter(folder) as bag:
+        for i in range(10):
+            for number, name in enumerate(("one", "two")):
+                if (i, name) == (7, "two"):
+                    continue
+                stamp = 10**18 + i * PERIOD_NS + number * LATER_NS
+                image = rng.normal(100, 1, (48, 64)).astype(np.uint8)
+                if i >= 6:
+                    image[10:40, 20 + 5 * number : 40] = 200
+                bag.write_image(f"/{name}/image_raw", stamp, f"{name}_frame", image, "mono8")
+                bag.write_camera_info(f"/{name}/camera_info", stamp, f"{name}_frame", CAMERA)
+    return folder
+
+
+@pytest.fixture
+def chain(tmp_path: Path) -> Path:
+    file = tmp_path / "camchain.yaml"
+    moved = np.eye(4)
+    moved[0, 3] = -0.5
+    text = yaml.safe_dump({"one": {}, "two": {"T_cn_cnm1": moved.tolist()}})
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def sources(two: Path, chain: Path) -> Iterator[Recording]:
+    with open_recording(two, EMPTY, ["one", "/two/"], chain) as opened:
+        yield opened
+
+
+def test_each_camera_has_its_own_silhouettes(sources: Recording, two: Path) -> None:
+    sets = list(sources.frames(0.55))
+    assert [s.stamp_ns - 10**18 for s in sets] == [i * PERIOD_NS for i in range(6, 10)]
+    assert [None in s.frames for s in sets] == [False, True, False, False]
+    with BagReader(two) as bag:
+        alone = SilhouetteSource(bag, EMPTY, camera="two")
+        expected = [frame.silhouette for frame in alone.frames(0.6)]
+    found = [s.frames[1].silhouette for s in sets if s.frames[1] is not None]
+    np.testing.assert_array_equal(found, expected)
+    assert np.count_nonzero(found[0]) > 100
+    np.testing.assert_allclose(sources.others[0].extrinsics.centre_m, [0.5, 0.0, 0.0])
+
+
+def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
+    with (
+        pytest.raises(CameraError, match="nothing says where camera two"),
+        open_recording(two, EMPTY, ["one", "two"]),
+    ):
+        pass
+    with pytest.raises(BagError, match=r"0 image topics .*/three/"), BagReader(two) as bag:
+        bag.image_topic("three")
+    with pytest.raises(BagError, match="--cameras NAMESPACE"), open_recording(two, EMPTY):
+        pass
+    with (
+        pytest.raises(CardboxError, match="different namespaces"),
+        open_recording(two, EMPTY, ["one", "one"]),
+    ):
+        pass
+    with (
+        pytest.raises(CameraError, match="left camera the first"),
+        open_recording(two, EMPTY, ["two", "one"], chain, depth="stereo"),
+    ):
+        pass
+
+
+def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "ranged"
+    depth = np.full((96, 128), 3000, np.uint16)
+    depth[20:80, 40:80] = 1500
+    with BagReader(two) as old, BagWriter(folder) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for i in range(9):
+            new.write_image("/one/depth", 10**18 + i * PERIOD_NS, "one_frame", depth, "16UC1")
+    with open_recording(folder, Within("/one/depth", 2.0), ["one"]) as source:
+        frames = list(source.first.frames(0.25))
+        # Of ten images the last one has no depth image, and two are before that time.
+        assert len(frames) == 9 - 3
+        assert "/one/depth" in source.first.remarks[0]
+        for frame in frames:
+            assert frame.silhouette.shape == (source.first.camera.height, source.first.camera.width)
+            assert frame.image is not None
+        # A quarter of the image's height times a third of its width is near.
+        near = np.mean([np.count_nonzero(frame.silhouette) for frame in frames])
+        assert near / frames[0].silhouette.size == pytest.approx(60 / 96 * 40 / 128, rel=0.05)
+        assert np.array_equal(frames[0].depth_m > 2.0, frames[0].silhouette == 0)
+    within = Within("/one/depth", 2.0)
+    with open_recording(folder, within, ["one"], depth="/one/depth") as sources:
+        # Read once, for the silhouette and for whoever asks for the depth.
+        taken = list(sources.frames(0.25))
+        assert len(taken) == len(frames)
+        assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
+    with (
+        pytest.raises(CardboxError, match="for one camera only"),
+        open_recording(folder, within, ["one", "two"]),
+    ):
+        pass
+    with (
+        pytest.raises(CardboxError, match=r"0\.1 m; .*0\.3 to 20 m"),
+        open_recording(folder, Within("/one/depth", 0.1), ["one"]),
+    ):
+        pass
+
+
+def test_a_topic_without_depth_is_refused(two: Path) -> None:
+    with (
+        open_recording(two, EMPTY, ["one"], depth="/one/camera_info") as opened,
+        pytest.raises(BagError, match="/one/camera_info has messages of sensor_msgs/msg/Camera"),
+    ):
+        next(opened.frames())
+    with (
+        open_recording(two, EMPTY, ["one"], depth="/one/image_raw") as opened,
+        pytest.raises(CardboxError, match="encoding 'mono8' is no depth"),
+    ):
+        next(opened.frames())
+
+
+def test_depth_comes_with_the_images_of_its_time(two: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "with_depth"
+    with BagReader(two) as old, BagWriter(folder) as new:
+        for message in old.messages():
+            new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
+        for i in (6, 8):
+            depth = np.full((48, 64), 1000 + i, np.uint16)
+            stamp = 10**18 + i * PERIOD_NS + LATER_NS
+            new.write_image("/one/depth", stamp, "one_frame", depth, "16UC1")
+    with open_recording(folder, EMPTY, ["one"], depth="/one/depth") as opened:
+        depths = [s.depth_m for s in opened.frames(0.55)]
+        assert [d is not None for d in depths] == [True, False, True, False]
+        assert depths[2] is not None
+        assert depths[2].shape == (opened.first.camera.height, opened.first.camera.width)
+        np.testing.assert_allclose(depths[2], 1.008, rtol=1e-6)
+
+
+def test_one_camera_is_a_list_of_one(two: Path) -> None:
+    with open_recording(two, EMPTY, ["one"]) as opened:
+        sets = list(opened.frames(0.55))
+        alone = list(opened.first.frames(0.55))
+    assert (opened.names, opened.others) == (("one",), [])
+    for taken, frame in zip(sets, alone, strict=True):
+        (observation,) = taken.observations
+        assert (taken.stamp_ns, observation.stamp_ns) == (frame.stamp_ns, frame.stamp_ns)
+        np.testing.assert_array_equal(observation.silhouette, frame.silhouette)
+        np.testing.assert_array_equal(taken.first.silhouette, frame.silhouette)
+        assert observation.depth_m is None
+
+
+def test_a_camera_without_an_image_gives_an_empty_observation(sources: Recording) -> None:
+    seen = [taken.observations for taken in sources.frames(0.55)]
+    assert [one[1].silhouette is None for one in seen] == [False, True, False, False]
+    assert all(one[0].stamp_ns is not None for one in seen)

@@ -1,0 +1,297 @@
+"""The cameras of the tracker, one or several: where they stand, and what they see at one time."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time  # noqa: E402
+from sensor_msgs.msg import CameraInfo, CompressedImage  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.errors import CameraError  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+    camera_info_message,
+    image_message,
+)
+from cardbox_tracker.ros.nodes import camera_inputs, camera_poses  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_poses import CameraPoses  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+S = 1_000_000_000
+
+
+class Ears:
+    """Stands for a node: hands messages to whoever subscribed."""
+
+    def __init__(self) -> None:
+        self.callbacks: dict[str, Any] = {}
+        self.kinds: dict[str, Any] = {}
+
+    def resolve(self, topic: str) -> str:
+        return f"/{topic.lstrip('/')}"
+
+    def subscribe(self, kind: Any, topic: str, callback: Any, profile: Any) -> None:
+        self.callbacks[self.resolve(topic)] = callback
+        self.kinds[self.resolve(topic)] = kind
+
+    def hear(self, topic: str, message: Any) -> None:
+        self.callbacks[topic](message, 1)
+
+
+def header(stamp_ns: int = 0, frame: str = "left_frame") -> Header:
+    return Header(frame_id=frame, stamp=Time(sec=stamp_ns // S, nanosec=stamp_ns % S))
+
+
+def info(name: str, baseline_m: float = 0.0) -> CameraInfo:
+    """What the background node sends for a camera at twice the working size."""
+    large = camera_info_message(header(), CAMERA.scaled(128, 96))
+    large.p[3] = -baseline_m * large.p[0]
+    return camera_info_message(header(frame=f"{name}_frame"), CAMERA, large)
+
+
+def transform(x_m: float, parent: str = "left_frame", child: str = "right_frame") -> Any:
+    where = SimpleNamespace(
+        rotation=SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0),
+        translation=SimpleNamespace(x=x_m, y=0.0, z=0.0),
+    )
+    stamped = SimpleNamespace(header=Header(frame_id=parent), child_frame_id=child, transform=where)
+    return SimpleNamespace(transforms=[stamped])
+
+
+class Listening:
+    """The poses of two cameras, and how often they were found."""
+
+    def __init__(self, file: str = "") -> None:
+        self.node = Ears()
+        self.changes = 0
+        self.poses = CameraPoses(self.node, ["left", "right"], file, self._changed)  # type: ignore[arg-type]
+
+    def _changed(self) -> None:
+        self.changes += 1
+
+    def hear(self, name: str, baseline_m: float = 0.0) -> None:
+        self.node.hear(f"/{name}/silhouette/camera_info", info(name, baseline_m))
+
+
+@pytest.fixture
+def listening(monkeypatch: pytest.MonkeyPatch) -> Listening:
+    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: object)
+    return Listening()
+
+
+def test_a_rectified_pair_says_itself_where_it_stands(listening: Listening) -> None:
+    poses = listening.poses
+    listening.hear("left")
+    assert (poses.first, poses.missing) == (None, ["/right/silhouette/camera_info"])
+    for _ in range(3):
+        listening.hear("right", 0.12)
+    assert listening.changes == 1
+    assert poses.first == CAMERA
+    np.testing.assert_allclose(poses.others[0].extrinsics.centre_m, [0.12, 0, 0], atol=1e-9)
+    # It is moved: tracking has to know.
+    listening.hear("right", 0.24)
+    assert listening.changes == 2
+    np.testing.assert_allclose(poses.others[0].extrinsics.centre_m, [0.24, 0, 0], atol=1e-9)
+
+
+def test_transforms_may_come_last_and_say_the_same_again(listening: Listening) -> None:
+    for name in ("left", "right"):
+        listening.hear(name)
+    assert listening.poses.first is None
+    with pytest.raises(CameraError, match="camera right"):
+        listening.poses.check()
+    for _ in range(3):
+        listening.node.hear("/tf_static", transform(0.5))
+    listening.poses.check()
+    assert listening.changes == 2
+    np.testing.assert_allclose(listening.poses.others[0].extrinsics.centre_m, [0.5, 0, 0])
+
+
+def test_sources_that_disagree_stop_it_and_say_so(listening: Listening) -> None:
+    listening.hear("left")
+    listening.hear("right", 0.12)
+    listening.node.hear("/tf_static", transform(0.2))
+    assert listening.poses.first is None
+    with pytest.raises(CameraError, match=r"8\.0 cm"):
+        listening.poses.check()
+    listening.node.hear("/tf_static", transform(0.12))
+    assert listening.poses.first == CAMERA
+
+
+def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: None)
+    blind = Listening()
+    for name in ("left", "right"):
+        blind.hear(name)
+    with pytest.raises(CameraError, match="tf2_msgs"):
+        blind.poses.check()
+
+
+class Watching:
+    """What two cameras and a depth image showed together, or one camera alone."""
+
+    def __init__(self, depth: str = "depth", cameras: tuple[str, ...] = ("left", "right")) -> None:
+        self.node = Ears()
+        self.views: list[ObservationSet] = []
+        settings = TrackerParameters(cameras=list(cameras), depth=depth)
+        given = settings, lambda *_: None, self._take
+        self.source = CameraInputs(self.node, *given)  # type: ignore[arg-type]
+        for number, name in enumerate(cameras or ("",)):
+            topic = f"/{name}/silhouette/camera_info".replace("//", "/")
+            self.node.hear(topic, info(name, 0.12 * number))
+
+    def _take(self, lead: Any, received: Any) -> None:
+        self.views.append(self.source.observed(received))
+        assert self.views[-1].header.stamp == lead.message.header.stamp
+
+    def show(self, name: str, stamp_ns: int, size: tuple[int, int] = (48, 64)) -> None:
+        pixels = np.full(size, 255, np.uint8)
+        message = image_message(header(stamp_ns, f"{name}_frame"), pixels, "mono8")
+        self.node.hear(f"/{name}/silhouette".replace("//", "/"), message)
+
+    def show_depth(self, stamp_ns: int, depth_m: np.ndarray) -> None:
+        pixels = depth_m.astype(np.float32)
+        self.node.hear("/depth", image_message(header(stamp_ns), pixels, "32FC1"))
+
+
+@pytest.fixture
+def watching(monkeypatch: pytest.MonkeyPatch) -> Watching:
+    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: None)
+    return Watching()
+
+
+def test_what_belongs_to_one_time_comes_together(watching: Watching) -> None:
+    watching.show_depth(S, np.full((96, 128), 2.0))
+    watching.show("right", S + 8_000_000)
+    assert watching.views == []
+    watching.show("left", S)
+    (views,) = watching.views
+    assert views.header == header(S)
+    assert [h.frame_id for h in views.headers if h] == ["left_frame", "right_frame"]
+    left, right = views.observations
+    assert (left.image, right.image, left.stamp_ns) == (None, None, S)
+    assert left.depth_m is not None
+    assert left.depth_m.shape == (48, 64)
+    assert np.all(left.depth_m == 2.0)
+
+
+def test_packed_depth_is_read_too() -> None:
+    watching = Watching("depth/compressedDepth")
+    assert watching.node.kinds["/depth/compressedDepth"] is CompressedImage
+    png = cv2.imencode(".png", np.full((48, 64), 1700, np.uint16))[1].tobytes()
+    packed = CompressedImage(header=header(S), format="16UC1; compressedDepth png")
+    packed.data = bytes(12) + png
+    watching.node.hear("/depth/compressedDepth", packed)
+    for name in ("left", "right"):
+        watching.show(name, S)
+    depth_m = watching.views[0].observations[0].depth_m
+    assert depth_m is not None
+    assert np.allclose(depth_m, 1.7)
+    # The camera is that of the topic without the plugin's name.
+    assert "/depth/camera_info" in watching.node.callbacks
+
+
+def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:
+    # The same place, twice the size, and the principal point 10 px further to the right.
+    own = Camera(128, 96, 120.0, 120.0, 73.5, 47.5)
+    watching.node.hear("/depth/camera_info", camera_info_message(header(), own))
+    depth = np.zeros((96, 128))
+    depth[:, 74:] = 3.0
+    watching.show_depth(S, depth)
+    watching.show("right", S)
+    watching.show("left", S)
+    found = watching.views[0].observations[0].depth_m
+    assert found is not None
+    # Right of the optical axis in one is right of it in the other.
+    assert np.all(found[:, :31] == 0)
+    assert np.all(found[:, 33:58] == 3.0)
+
+
+def test_without_the_first_camera_the_earliest_image_gives_the_stamp(watching: Watching) -> None:
+    for number in range(1, 12):
+        watching.show("right", number * S // 10)
+    assert watching.views[-1].header.frame_id == "left_frame"
+    assert watching.views[-1].observations[0].silhouette is None
+    assert not watching.views[-1].picture().any()
+    # Depth alone is nothing to track.
+    count = len(watching.views)
+    for number in range(20, 30):
+        watching.show_depth(number * S // 10, np.ones((48, 64)))
+    assert len(watching.views) == count
+
+
+def test_what_cannot_be_read_is_left_out_and_said(watching: Watching) -> None:
+    for name, size in (("left", (48, 64)), ("right", (24, 32))):
+        watching.show(name, S, size)
+    watching.show_depth(S, np.ones((48, 64)))
+    (views,) = watching.views
+    assert views.observations[0].silhouette is not None
+    assert views.observations[1].silhouette is None
+    (text,) = watching.source.warnings().values()
+    assert "/right/silhouette" in text and "32x24" in text
+    with pytest.raises(CameraError, match="32x24"):
+        for name in ("left", "right", "depth"):
+            if name == "depth":
+                watching.show_depth(2 * S, np.ones((48, 64)))
+            else:
+                watching.show(name, 2 * S, (24, 32))
+
+
+def test_silence_and_other_clocks_are_said(
+    watching: Watching, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = camera_inputs.time.monotonic()
+    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    watching.show("left", 100 * S)
+    watching.show("right", 90 * S)
+    watching.show_depth(100 * S, np.ones((48, 64)))
+    (text,) = watching.source.warnings().values()
+    assert "10.0 s apart" in text
+    now_s += 5.0
+    watching.show("left", 105 * S)
+    watching.show_depth(105 * S, np.ones((48, 64)))
+    (text,) = watching.source.warnings().values()
+    assert "/right/silhouette for 5 s" in text
+    values = watching.source.values([0.9, None])
+    assert values["left iou"] == "0.900"
+    assert values["right iou"] == "sees nobody"
+    assert (values["left age (s)"], values["right age (s)"]) == ("0.0", "5.0")
+    assert values["right rate (Hz)"] == "0.2"
+
+
+def test_a_camera_that_pauses_has_no_other_clock(
+    watching: Watching, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = camera_inputs.time.monotonic()
+    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    watching.show("right", 100 * S)
+    now_s += 1.5
+    watching.show("left", 100 * S + 3 * S // 2)
+    watching.show_depth(100 * S + 3 * S // 2, np.ones((48, 64)))
+    assert not watching.source.warnings()
+
+
+def test_one_camera_is_a_list_of_one() -> None:
+    alone = Watching(depth="", cameras=())
+    alone.source.wait_for_images(False)
+    pixels = np.zeros((48, 64), np.uint8)
+    alone.node.hear("/silhouette/image", image_message(header(S), pixels, "mono8"))
+    # Every message is handed on: the node counts those that come twice or too late.
+    for stamp_ns in (S, S, 3 * S, 2 * S):
+        alone.show("", stamp_ns)
+    assert [view.observations[0].stamp_ns for view in alone.views] == [S, S, 3 * S, 2 * S]
+    assert [view.observations[0].image is None for view in alone.views] == [False, True, True, True]
+    assert alone.views[0].header.frame_id == "_frame"
+    assert (alone.source.values([0.9]), alone.source.warnings()) == ({}, {})
+    with pytest.raises(CameraError, match="32x24"):
+        alone.show("", 4 * S, (24, 32))

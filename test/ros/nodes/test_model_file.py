@@ -1,0 +1,84 @@
+"""``model_file``: checked at the start, and no measurement is lost where it cannot be written."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from rclpy.context import Context  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+
+from cardbox_tracker.body.model import BodyModel  # noqa: E402
+from cardbox_tracker.body.model_file import load_body_model  # noqa: E402
+from cardbox_tracker.body.posture import REFERENCE_NAMES  # noqa: E402
+from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.estimation.initialization.config import InitializationResult  # noqa: E402
+from cardbox_tracker.ros.nodes import initializer_node, second_camera  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+
+BODY = BodyModel.of(distance_m=2.3)
+
+
+@pytest.fixture
+def context(ros_domain: int) -> Iterator[Context]:
+    # Nodes whose construction fails live on for a while; here nobody meets them.
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.mark.parametrize("make", [TrackerNode, initializer_node.InitializerNode, CameraNode])
+def test_a_home_folder_is_known_to_every_node(
+    make: Any, context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr("cardbox_tracker.ros.nodes.camera_node.open_video", lambda _: None)
+    (tmp_path / "bad.yaml").write_text("- nothing\n")
+    name = "calibration_file" if make is CameraNode else "model_file"
+    parameters = (
+        {name: "~/bad.yaml", "file": "video"} if make is CameraNode else {name: "~/bad.yaml"}
+    )
+    overrides = [Parameter(key, value=value) for key, value in parameters.items()]
+    with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: .*mapping"):
+        make(context=context, parameter_overrides=overrides, enable_rosout=False)
+
+
+@pytest.mark.promise("A measurement that cannot be saved costs no second posing")
+def test_a_folder_that_is_gone_costs_no_second_posing(
+    context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "people"
+    folder.mkdir()
+    path = folder / "model.yaml"
+    result = InitializationResult(BODY, dict.fromkeys(REFERENCE_NAMES, 0.9), {}, {})
+    monkeypatch.setattr(second_camera, "initialize_body", lambda *_: result)
+    node = initializer_node.InitializerNode(
+        context=context,
+        parameter_overrides=[Parameter("model_file", value=str(path))],
+        enable_rosout=False,
+    )
+    references = node._references
+    monkeypatch.setattr(references, "check_running", lambda: None)
+    node._camera = Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
+    captured = {name: np.zeros((24, 32), np.uint8) for name in REFERENCE_NAMES}
+    references.captured = dict(captured)
+    shutil.rmtree(folder)
+    with pytest.raises(CardboxError, match=r"not saved: .*call initialize"):
+        node._measure()
+    assert references.captured.keys() == captured.keys()
+    folder.mkdir()
+    assert f"saved to {path}" in node._measure()
+    assert load_body_model(path) == BODY
+    assert not references.captured
+    node.close()
+    node.destroy_node()
