@@ -1,9 +1,9 @@
 """numba's ``njit`` with a cache on disk that may be missing or damaged, but never ends a program.
 
 numba keeps compiled code beside the sources, or below the home folder; ``NUMBA_CACHE_DIR`` names
-another place. Where it can write to none of them it fails when a module is imported, and where a
-file of the cache was cut off, whenever the function is called. Here a folder of our own below the
-folder for temporary files is tried next, then there is no cache; what is damaged is compiled again.
+another place. Where numba can write to none of them, importing a module fails, and where a file of
+the cache was cut off, each call fails. Here a folder of our own below the folder for temporary
+files is tried next, then there is no cache; damaged code is compiled again.
 
 Compiled code contains its callees and the constants of other files. numba alone only checks the
 file of the function itself; here an entry is valid for one state of all kernel sources of a

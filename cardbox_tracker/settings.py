@@ -71,13 +71,21 @@ class NoEffectError(ValueError):
 
     Attributes:
         name: of the setting.
+        where: in which case it has no effect, such as ``with the strategy drs``.
         instead: names of settings that act.
     """
 
     def __init__(self, name: str, where: str, instead: str) -> None:
-        """``where`` says in which case it has no effect, such as ``with the strategy drs``."""
+        """See the attributes."""
         super().__init__(f"{name} has no effect {where}; use {instead}")
-        self.name, self.instead = name, instead
+        self.name, self.where, self.instead = name, where, instead
+
+    def renamed(self, names: Mapping[str, str]) -> str:
+        """Return the text with other names of settings, as a program calls them."""
+        instead = self.instead
+        for name, other in names.items():
+            instead = instead.replace(name, other)
+        return f"{names.get(self.name, self.name)} has no effect {self.where}; use {instead}"
 
 
 def setting(
@@ -142,6 +150,18 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
         return replace(instance, **values)  # type: ignore[type-var]
     except ValueError as error:
         raise ValueError(f"{where}{error}") from None
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values by dotted names, such as ``whole_body.effort``, as nested mappings."""
+    result: dict[str, Any] = {}
+    for dotted, value in values.items():
+        *outer, name = dotted.split(".")
+        inner = result
+        for part in outer:
+            inner = inner.setdefault(part, {})
+        inner[name] = value
+    return result
 
 
 def _changed_parts(before: tuple[Any, ...], given: Any, where: str) -> tuple[Any, ...]:

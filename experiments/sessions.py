@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
@@ -155,7 +156,7 @@ def _session(
     n = len(frames)
     segments = ["neutral"] * n
     keypoints_m = np.full((n, 6, 3), np.nan)
-    postures = np.full((n, 12), np.nan)
+    postures = np.full((n, N_JOINTS), np.nan)
     torso_rad = np.full((n, 3), np.nan)
     for i, frame in enumerate(frames):
         true = truth.frames.get(frame.stamp_ns)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS, TURNS
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import (
@@ -82,7 +82,7 @@ def track_runs(session: Session, setting: Setting, first: int, end: int) -> Runs
     """Do the runs ``first`` to ``end`` - 1 of ``setting``."""
     silhouettes = session.silhouettes[:: setting.every]
     shape = (end - first, len(silhouettes))
-    postures = np.full((*shape, 12), np.nan)
+    postures = np.full((*shape, N_JOINTS), np.nan)
     keypoints_m = np.full((*shape, 6, 3), np.nan)
     costs_px = np.full(shape, np.nan)
     cost = make_silhouette_term(setting.model, session.body, session.camera)
@@ -203,7 +203,7 @@ def _angle_errors(motion: MotionRuns) -> dict[str, float]:
     if not np.any(np.isnan(motion.postures)):
         names, truth = JOINT_NAMES[1:], motion.postures[:, 1:]
     elif not np.any(np.isnan(motion.torso_rad)):
-        names, truth = JOINT_NAMES[1:4], motion.torso_rad
+        names, truth = JOINT_NAMES[TURNS], motion.torso_rad
     else:
         return {}
     estimates = motion.runs.postures[..., 1 : 1 + len(names)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,3 +95,50 @@ def test_the_core_declares_and_checks_all_its_settings(kind: Any) -> None:
             for wrong in (one.limits[0] - 1, one.limits[1] + 1):
                 with pytest.raises(ValueError, match=name):
                     kind(**{name: type(default)(wrong)})
+
+
+def test_a_value_out_of_range_is_refused_by_its_whole_name() -> None:
+    with pytest.raises(ValueError, match=r"whole_body\.cost\.legs is 9; expected 0 to 3"):
+        TrackerConfig().changed({"whole_body": {"cost": {"legs": 9.0}}})
+
+
+def test_dotted_names_are_nested() -> None:
+    values = {"a.b.c": 1, "a.d": 2, "e": 3}
+    assert settings.nested(values) == {"a": {"b": {"c": 1}, "d": 2}, "e": 3}
+
+
+@dataclass(frozen=True)
+class Outer:
+    parts: tuple[Inner, ...] = (Inner(),)
+    sample: Sample = Sample()
+    flag: bool = setting(False, "a flag")
+
+
+def test_settings_are_changed_by_name_however_deep() -> None:
+    given = {"flag": True, "parts": {"Inner": {"depth": 2}}, "sample": {"ratio": 1, "kind": "b"}}
+    found = settings.changed(Outer(), given)
+    assert found == Outer((Inner(2),), Sample(ratio=1.0, kind="b"), True)
+    assert type(found.sample.ratio) is float
+    assert settings.changed(Outer(), {}) == Outer()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"flags": True}, ["'flags'", "did you mean 'flag'", "parts, sample, flag"]),
+        ({"sample": {"rate": 1.0}}, ["'sample.rate'", "ratio"]),
+        ({"parts": {"Other": {}}}, ["'parts.Other'", "Inner"]),
+        ({"sample": 3}, ["sample is 3", "names and values"]),
+        ({"flag": 1}, ["flag is 1", "true or false"]),
+        ({"sample": {"ratio": True}}, ["sample.ratio is True", "a number"]),
+        ({"sample": {"ratio": "0.5"}}, ["sample.ratio is '0.5'", "a number"]),
+        ({"sample": {"limit": 2.0}}, ["sample.limit is 2.0", "a whole number"]),
+        ({7: True}, ["'7'", "flag"]),
+    ],
+)
+def test_what_is_no_such_setting_is_refused_by_its_whole_name(
+    given: dict[Any, Any], words: list[str]
+) -> None:
+    with pytest.raises(ValueError, match=re.escape(words[0])) as caught:
+        settings.changed(Outer(), given)
+    assert all(word in str(caught.value) for word in words)

@@ -1,6 +1,6 @@
 """Fit the coefficients of the chance of loss to recorded sessions with ground truth.
 
-python -m tools.make_loss SESSION... [--seeds N] [--jobs N]
+python -m tools.make_loss SESSION... [--seeds N] [--jobs N] [--inverse-penalty C]
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
 ``default`` in as many ways as seeds are asked for (``tools/tracked_ways.py``), and never declared
@@ -46,8 +46,8 @@ BoolArray = NDArray[np.bool_]
 SHIPPED = np.array([INTERCEPT, *COEFFICIENTS.values()])
 """The package's intercept and coefficients."""
 
-# Strength of the data against the penalty on large coefficients of scaled features.
-_INVERSE_PENALTY = 1.0
+INVERSE_PENALTY = 1e-3
+"""Weight of the data against the penalty on coefficients; larger ones need many sessions."""
 
 
 class Frames(NamedTuple):
@@ -88,7 +88,7 @@ def frames_of(folder: Path, seed: int) -> Frames:
     return Frames(np.array(features).reshape(-1, len(COEFFICIENTS)), np.array(is_wrong, bool))
 
 
-def fitted(frames: Frames, inverse_penalty: float = _INVERSE_PENALTY) -> FloatArray:
+def fitted(frames: Frames, inverse_penalty: float = INVERSE_PENALTY) -> FloatArray:
     """Return intercept and coefficients (1 + F,) of the logistic regression.
 
     Raises:
@@ -109,12 +109,12 @@ def chances(coefficients: FloatArray, features: FloatArray) -> FloatArray:
     return np.asarray(1.0 / (1.0 + np.exp(-logits)))
 
 
-def left_out_chances(sessions: Sequence[Frames]) -> FloatArray:
+def left_out_chances(sessions: Sequence[Frames], inverse_penalty: float) -> FloatArray:
     """Return the chances of all frames, each by coefficients fitted to the other sessions."""
     found = []
     for number, one in enumerate(sessions):
         others = together([*sessions[:number], *sessions[number + 1 :]])
-        found.append(chances(fitted(others), one.features))
+        found.append(chances(fitted(others, inverse_penalty), one.features))
     return np.concatenate(found)
 
 
@@ -132,15 +132,16 @@ def quality(found: FloatArray, is_wrong: BoolArray) -> tuple[float, float]:
     )
 
 
-def report(sessions: Sequence[Frames]) -> str:
+def report(sessions: Sequence[Frames], inverse_penalty: float = INVERSE_PENALTY) -> str:
     """Return the coefficients beside the shipped ones, and how good both are.
 
     Raises:
         ValueError: without one of the sessions, all frames are right.
     """
     every = together(sessions)
+    found = fitted(every, inverse_penalty)
     lines = [f"{'':16} {'fitted':>8} {'shipped':>8}"]
-    for name, *values in zip(("intercept", *COEFFICIENTS), fitted(every), SHIPPED, strict=True):
+    for name, *values in zip(("intercept", *COEFFICIENTS), found, SHIPPED, strict=True):
         lines.append(f"{name:16} {values[0]:8.3f} {values[1]:8.3f}")
     share = 100.0 * every.is_wrong.mean()
     lines += [
@@ -150,9 +151,9 @@ def report(sessions: Sequence[Frames]) -> str:
     ]
     rows = [("shipped", chances(SHIPPED, every.features))]
     if len(sessions) > 1:
-        rows.insert(0, ("fitted, left out", left_out_chances(sessions)))
-    for name, found in rows:
-        lines.append("{:16} {:8.3f} {:8.3f}".format(name, *quality(found, every.is_wrong)))
+        rows.insert(0, ("fitted, left out", left_out_chances(sessions, inverse_penalty)))
+    for name, said in rows:
+        lines.append("{:16} {:8.3f} {:8.3f}".format(name, *quality(said, every.is_wrong)))
     return "\n".join(lines)
 
 
@@ -162,6 +163,13 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
     parser.add_argument("--seeds", type=int, default=1, help="that each session is tracked with")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument(
+        "--inverse-penalty",
+        type=float,
+        default=INVERSE_PENALTY,
+        metavar="C",
+        help="more for many sessions (default: %(default)s)",
+    )
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:
         runs = [
@@ -172,7 +180,7 @@ def main(args: list[str] | None = None) -> int:
     for folder, one in zip(given.sessions, sessions, strict=True):
         print(f"{folder.name}: {one.is_wrong.sum()} of {len(one.is_wrong)} frames wrong")
     try:
-        print(report(sessions))
+        print(report(sessions, given.inverse_penalty))
     except ValueError as error:
         print(f"no fit: {error}; give more sessions, with wrong frames", file=sys.stderr)
         return 1

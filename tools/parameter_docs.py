@@ -7,11 +7,17 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.depth import Depth
+from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.ros.nodes.node_parameters import NODES
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, ParameterSpec
+from cardbox_tracker.settings import settings_of
 
 _GENERATED = (
     "made by 'python -m tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"
@@ -104,7 +110,41 @@ def markdown_text() -> str:
                 f"| `{name}` | {type_name} | `{yaml_value(default_of(kind, name))}` | {spec.unit} "
                 f"| {allowed} | {live} | {description} |"
             )
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_settings_section()]) + "\n"
+
+
+def _settings_section() -> list[str]:
+    """Return the lines about the settings of the core that a file can give."""
+    lines = [
+        *("", "## Settings of the tracker in a file", ""),
+        "The option `--settings` of `cardbox track` and the parameter `settings_file` of the",
+        "tracker take a YAML file with any of these; each part before a dot is a level of its own:",
+        "",
+        *("```yaml", "whole_body:", "  effort: 0.5", "  cost:", "    yaw_deg: 20.0", "```", ""),
+        "`torso`, `arm`, `strategy`, `cycles`, `average` and `torso_beside_arms` are of the preset",
+        "`paper`, `whole_body` of the preset `default`; those of the other preset are refused.",
+        "",
+        "| name | type | default | unit | allowed | what it does |",
+        "|---|---|---|---|---|---|",
+    ]
+    return lines + list(_settings_rows(TrackerConfig(terms=(InnerCue(), Depth()))))
+
+
+def _settings_rows(settings: Any, before: str = "") -> Iterator[str]:
+    known = settings_of(settings)
+    for entry in fields(settings):
+        name, value = f"{before}{entry.name}", getattr(settings, entry.name)
+        if isinstance(value, tuple):
+            for one in value:
+                yield from _settings_rows(one, f"{name}.{type(one).__name__}.")
+        elif is_dataclass(value):
+            yield from _settings_rows(value, f"{name}.")
+        else:
+            spec, allowed = known[entry.name], known[entry.name].range_text.replace("|", "\\|")
+            yield (
+                f"| `{name}` | {type(value).__name__} | `{yaml_value(value)}` | {spec.unit} "
+                f"| {allowed} | {spec.description} |"
+            )
 
 
 def files() -> dict[str, str]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
 from cardbox_tracker.body.sizes import FloatArray
 
 KEYPOINT_NAMES: tuple[str, ...] = (
@@ -92,10 +92,10 @@ def forward_kinematics(body: BodyModel, postures: FloatArray) -> BodyFrames:
         Frames in the reference frame, with the leading shape of ``postures``.
     """
     d = np.asarray(postures, dtype=np.float64)
-    rotation = rotation_z(d[..., 3]) @ rotation_y(d[..., 2]) @ rotation_x(d[..., 1])
+    rotation = rotation_z(d[..., YAW]) @ rotation_y(d[..., PITCH]) @ rotation_x(d[..., ROLL])
     hip = np.empty((*d.shape[:-1], 3))
     hip[..., 0] = -body.placement.distance_m
-    hip[..., 1] = d[..., 0]
+    hip[..., 1] = d[..., TORSO_Y]
     hip[..., 2] = body.placement.hip_height_m
 
     parts = body_parts(body.sizes)

@@ -1,7 +1,7 @@
 """Placement of a person and pose of the camera, the parts of a body model beside the sizes.
 
 Both are given in the reference frame: origin at the camera's centre, X towards the camera, Y to the
-right of the image, Z up; level, whatever the camera's pitch.
+right of the image, Z up; level, independent of the camera's pitch.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Posture vector d1..d12, position of the hips, limits and reference postures.
+"""The 14 values of a state: names, order, limits, mirror image, and the reference postures.
+
+A state (14,) is a posture d1..d12 followed by ``torso_x`` and ``torso_z``. All other modules take
+the places of these values from here.
 
 The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
 rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
@@ -42,9 +45,28 @@ JOINT_NAMES: tuple[str, ...] = (
 )
 N_JOINTS = len(JOINT_NAMES)
 
+PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
+"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
+
+N_STATE = N_JOINTS + len(PLACE_NAMES)
+SHOULDER_ABDUCTION, SHOULDER_FLEXION, ELBOW_ABDUCTION, ELBOW_FLEXION = range(4)
+ARM_ANGLES = 4
+"""Values of an arm, in that order."""
+
+TORSO_Y, ROLL, PITCH, YAW = range(4)
+FIRST_ANGLES = 4, 8
+"""Indices at which the angles of the left and of the right arm begin."""
+TORSO_X, TORSO_Z = N_JOINTS, N_JOINTS + 1
+
 TORSO = slice(0, 4)
-LEFT_ARM = slice(4, 8)
-RIGHT_ARM = slice(8, 12)
+TURNS = slice(ROLL, YAW + 1)
+LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
+POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
+
+MIRRORED = np.array([*range(4), *range(8, 12), *range(4, 8), TORSO_X, TORSO_Z])
+"""Index (14,) of each value in the state of the mirror image, where the arms change places."""
+MIRROR_SIGNS = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * (N_STATE - 4)])
+"""Factor (14,) of each value in the mirror image: aside, roll and yaw turn over."""
 
 _TORSO_LIMITS_DEG = ((-45, 45), (-25, 90), (-60, 60))
 _ARM_LIMITS_DEG = ((-45, 180), (-60, 90), (-150, 150), (-10, 95))
@@ -65,11 +87,8 @@ JOINT_LIMITS.setflags(write=False)
 _TURN_DEG = 100.0
 TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
 """Shape (12, 2): limits of a person who also turns with the feet, to walk or to look aside."""
-TURNING_LIMITS[3] = np.radians([-_TURN_DEG, _TURN_DEG])
+TURNING_LIMITS[YAW] = np.radians([-_TURN_DEG, _TURN_DEG])
 TURNING_LIMITS.setflags(write=False)
-
-PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
-"""Displacement of the hips towards the camera and upwards since the measurement, metres."""
 
 TORSO_X_LIMIT_M = 0.9
 """Range of ``torso_x``, a step or two; beyond it, measure the person at another distance."""
@@ -81,6 +100,9 @@ PLACE_LIMITS: FloatArray = np.array(
 )
 """Shape (2, 2): lowest and highest value of each of ``PLACE_NAMES``, metres."""
 PLACE_LIMITS.setflags(write=False)
+
+STATE_LIMITS: FloatArray = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
+"""Shape (14, 2): lowest and highest value of each value of a state."""
 
 REFERENCE_NAMES: tuple[str, ...] = ("front", "side", "arms")
 SIDE_TURNS: tuple[str, ...] = ("left", "right")
@@ -112,7 +134,7 @@ def reference_posture(name: str, side_turn: str = "left") -> FloatArray:
     abduction = _STRETCHED_ABDUCTION_RAD if name == "arms" else _HANGING_ABDUCTION_RAD
     posture[LEFT_ARM.start] = posture[RIGHT_ARM.start] = abduction
     if name == "side":
-        posture[3] = np.pi / 2 if side_turn == "left" else -np.pi / 2
+        posture[YAW] = np.pi / 2 if side_turn == "left" else -np.pi / 2
     return posture
 
 

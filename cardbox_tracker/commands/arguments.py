@@ -70,8 +70,8 @@ def add_depth(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=None,
         metavar="M",
-        help="in place of --background: with the images of --depth, whoever is nearer than this is "
-        "the person, metres; choose it between them and the wall",
+        help="in place of --background: limit of the depth in the images of --depth, metres; "
+        "choose it between the person and the wall",
     )
 
 

@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=None,
         metavar="M",
-        help="between the shoulder joints, metres; without it, and for all other breadths, what "
-        "the first silhouette shows",
+        help="between the shoulder joints, metres; by default it is fitted to the first "
+        "silhouette, like all other breadths",
     )
     parser.add_argument(
         "--hip-height",
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         metavar="M",
         help="of the middle of the hips above the camera's centre, metres, negative below it; "
-        "without it, what the first silhouette shows",
+        "by default it is fitted to the first silhouette",
     )
     add_camera_pitch(parser)
     parser.add_argument(

@@ -72,8 +72,8 @@ def run(options: argparse.Namespace) -> None:
     # The body model refuses an impossible distance or pitch by name, before they are used.
     if options.distance is None and options.depth is None and len(options.cameras) < 2:
         raise CardboxError(
-            "one camera does not show how far away the person is; give --distance M, --depth "
-            "TOPIC, or two --cameras"
+            "the distance of the person cannot be measured with one camera; give --distance M, "
+            "--depth TOPIC, or two --cameras"
         )
     distance_m = _GUESSED_M if options.distance is None else options.distance
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
@@ -87,8 +87,8 @@ def run(options: argparse.Namespace) -> None:
     check_outputs((options.output,), options.force, inputs=inputs)
     if None not in (options.depth, options.distance) and options.within is None:
         raise CardboxError(
-            "--depth measures how far away the person is, which --distance says, too: leave one of "
-            "them out, or give --within M in place of --background"
+            "--depth and --distance both give the distance of the person; leave one of them out, "
+            "or give --within M in place of --background"
         )
     spans = {name: getattr(options, name) for name in REFERENCES}
     with (

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--plot", type=Path, default=None, metavar="OUT.png", help="also draw the scores over time"
     )
     add_force(parser)
-    add_settings(parser, RulaConfig, "the task, and what the paper leaves open")
+    add_settings(parser, RulaConfig, "the task and the limits that the paper leaves open")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -4,12 +4,98 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import fields
-from typing import Any, TypeVar
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from cardbox_tracker.commands.arguments import particle_count
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.settings import settings_of
+from cardbox_tracker.settings import NoEffectError, nested, settings_of
+
+if TYPE_CHECKING:
+    from cardbox_tracker.estimation.config import TrackerConfig
 
 T = TypeVar("T")
+
+# Settings of the tracker that are options of their own, with the option of each.
+_OPTIONS = MappingProxyType(
+    {
+        "strategy": "--strategy",
+        "torso.particles": "--particles",
+        "arm.particles": "--particles",
+        "whole_body.effort": "--effort",
+        "whole_body.corrector": "--corrector",
+        "whole_body.output_smoothing_s": "--output-smoothing-s",
+    }
+)
+
+
+def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
+    """Add the options that change the preset's settings of the tracker."""
+    from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+    from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+
+    whole_body = settings_of(WholeBodyConfig)
+    parser.add_argument(
+        "--strategy",
+        choices=STRATEGIES,
+        default=None,
+        help="resampling of the preset paper; without it drs, the paper's deterministic one",
+    )
+    parser.add_argument(
+        "--particles",
+        type=particle_count,
+        default=None,
+        metavar="N",
+        help="particles of each of the three filters of the preset paper; without it 200",
+    )
+    for name, kind, metavar in (
+        ("effort", float, "X"),
+        ("corrector", str, "NAME"),
+        ("output_smoothing_s", float, "S"),
+    ):
+        setting = whole_body[name]
+        allowed = f"; {setting.range_text}" if setting.range_text else ""
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=kind,
+            default=None,
+            metavar=metavar,
+            help=f"{setting.description}{allowed}; for the preset default",
+        )
+    parser.add_argument(
+        "--settings",
+        type=Path,
+        default=None,
+        metavar="FILE.yaml",
+        help="further settings of the tracker by name, as docs/parameters.md lists them; options "
+        "of their own go before",
+    )
+
+
+def with_tracker_settings(config: TrackerConfig, options: argparse.Namespace) -> TrackerConfig:
+    """Return ``config`` with what the options of :func:`add_tracker_settings` change in it.
+
+    Raises:
+        CardboxError: the file cannot be read, or a value is wrong or has no effect.
+    """
+    from cardbox_tracker.estimation.settings_file import read_settings
+
+    if options.settings is not None:
+        config = read_settings(options.settings, config)
+    values = {
+        name: getattr(options, option[2:].replace("-", "_")) for name, option in _OPTIONS.items()
+    }
+    given = {name: value for name, value in values.items() if value is not None}
+    try:
+        return config.changed(nested(given))
+    except NoEffectError as error:
+        raise CardboxError(error.renamed(_OPTIONS)) from None
+    except ValueError as error:
+        text = str(error)
+        for name, option in _OPTIONS.items():
+            text = text.replace(name, option)
+        raise CardboxError(text) from None
 
 
 def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None:

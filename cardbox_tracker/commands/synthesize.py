@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--motion",
         default="all",
-        help="what follows the reference postures: wave, bend, bow or all",
+        help="motion after the reference postures: wave, bend, bow or all",
     )
     parser.add_argument(
         "--output",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,11 +14,14 @@ from cardbox_tracker.commands.arguments import (
     add_retired,
     add_seed,
     background_of,
-    particle_count,
     print_remarks,
     time,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.settings_arguments import (
+    add_tracker_settings,
+    with_tracker_settings,
+)
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
@@ -54,8 +56,6 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
 
     Without ``required`` the recording may be missing, or one of results that needs no more.
     """
-    from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
-
     add_recording(parser, required, needs_background=False)
     add_cameras(parser)
     add_depth(parser)
@@ -75,19 +75,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
         "'cardbox body' is fitted to the first silhouette from then on, in any posture",
     )
     add_preset(parser, "default")
-    parser.add_argument(
-        "--strategy",
-        choices=STRATEGIES,
-        default="drs",
-        help="resampling; drs is the paper's deterministic one",
-    )
-    parser.add_argument(
-        "--particles",
-        type=particle_count,
-        default=None,
-        metavar="N",
-        help="particles of each of the three filters; without it, the preset's",
-    )
+    add_tracker_settings(parser)
     add_retired(parser, "--refine-sizes", "breadths stay as they were measured")
     add_seed(parser, "the filters")
 
@@ -113,7 +101,7 @@ def run(options: argparse.Namespace) -> None:
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
     """Return the files that the arguments of :func:`add_inputs` name."""
-    return options.recording, options.model, options.extrinsics
+    return options.recording, options.model, options.extrinsics, options.settings
 
 
 def track_inputs(
@@ -182,12 +170,7 @@ def _config(options: argparse.Namespace) -> TrackerConfig:
     """Return the preset with what the options change in it."""
     from cardbox_tracker.estimation.config import PRESETS
 
-    config = replace(PRESETS[options.preset](), strategy=options.strategy)
+    config = PRESETS[options.preset]()
     if options.depth is not None:
         config = config.with_depth()
-    if options.particles is None:
-        return config
-    try:
-        return config.with_particles(options.particles)
-    except ValueError as error:
-        raise CardboxError(str(error)) from None
+    return with_tracker_settings(config, options)

@@ -22,7 +22,7 @@ _TRUTH = "ground_truth.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox view``."""
-    parser.add_argument("--live", action="store_true", help="show what the running nodes publish")
+    parser.add_argument("--live", action="store_true", help="show the results of the running nodes")
     parser.add_argument(
         "--save", type=Path, default=None, metavar="FILE.rrd", help="write a file for the viewer"
     )

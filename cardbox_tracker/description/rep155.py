@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
-from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 
 _TORSO_JOINTS = ("body", "r_waist", "waist", "y_waist")
@@ -65,7 +65,7 @@ class Rep155Joints:
     def __call__(self, posture: FloatArray) -> FloatArray:
         """Return the 12 values of ``REP155_JOINTS``, rad and metres, of a posture (12,)."""
         return np.concatenate(
-            [posture[:4], self._arm(posture[LEFT_ARM], 1.0), self._arm(posture[RIGHT_ARM], -1.0)]
+            [posture[TORSO], self._arm(posture[LEFT_ARM], 1.0), self._arm(posture[RIGHT_ARM], -1.0)]
         )
 
     def _arm(self, angles: FloatArray, side: float) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.body.posture import REFERENCE_NAMES, TORSO_Y, reference_posture
 from cardbox_tracker.drawing.guidance import Asked, draw_guidance
 from cardbox_tracker.drawing.overlay import ImageArray
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
@@ -67,6 +67,6 @@ class Guide:
         posture = reference_posture(name, config.side_turn)
         if np.count_nonzero(silhouette) >= MIN_PERSON_FRACTION * silhouette.size:
             body = at_height_of(silhouette, body, self.camera)
-            posture[0] = lateral_m(silhouette, self.camera, config.distance_m)
+            posture[TORSO_Y] = lateral_m(silhouette, self.camera, config.distance_m)
         view = self.camera.with_pitch(config.camera_pitch_rad)
         return Asked(body, view, posture, self._fit(name, silhouette))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
+from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.tables import TABLE_A, TABLE_B, TABLE_C, ScoreArray
@@ -49,7 +49,7 @@ class RulaScores(NamedTuple):
 def rula_scores(body: BodyModel, postures: FloatArray, config: RulaConfig) -> RulaScores:
     """Return the scores of postures (..., 12), rad and metres, of ``body``."""
     d = np.asarray(postures, dtype=np.float64)
-    trunk = trunk_score(d[..., 2], d[..., 1], config)
+    trunk = trunk_score(d[..., PITCH], d[..., ROLL], config)
     rest = TABLE_B[config.neck - 1, trunk - 1, config.legs - 1]
     rest = rest + config.body_muscle_use + config.body_load
     left, right = (

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import TORSO_X, TORSO_Y, TORSO_Z, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CameraError, InitializationError
 from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
@@ -166,7 +166,9 @@ def _iou(cost: WholeBodyCost, view: View, state: FloatArray, seen: NDArray[np.bo
     for patch in np.rint(16.0 * camera.project(corners_m)).astype(np.int32):
         cv2.fillConvexPoly(image, cv2.convexHull(patch), 1, cv2.LINE_8, 4)
     place = view.body.placement
-    hips = np.array([there[12] - place.distance_m, there[0], place.hip_height_m + there[13]])
+    hips = np.array(
+        [there[TORSO_X] - place.distance_m, there[TORSO_Y], place.hip_height_m + there[TORSO_Z]]
+    )
     row = int(np.clip(camera.project(camera.reference_to_optical(hips))[1], 1, len(seen)))
     drawn, mask = image[:row] > 0, seen[:row]
     return float((drawn & mask).sum() / max(1, (drawn | mask).sum()))

@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.outline_distances import (
     HALF_PX,
@@ -31,7 +32,6 @@ from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
 from cardbox_tracker.estimation.silhouette_tangents import TopTangents
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics

@@ -29,15 +29,13 @@ _OF_HIERARCHICAL = MappingProxyType(
         "torso.translation_noise_m": "y_noise_m",
         "torso": "effort",
         "arm": "effort",
-        "strategy": "survivors",
+        "strategy": "effort",
         "cycles": "effort",
         "average": "average",
         "torso_beside_arms": "effort",
     }
 )
-_OF_WHOLE_BODY = MappingProxyType(
-    {"survivors": "torso.survival_rate and arm.survival_rate", "average": "average"}
-)
+_OF_WHOLE_BODY = MappingProxyType({"survivors": "torso.survival_rate", "average": "average"})
 
 
 @dataclass(frozen=True)
@@ -186,14 +184,15 @@ class TrackerConfig:
         if self.filter == "whole_body":
             instead = _OF_HIERARCHICAL.get(name) or _OF_HIERARCHICAL.get(first)
             if instead is not None:
-                raise NoEffectError(name, "with the filter whole_body", f"whole_body.{instead}")
+                where = "with the filter whole_body (preset default)"
+                raise NoEffectError(name, where, f"whole_body.{instead}")
             is_corrected = self.whole_body.corrector != "none"
             if last in ("output_smoothing_s", "learned_deviations") and not is_corrected:
                 raise NoEffectError(name, "without a corrector", "whole_body.corrector")
             return
         if name.startswith("whole_body"):
-            instead = _OF_WHOLE_BODY.get(last, "torso.particles and arm.particles")
-            raise NoEffectError(name, "with the filter hierarchical", instead)
+            instead = _OF_WHOLE_BODY.get(last, "torso.particles")
+            raise NoEffectError(name, "with the filter hierarchical (preset paper)", instead)
         if last == "sigma_gamma_px" and self.strategy == "drs":
             raise NoEffectError(name, "with the strategy drs", f"{first}.survival_rate")
         if last == "survival_rate" and self.strategy != "drs":
@@ -203,13 +202,15 @@ class TrackerConfig:
             raise NoEffectError(name, "of arms, which have no place", "arm.rotation_noise_rad")
 
     def with_particles(self, particles: int) -> TrackerConfig:
-        """Return the same settings with N = ``particles`` in each of the three filters."""
-        return replace(
-            self,
-            torso=replace(self.torso, particles=particles),
-            arm=replace(self.arm, particles=particles),
-            average=min(self.average, particles),
-        )
+        """Return the same settings with N = ``particles`` in each of the three filters.
+
+        Raises:
+            NoEffectError: the filter is another one, which has none.
+            ValueError: the number is out of range.
+        """
+        number = {"particles": particles}
+        fewer = {"average": particles} if particles < self.average else {}
+        return self.changed({"torso": number, "arm": number, **fewer})
 
 
 def _names(given: Mapping[str, Any], before: str = "") -> Iterator[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.posture import N_JOINTS, POSTURE, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
 
@@ -84,7 +84,7 @@ class PersonDrawer:
         )
         self.cells_per_m = self._camera.fx / body.placement.distance_m
         self.front: FloatArray = np.zeros(N_JOINTS + 2)
-        self.front[:N_JOINTS] = reference_posture("front")
+        self.front[POSTURE] = reference_posture("front")
         self.front[0] = body.placement.lateral_m
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
@@ -153,7 +153,7 @@ class PersonDrawer:
             distance_m=max(place.distance_m - x_m, _NEAREST_M),
             hip_height_m=place.hip_height_m + z_m,
         )
-        frames = forward_kinematics(moved, posture[:N_JOINTS])
+        frames = forward_kinematics(moved, posture[POSTURE])
         points_m = [frames.hip, frames.neck, frames.head]
         for arm in (frames.left, frames.right):
             tips = arm.hand + _FINGERS * (arm.hand - arm.elbow)

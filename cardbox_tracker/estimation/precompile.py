@@ -14,7 +14,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation import person_region
-from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
@@ -39,13 +39,20 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
             looks = Appearance(
                 np.zeros((len(PARTS), bins_of(channels)), np.uint8), np.full(channels, 128.0)
             )
-            config = PRESETS[name]().with_particles(2)
+            config = quickest(PRESETS[name]())
             image = np.full(shape, 128, np.uint8)
             for others in ((), (beside,)) if config.has_several_views else ((),):
                 person = body.with_values(appearance=looks)
                 tracker = Tracker(person, camera, config, others=others)
                 for _ in range(2):
                     tracker.track([Observation(silhouette, image)] * (1 + len(others)))
+
+
+def quickest(config: TrackerConfig) -> TrackerConfig:
+    """Return ``config`` with as few states as its filter allows."""
+    if config.filter == "hierarchical":
+        return config.with_particles(2)
+    return config.changed({"whole_body": {"effort": 0.25}})
 
 
 if __name__ == "__main__":

@@ -84,13 +84,14 @@ class TrackedCamera:
             ValueError: the silhouette or the image has not the camera's size.
         """
         posture, depth_m = before, None
+        stamp_ns = None if observation is None else observation.stamp_ns
         if self.view is None:
             depth_m = None if observation is None else observation.depth_m
         elif before is not None:
             posture = self.view.states(before) if len(before) == N_JOINTS + 2 else None
         if observation is None or observation.silhouette is None:
             nothing = np.zeros((self._camera.height, self._camera.width), np.uint8)
-            return Frame(nothing, self._rows, 0, None, posture, depth_m, interval_s)
+            return Frame(nothing, self._rows, 0, None, posture, depth_m, interval_s, stamp_ns)
         self._check(observation)
         silhouette, image = observation.silhouette, observation.image
         if self.view is not None:
@@ -99,7 +100,8 @@ class TrackedCamera:
             silhouette = self._region.select(silhouette, posture, is_sure, image)
         upper = np.ascontiguousarray(silhouette[: self._rows])
         foreground_px = cv2.countNonZero(upper)
-        return Frame(silhouette, self._rows, foreground_px, image, posture, depth_m, interval_s)
+        seen = silhouette, self._rows, foreground_px, image
+        return Frame(*seen, posture, depth_m, interval_s, stamp_ns)
 
     def _check(self, observation: Observation) -> None:
         for name, pixels, most in (

@@ -202,7 +202,13 @@ class Tracker:
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
             again = self._silhouette.frame(silhouette, image)
-            frames[0] = replace(again, depth_m=frames[0].depth_m, interval_s=frames[0].interval_s)
+            first = frames[0]
+            frames[0] = replace(
+                again,
+                depth_m=first.depth_m,
+                interval_s=first.interval_s,
+                stamp_ns=first.stamp_ns,
+            )
         estimate = self._follow(frames)
         iou = None if estimate.iou is None else self._seen_iou
         self._fitting.after(estimate.state != NO_PERSON, iou)

@@ -12,7 +12,7 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import CardboxError
@@ -28,10 +28,10 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 CSV_HEADER = (
     "stamp",
     "state",
-    *JOINT_STATE_NAMES[:N_JOINTS],
+    *JOINT_STATE_NAMES[POSTURE],
     *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
     *(metric.name for metric in METRICS),
-    *JOINT_STATE_NAMES[N_JOINTS:],
+    *JOINT_STATE_NAMES[PLACE],
 )
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
@@ -141,8 +141,8 @@ def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
     return [
         stamp,
         estimate.state,
-        *values[:N_JOINTS],
+        *values[POSTURE],
         *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
         *(metric.text(estimate) for metric in METRICS),
-        *values[N_JOINTS:],
+        *values[PLACE],
     ]

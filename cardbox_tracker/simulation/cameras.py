@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.vision.camera import Camera
@@ -62,11 +63,11 @@ class SyntheticCamera:
             return body, posture
         there = self.view.states(np.append(posture, [0.0, 0.0]))
         place = self.view.body.placement
-        x_m, z_m = there[12:].tolist()
+        x_m, z_m = there[PLACE].tolist()
         moved = self.view.body.with_values(
             distance_m=place.distance_m - x_m, hip_height_m=place.hip_height_m + z_m
         )
-        return moved, there[:12]
+        return moved, there[POSTURE]
 
     def truth(self) -> dict[str, Any]:
         """Return the camera's entry of ``ground_truth.json``."""

@@ -12,7 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import (
+    LEFT_ARM,
+    PITCH,
+    RIGHT_ARM,
+    ROLL,
+    SHOULDER_ABDUCTION,
+    SHOULDER_FLEXION,
+    reference_posture,
+)
 from cardbox_tracker.errors import CardboxError
 
 FloatArray = NDArray[np.float64]
@@ -76,10 +84,10 @@ def bend(t: float) -> FloatArray:
     """Bend sideways to both sides, twice, for ``BEND_S`` seconds."""
     posture = reference_posture("front")
     roll = np.radians(22.0) * np.sin(2.0 * np.pi * 2.0 * t / BEND_S) * _envelope(t, BEND_S, 1.0)
-    posture[1] = roll
+    posture[ROLL] = roll
     # The arms hang vertically, so the arm on the bent side moves away from the torso.
-    posture[4] += _ramp(-roll)
-    posture[8] += _ramp(roll)
+    posture[LEFT_ARM.start + SHOULDER_ABDUCTION] += _ramp(-roll)
+    posture[RIGHT_ARM.start + SHOULDER_ABDUCTION] += _ramp(roll)
     return posture
 
 
@@ -87,9 +95,10 @@ def bow(t: float) -> FloatArray:
     """Bow forward once and come up again, for ``BOW_S`` seconds."""
     posture = reference_posture("front")
     pitch = np.radians(35.0) * _envelope(t, BOW_S, 2.5)
-    posture[2] = pitch
+    posture[PITCH] = pitch
     # The arms stay almost vertical while the torso leans.
-    posture[5] = posture[9] = 0.6 * pitch
+    for arm in (LEFT_ARM, RIGHT_ARM):
+        posture[arm.start + SHOULDER_FLEXION] = 0.6 * pitch
     return posture
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, TORSO_Y, TURNS
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.cameras import (
@@ -117,7 +117,7 @@ def synthesize_session(
                 # The person sways: a slow random walk that is pulled back to its centre.
                 sway = 0.95 * sway + 0.3 * _SWAY_M * rng.standard_normal()
                 posture = segment.pose(time_s - segment.start_s)
-                posture[0] += body.placement.lateral_m + sway
+                posture[TORSO_Y] += body.placement.lateral_m + sway
             seen = [
                 renderer.image() if posture is None else renderer.image(*view.seen(body, posture))
                 for renderer, view in zip(renderers, views, strict=True)
@@ -179,7 +179,7 @@ def _truth(
     return {
         "joints_m": dict(zip(names, np.round(optical, 4).tolist(), strict=True)),
         "joints_px": dict(zip(names, np.round(camera.project(optical), 2).tolist(), strict=True)),
-        "torso_rpy_deg": np.round(np.degrees(posture[1:4]), 2).tolist(),
+        "torso_rpy_deg": np.round(np.degrees(posture[TURNS]), 2).tolist(),
         "posture": dict(zip(JOINT_NAMES, np.round(posture, 6).tolist(), strict=True)),
         "mask_px": int(np.count_nonzero(mask)),
     }

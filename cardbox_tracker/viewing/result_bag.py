@@ -43,7 +43,7 @@ def show_results(
         except (AttributeError, TypeError, ValueError) as error:
             # A recording contains the definitions of its types.
             raise BagError(
-                f"{message.topic} of {bag.path} is not what it should be: {error}"
+                f"{message.topic} of {bag.path} has a malformed message: {error}; record it again"
             ) from None
         count += message.topic == space + _JOINTS
         progress((message.time_ns - bag.start_ns) / 1e9 / total_s)

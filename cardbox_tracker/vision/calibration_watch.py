@@ -1,7 +1,7 @@
 """Follows lasting changes of a camera's calibration and ignores brief or invalid ones.
 
-A single wrong CameraInfo, or a second camera on the same topic, must not discard what was learned
-with the right one.
+A single wrong CameraInfo, or a second camera on the same topic, must not discard the background
+that was learned with the right one.
 """
 
 from __future__ import annotations

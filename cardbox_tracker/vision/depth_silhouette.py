@@ -24,7 +24,7 @@ _SPECKS = BackgroundConfig()
 
 
 def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]:
-    """Return the silhouette (H, W), 0 or 255, of what is nearer than ``within_m``.
+    """Return the silhouette (H, W), 0 or 255, of the pixels nearer than ``within_m``.
 
     Args:
         depth_m: (H, W), metres; not finite or 0 where it is unknown.

@@ -182,7 +182,7 @@ class LightFollower:
         if self._settling > 0 or self._is_lit:
             rate, tolerance = 1.0, _TOLERANCE_AFTER_STEP
         base = cv2.resize(self._base, self._size)
-        sum_cells(*parts, around, base, person, level, tolerance, self._cells)
+        sum_cells(parts, around, base, person, level, tolerance, self._cells)
         change, weight = (cv2.GaussianBlur(c, (0, 0), _SMOOTHING_CELLS) for c in self._cells)
         # Cells without known pixels do not change.
         goal = self._base * (1.0 + change / (weight + _DOUBT))

@@ -39,9 +39,7 @@ def collect_ratios(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sum_cells(
-    small: Any,
-    mean: Any,
-    brightest: Any,
+    seen: Any,
     around: Any,
     base: Any,
     person: Any,
@@ -52,9 +50,7 @@ def sum_cells(
     """Write each cell's mean change times its share of usable pixels, and that share.
 
     Args:
-        small: brightness of an image, (h, w) uint8.
-        mean: brightness of the background.
-        brightest: the brightest channel of the background.
+        seen: ``small``, ``mean`` and ``brightest`` as for :func:`collect_ratios`.
         around: expected factors of the level, (h, w).
         base: factors of the level that the change is relative to, (h, w).
         person: not 0 where the person is.
@@ -63,6 +59,7 @@ def sum_cells(
         cells: result, (2, rows, columns).
     """
     cells[:] = 0
+    small, mean, brightest = seen
     height, width = small.shape
     rows, columns = cells.shape[1:]
     share = np.float32(rows * columns / (height * width))

@@ -1,7 +1,7 @@
-"""Order and losses of a stream of images, judged by their stamps.
+"""Detects the order and the losses of a stream of images by their stamps.
 
-A camera that sets no stamps, or one whose clock jumps, must neither stop the nodes nor make
-tracking start again with every image.
+A camera without stamps, or with a clock that jumps, must neither stop the nodes nor restart the
+tracking with every image.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from enum import Enum
 
 WINDOW = 120
 _PAUSE_NS = 2_000_000_000
-# Further back than the network reorders messages: the source has started again.
+# The network does not reorder messages over this time, so the source was restarted.
 _RESTART_NS = 1_000_000_000
-# After this many images of one clock in a row the other clock is forgotten.
+# After this many consecutive images of one clock the other clock is forgotten.
 _PATIENCE = 5
 
 
 class StampOrder(Enum):
-    """How the stamp of an image follows the one before."""
+    """Relation of the stamp of an image to the one before."""
 
     NEXT = "later than the one before, or the first"
     GAP = "more than two seconds later"
@@ -31,28 +31,28 @@ class StampOrder(Enum):
 
     @property
     def is_usable(self) -> bool:
-        """Whether the image may be processed as the next one."""
+        """Whether the image can be processed as the next one."""
         return self not in (StampOrder.LATE, StampOrder.REPEATED, StampOrder.FOREIGN)
 
 
 class StampSequence:
-    """Classifies each stamp by those before it.
+    """Classifies each stamp by the earlier ones.
 
-    A jump is followed at once. If the next image continues the time before the jump, that time goes
-    on and images of the other time are foreign: two publishers with different clocks, or one wrong
-    stamp.
+    A jump is accepted at once. If the next image continues the time before the jump, that time is
+    used again and images of the other time are foreign. They come from a second publisher with
+    another clock, or have a wrong stamp.
     """
 
     def __init__(self) -> None:
         """Start before the first image."""
         self._last_ns: int | None = None
-        # Where the stamps were before they jumped.
+        # Last stamp before the jump.
         self._left_ns: int | None = None
         self._has_jumped = False
         self._foreign = 0
 
     def add(self, stamp_ns: int) -> StampOrder:
-        """Return how the next stamp follows; 0 stands for none."""
+        """Classify the next stamp, ns; 0 means that the image has none."""
         if stamp_ns == 0:
             return StampOrder.UNSTAMPED
         last_ns = self._last_ns
@@ -76,13 +76,13 @@ class StampSequence:
         return StampOrder.GAP if spacing_ns > 0 else StampOrder.RESTART
 
     def _is_foreign(self, stamp_ns: int) -> bool:
-        """Return whether a stamp continues those before the jump."""
+        """Return whether a stamp continues the stamps before the jump."""
         left_ns = self._left_ns
         if left_ns is None or not -_RESTART_NS <= stamp_ns - left_ns < _PAUSE_NS:
             return False
         self._foreign += 1
         if self._foreign > _PATIENCE:
-            # The jump was an error of one image, or the other publisher has ended.
+            # The jump was an error of one image, or the other publisher has stopped.
             self._foreign, self._left_ns = 0, None
             return False
         self._left_ns = stamp_ns
@@ -90,22 +90,22 @@ class StampSequence:
 
 
 class StreamStatistics:
-    """Counts the messages of a stream and, by their stamps, those that never arrived."""
+    """Counts the messages of a stream and estimates the lost ones by the stamps."""
 
     def __init__(self) -> None:
-        """Start with nothing received."""
+        """Start without messages."""
         self.received = 0
         self.dropped = 0
         self.counts: dict[StampOrder, int] = dict.fromkeys(StampOrder, 0)
         self._sequence = StampSequence()
         self._last_ns: int | None = None
         self._spacings_ns: deque[int] = deque()
-        # The same, sorted: the period is needed with every image.
+        # The sorted intervals, since the period is needed with every image.
         self._ordered_ns: list[int] = []
         self._latest: deque[StampOrder] = deque(maxlen=WINDOW)
 
     def add(self, stamp_ns: int) -> StampOrder:
-        """Count a message of that stamp and return how it follows those before."""
+        """Count a message with this stamp, ns, and return its relation to the one before."""
         self.received += 1
         order = self._sequence.add(stamp_ns)
         self.counts[order] += 1
@@ -140,20 +140,21 @@ class StreamStatistics:
     def period_ns(self) -> int:
         """Spacing of the stamps without losses, ns.
 
-        A low percentile: where most images are lost, the median is a multiple of the period.
+        It is a low percentile, since the median is a multiple of the period if most images are
+        lost.
         """
         return self._ordered_ns[len(self._ordered_ns) // 10] if self._ordered_ns else 0
 
     @property
     def loss(self) -> float:
-        """Fraction of the latest messages that never arrived, judged by their stamps."""
+        """Fraction of the latest messages that were lost, estimated by the stamps."""
         if len(self._spacings_ns) < 5:
             return 0.0
         expected = max(round(sum(self._spacings_ns) / self.period_ns), 1)
         return max(1.0 - len(self._spacings_ns) / expected, 0.0)
 
     def remarks(self) -> dict[str, str]:
-        """Return the faults of the latest stamps, a text by kind; a single late image is none."""
+        """Return texts on faults of the latest stamps by kind; a single late image is no fault."""
         texts = {}
         latest = Counter(self._latest)
         count = len(self._latest)

@@ -8,13 +8,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.body import posture as posture_module
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
+    FIRST_ANGLES,
     JOINT_LIMITS,
     JOINT_NAMES,
     LEFT_ARM,
+    MIRROR_SIGNS,
+    MIRRORED,
+    N_STATE,
+    PLACE,
+    PLACE_NAMES,
+    POSTURE,
     REFERENCE_NAMES,
     RIGHT_ARM,
+    STATE_LIMITS,
     TORSO,
+    TURNS,
     clip_to_limits,
     reference_posture,
 )
@@ -27,6 +39,31 @@ def test_the_slices_hold_the_joints_of_their_part() -> None:
     assert all(name.startswith("right_") for name in JOINT_NAMES[RIGHT_ARM])
     left = [name.removeprefix("left_") for name in JOINT_NAMES[LEFT_ARM]]
     assert left == [name.removeprefix("right_") for name in JOINT_NAMES[RIGHT_ARM]]
+
+
+def test_the_indices_are_those_of_the_names() -> None:
+    names = (*JOINT_NAMES, *PLACE_NAMES)
+    assert (len(names), names[POSTURE], names[PLACE]) == (N_STATE, JOINT_NAMES, PLACE_NAMES)
+    for name in ("TORSO_Y", "TORSO_X", "TORSO_Z"):
+        assert names[getattr(posture_module, name)] == name.lower()
+    assert names[TURNS] == ("torso_roll", "torso_pitch", "torso_yaw")
+    for name in ("ROLL", "PITCH", "YAW"):
+        assert names[getattr(posture_module, name)] == f"torso_{name.lower()}"
+    arm = ("SHOULDER_ABDUCTION", "SHOULDER_FLEXION", "ELBOW_ABDUCTION", "ELBOW_FLEXION")
+    for side, first in zip(("left", "right"), FIRST_ANGLES, strict=True):
+        for name in arm:
+            assert names[first + getattr(posture_module, name)] == f"{side}_{name.lower()}"
+
+
+@given(shares=arrays(np.float64, N_STATE, elements=st.floats(0.0, 1.0)))
+def test_the_mirror_image_of_a_state_has_the_mirrored_keypoints(shares: np.ndarray) -> None:
+    low, high = STATE_LIMITS.T
+    state = low + shares * (high - low)
+    body = BodyModel()
+    left, right = (
+        keypoints_m(body, one[POSTURE]) for one in (state, state[MIRRORED] * MIRROR_SIGNS)
+    )
+    np.testing.assert_allclose(right, left[[3, 4, 5, 0, 1, 2]] * (1.0, -1.0, 1.0), atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,16 @@ import pytest
             "--refine-sizes was removed: breadths stay as they were measured",
         ),
         (("--particles", "1"), "--particles: expected a whole number of 2 or more, got '1'"),
-        (("--particles", "9999999999"), "particles is 1e+10; expected 2 to 1e+06"),
+        (("--particles", "100"), "--particles has no effect with the filter whole_body"),
+        (("--particles", "100"), "use --effort"),
+        (("--strategy", "srs"), "use --effort"),
+        (("--effort", "5"), "--effort is 5; expected 0.25 to 4"),
+        (("--output-smoothing-s", "-1"), "--output-smoothing-s is -1; expected 0 to 10"),
+        (("--corrector", "best"), "corrector is 'best'; expected learned, none, FILE.npz or"),
+        (("--corrector", "FOLDER/missing.npz"), "missing.npz: No such file"),
+        (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file"),
+        (("--settings", "FOLDER/list.yaml"), "list.yaml: expected names and values"),
+        (("--settings", "FOLDER/person.yaml"), "person.yaml: 'format' is no setting; "),
         (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),
         (("--model", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give the"),
         (("--model", "FOLDER/session"), "directory"),
@@ -60,6 +69,24 @@ def test_mistakes_of_track(
     done = cardbox("track", files / "session", *(f"{n}={text}" for n, text in options.items()))
     done.assert_refused("track", expected)
     assert sorted(path.name for path in files.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--particles=9999999999",), "--particles is 1e+10; expected 2 to 1e+06"),
+        (("--effort=0.5",), "--effort has no effect with the filter hierarchical (preset paper)"),
+        (("--effort=0.5",), "use --particles"),
+        (("--corrector=none",), "--corrector has no effect"),
+    ],
+)
+def test_settings_that_do_nothing_with_the_paper_preset(
+    files: Path, words: tuple[str, ...], expected: str, cardbox: Callable
+) -> None:
+    given = ("--background=0:3.9", f"--model={files / 'person.yaml'}", "--start=15.6")
+    paper = (f"--csv={files / 'out.csv'}", "--preset=paper")
+    done = cardbox("track", files / "session", *given, *paper, *words)
+    done.assert_refused("track", expected)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,9 @@
-"""The worked example of docs/extending.md is executed as it stands there."""
+"""The worked examples of docs/extending.md are executed as they stand there, and checked."""
 
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,60 +15,149 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.cost.terms import ARMS, Frame
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.cost.terms import ARMS, Frame, Silence
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.rasterisation import render
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)
+FILES = {"clicked_points.py": CODE[0], "linear_corrector.py": CODE[2]}
+STAMP_NS = 7_000_000_000
+FRONT = reference_posture("front")
 
 
 @pytest.fixture
-def table(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """The example's file as a module of its name."""
-    module = ModuleType("table")
-    monkeypatch.setitem(sys.modules, "table", module)
-    monkeypatch.chdir(ROOT)
-    exec(compile(CODE[0], "table.py", "exec"), vars(module))
-    yield module
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The examples' files in a folder on the path, with the configuration they read."""
+    for name, code in FILES.items():
+        (tmp_path / name).write_text(code)
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    (tmp_path / "points.csv").write_text(f"stamp_ns,joint,u,v\n{STAMP_NS},left_hand,180.0,50.0\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path
+    for name in FILES:
+        sys.modules.pop(Path(name).stem, None)
 
 
-@pytest.fixture
-def tracker(table: ModuleType) -> Tracker:
-    """What the example's second piece makes."""
+def made_by(code: str) -> Tracker:
+    """What a piece of code calls ``tracker``."""
     names: dict[str, Any] = {}
-    exec(CODE[1], names)
-    return names["tracker"]
+    exec(code, names)
+    found = names["tracker"]
+    assert isinstance(found, Tracker)
+    return found
 
 
-def test_the_term_rates_by_hand(table: ModuleType, tracker: Tracker) -> None:
-    body = tracker.body
-    frame = Frame(np.zeros((240, 320), np.uint8), 200, 0)
-    hanging = np.zeros((1, 12))
-    hand_m = forward_kinematics(body, hanging[0]).left.hand[2]
-    seen = table.Table(top_m=hand_m + 0.05).build(body, tracker.camera).observe(frame)
-    # Both hands are 5 cm too low: 2000 px a metre each.
-    assert seen.postures(hanging).tolist() == pytest.approx([200.0])
-    rate = seen.arms_beside(np.zeros(4))
-    for side in ARMS:
-        assert rate(side, np.zeros((2, 4))).tolist() == pytest.approx([100.0, 100.0])
+def module_of(name: str) -> ModuleType:
+    return __import__(name)
+
+
+def silhouette_of(tracker: Tracker, posture: np.ndarray = FRONT) -> np.ndarray:
+    return render(cardbox_patches(tracker.body, posture), tracker.camera)
+
+
+def projected(tracker: Tracker, posture: np.ndarray) -> np.ndarray:
+    points_m = tracker.camera.reference_to_optical(keypoints_m(tracker.body, posture))
+    return tracker.camera.project(points_m)
+
+
+def frame(stamp_ns: int | None) -> Frame:
+    return Frame(np.zeros((240, 320), np.uint8), 200, 0, stamp_ns=stamp_ns)
+
+
+def test_clicked_points_rate_by_hand(folder: Path) -> None:
+    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    hand = KEYPOINT_NAMES.index("left_hand")
+    at = projected(tracker, FRONT)[hand]
+    points = {STAMP_NS: {"left_hand": (at[0] + 3.0, at[1] + 4.0)}}
+    term = clicked.ClickedPoints(points, weight=10.0).build(tracker.body, tracker.camera)
+    seen = term.observe(frame(STAMP_NS))
+    # 5 px away, and 10 px for each of them; another arm has no point.
+    states = np.stack([FRONT, np.append(FRONT, [0.0, 0.0])[:12]])
+    assert seen.postures(states).tolist() == pytest.approx([50.0, 50.0])
+    rate = seen.arms_beside(FRONT[:4])
+    assert rate("left", FRONT[None, ARMS["left"]]).tolist() == pytest.approx([50.0])
+    assert rate("right", FRONT[None, ARMS["right"]]).tolist() == [0.0]
     assert seen.torsos_beside(None)(np.zeros((3, 4))).tolist() == [0, 0, 0]
+    assert isinstance(term.observe(frame(STAMP_NS + 1)), Silence)
+    assert isinstance(term.observe(frame(None)), Silence)
 
 
-def test_the_tracker_uses_the_term(table: ModuleType, tracker: Tracker) -> None:
-    """With a weight above that of the silhouette, hands rise to the table's top."""
-    assert isinstance(tracker.config.terms[-1], table.Table)
-    heavy = table.Table(top_m=-0.1, weight_px_per_m=50_000.0)
-    tracker.configure(replace(tracker.config, terms=(heavy,)))
-    posture = reference_posture("front")
-    silhouette = render(cardbox_patches(tracker.body, posture), tracker.camera)
-    without = Tracker(tracker.body, tracker.camera)
-    found = []
-    for of in (without, tracker):
-        estimates = [of.track(silhouette) for _ in range(8)]
-        assert estimates[-1].posture is not None
-        frames = forward_kinematics(of.body, estimates[-1].posture)
-        found.append((frames.left.hand[2] + frames.right.hand[2]) / 2)
-    assert found[0] < -0.3 < -0.15 < found[1]
+def test_clicked_points_are_where_the_body_is_placed(folder: Path) -> None:
+    """A state of torso_x and torso_z is rated as the whole-body filter draws it."""
+    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    stiff = WholeBodyCostConfig(lift_gain=0.0)
+    state = np.append(FRONT, [0.2, -0.05])
+    cost = WholeBodyCost(tracker.body, tracker.camera, stiff)
+    points_px = tracker.camera.project(cost.keypoints(state))
+    points = {STAMP_NS: dict(zip(KEYPOINT_NAMES, map(tuple, points_px), strict=True))}
+    term = clicked.ClickedPoints(points, weight=1.0).build(tracker.body, tracker.camera)
+    seen = term.observe(frame(STAMP_NS))
+    assert seen.postures(state[None])[0] == pytest.approx(0.0, abs=1e-6)
+    arm = seen.arms_beside(state[[0, 1, 2, 3, 12, 13]])("left", state[None, 4:8])
+    assert arm[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_tracker_follows_clicked_points(folder: Path) -> None:
+    """An outline says little of a forearm before the belly; a point says where the hand is."""
+    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    assert tracker.config.terms[-1].points_px == {STAMP_NS: {"left_hand": (180.0, 50.0)}}
+    posture = FRONT.copy()
+    posture[4:8] = np.radians((10, 25, -70, 40))
+    names = ("left_elbow", "left_hand")
+    hand = KEYPOINT_NAMES.index("left_hand")
+    wanted_px = projected(tracker, posture)
+    at = {name: tuple(wanted_px[KEYPOINT_NAMES.index(name)]) for name in names}
+    away_px = []
+    for points in ({}, {STAMP_NS + i: at for i in range(8)}):
+        config = tracker.config.changed({"whole_body": {"corrector": "none"}})
+        config = replace(config, terms=(clicked.ClickedPoints(points),))
+        of = Tracker(tracker.body, tracker.camera, config)
+        for i in range(8):
+            estimate = of.track(silhouette_of(of, posture), stamp_ns=STAMP_NS + i)
+        assert estimate.keypoints_m is not None
+        found_px = of.camera.project(estimate.keypoints_m)
+        away_px.append(float(np.linalg.norm(found_px[hand] - wanted_px[hand])))
+    assert away_px[1] < 5.0 < away_px[0], away_px
+
+
+def test_a_corrector_from_a_file_is_fitted_and_used(folder: Path) -> None:
+    linear = module_of("linear_corrector")
+    rng = np.random.default_rng(0)
+    body_m = np.array([0.0, 0.0, 2.5]) + keypoints_m(made_by(CODE[1]).body, FRONT)
+    found_m = body_m + 0.2 * rng.standard_normal((200, 6, 3))
+    # All results are 10 cm too near.
+    linear.fit(found_m, found_m + np.array([0.0, 0.0, 0.1]))
+    tracker = made_by(CODE[3])
+    nothing = PRESETS["default"]().changed({"whole_body": {"corrector": "none"}})
+    ahead_m = []
+    for of in (Tracker(tracker.body, tracker.camera, nothing), tracker):
+        for _ in range(8):
+            estimate = of.track(silhouette_of(of))
+        assert estimate.keypoints_m is not None
+        ahead_m.append(estimate.keypoints_m[:, 2].mean())
+    assert ahead_m[1] - ahead_m[0] == pytest.approx(0.1, abs=0.03)
+
+
+@pytest.mark.slow
+def test_the_examples_pass_ruff_and_strict_mypy(folder: Path) -> None:
+    for tool in (("ruff", "check", "--config"), ("ruff", "format", "--check", "--config")):
+        done = subprocess.run(
+            [sys.executable, "-m", *tool, ROOT / "pyproject.toml", *FILES],
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", *FILES],
+        env={"MYPYPATH": str(ROOT), "PATH": ""},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

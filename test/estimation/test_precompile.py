@@ -16,16 +16,27 @@ from cardbox_tracker.estimation import person_region, still_things
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost import (
     arm_points,
+    body_outline,
+    body_priors,
+    cardbox_kernels,
     inner_cue_kernels,
-    kernels,
+    kinematics,
     outline_fit_kernels,
     pose_prior,
+    rasterisation,
     row_sums,
+    union,
     whole_body_kernels,
 )
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.estimate import TRACKING
-from cardbox_tracker.estimation.filtering import particle_kernels, whole_body_moves
+from cardbox_tracker.estimation.filtering import (
+    arm_proposals,
+    joint_moves,
+    particle_kernels,
+    state_choice,
+    torso_proposals,
+)
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
@@ -42,9 +53,10 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 def compiled() -> dict[str, int]:
     """How many versions of each function there are."""
     modules: tuple[ModuleType, ...] = (
-        *(kernels, inner_cue_kernels, row_sums, pose_prior, whole_body_kernels),
-        *(arm_points, outline_fit_kernels),
-        *(particle_kernels, whole_body_moves, person_region, still_things),
+        *(kinematics, rasterisation, union, cardbox_kernels, inner_cue_kernels, row_sums),
+        *(pose_prior, body_outline, body_priors, whole_body_kernels, arm_points),
+        *(outline_fit_kernels, particle_kernels, person_region, still_things),
+        *(arm_proposals, joint_moves, state_choice, torso_proposals),
         *(contrast, regions, chroma, shadows, light, window),
     )
     return {
@@ -60,7 +72,7 @@ def compiled() -> dict[str, int]:
 def test_no_image_waits_for_the_compiler(preset: str, channels: int) -> None:
     compile_all()
     before = compiled()
-    assert before["cardbox_tracker.estimation.cost.kernels.trunk_costs"] > 0
+    assert before["cardbox_tracker.estimation.cost.cardbox_kernels.trunk_costs"] > 0
     assert before["cardbox_tracker.estimation.cost.inner_cue_kernels.ratio_maps"] > 0
     levels = np.random.default_rng(0).integers(0, 255, (5, bins_of(channels))).astype(np.uint8)
     body = BodyModel.of(appearance=Appearance(levels, np.full(channels, 100.0)))

@@ -73,7 +73,7 @@ def test_each_camera_has_its_own_silhouettes(sources: Recording, two: Path) -> N
 
 def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     with (
-        pytest.raises(CameraError, match="nothing says where camera two"),
+        pytest.raises(CameraError, match="camera two"),
         open_recording(two, EMPTY, ["one", "two"]),
     ):
         pass
@@ -87,7 +87,7 @@ def test_what_is_missing_is_said(two: Path, chain: Path) -> None:
     ):
         pass
     with (
-        pytest.raises(CameraError, match="left camera the first"),
+        pytest.raises(CameraError, match="left camera"),
         open_recording(two, EMPTY, ["two", "one"], chain, depth="stereo"),
     ):
         pass
@@ -121,7 +121,7 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         assert len(taken) == len(frames)
         assert all(t.depth_m is t.frames[0].depth_m is not None for t in taken if t.frames[0])
     with (
-        pytest.raises(CardboxError, match="for one camera only"),
+        pytest.raises(CardboxError, match="one camera"),
         open_recording(folder, within, ["one", "two"]),
     ):
         pass
@@ -135,12 +135,12 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
 def test_a_topic_without_depth_is_refused(two: Path) -> None:
     with (
         open_recording(two, EMPTY, ["one"], depth="/one/camera_info") as opened,
-        pytest.raises(BagError, match="/one/camera_info has messages of sensor_msgs/msg/Camera"),
+        pytest.raises(BagError, match=r"/one/camera_info .*sensor_msgs/msg/Camera"),
     ):
         next(opened.frames())
     with (
         open_recording(two, EMPTY, ["one"], depth="/one/image_raw") as opened,
-        pytest.raises(CardboxError, match="encoding 'mono8' is no depth"),
+        pytest.raises(CardboxError, match=r"'mono8'.*16UC1"),
     ):
         next(opened.frames())
 

@@ -84,7 +84,7 @@ def test_the_tracker_gets_the_images(
         return follow(tracker, observations)
 
     monkeypatch.setattr(Tracker, "track", spy)
-    config = default_preset().with_particles(20)
+    config = default_preset().changed({"whole_body": {"effort": 0.25}})
     with_cue = tmp_path / "cue.csv"
     track_recording(
         Recording([""], [source]), recording.body, config, 0, recording.start_s(), with_cue

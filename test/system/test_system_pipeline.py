@@ -401,7 +401,9 @@ def test_wrong_parameter_is_refused_and_a_right_one_is_live(
     graph.diagnosis("tracker", "the person was lost")
     assert len(session.joint_states) == before, "it takes effect at the very next image"
     assert set_parameter("lost_iou", 0.3).successful
-    assert set_parameter("particles", 100).successful
+    refused = set_parameter("particles", 100)
+    assert not refused.successful and "effort" in refused.reason
+    assert set_parameter("effort", 0.5).successful
     session.track("front", 2)
 
 

@@ -354,7 +354,7 @@ def test_all_at_once(live: Live) -> None:
     # As it was before.
     models.publish(String(data=bodies[1]))
     settings = {
-        "tracker": {"preset": "default", "particles": 0, "lost_iou": 0.4},
+        "tracker": {"particles": 0, "preset": "default", "lost_iou": 0.4},
         "background": {"threshold": 3.0, "follow": True},
     }
     for name, values in settings.items():

@@ -41,7 +41,7 @@ def test_wrong_and_right_frames_weigh_alike() -> None:
     rare = np.flatnonzero(every.is_wrong)[::10]
     chosen = np.concatenate([np.flatnonzero(~every.is_wrong), rare])
     some = Frames(every.features[chosen], every.is_wrong[chosen])
-    np.testing.assert_allclose(fitted(some), fitted(every), atol=0.3)
+    np.testing.assert_allclose(fitted(some, 1e6), fitted(every, 1e6), atol=0.3)
 
 
 def test_the_quality_of_a_perfect_and_of_a_blind_guess() -> None:

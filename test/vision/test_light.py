@@ -192,7 +192,7 @@ def test_the_sums_are_those_of_numpy(seed: int, shape: tuple[int, int]) -> None:
     np.testing.assert_allclose(ratios[:count], (ratio / field)[known], rtol=1e-5)
     cells = np.empty((2, 3, 4), np.float32)
     base = rng.uniform(0.8, 1.2, shape).astype(np.float32)
-    sum_cells(small, mean, brightest, field, base, person, 1.2, 0.4, cells)
+    sum_cells((small, mean, brightest), field, base, person, 1.2, 0.4, cells)
     change = ratio / np.float32(1.2) / field - 1
     # What is cut off is a lower bound.
     seen = (person == 0) & ((ratio * brightest < 250) | (change > 0))

@@ -1,6 +1,8 @@
-"""How well a posture explains what was observed: terms over one observation.
+"""Cost of a posture: terms over one observation.
 
-``silhouette`` defines the cost of equation (2) and implements it as it reads. ``compiled`` gives
-the same numbers, fast: with ``row_sums`` of the silhouette, and ``kernels`` that take body and
-camera as ``kernel_arguments`` makes them.
+``silhouette`` defines the cost of equation (2) and implements it as it reads; ``compiled`` gives
+the same numbers, fast. Compiled code is built of ``kinematics`` (state to joints), patches
+(``cardbox_kernels`` for the paper's model, ``body_outline`` for the whole body), ``rasterisation``
+(patches to columns of rows) and ``union`` (pixels under any patch, from ``row_sums``).
+``kernel_arguments`` makes body and camera into what these take.
 """

@@ -7,8 +7,6 @@ sums of what trunk and other arm leave uncovered, the cost of an arm is about
 
 where (u, v) is the point's pixel: -1 for foreground that is uncovered, 0 for what is covered, 1 for
 background. That is enough to tell which of many arms are worth being drawn.
-
-Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code of this file.
 """
 
 from __future__ import annotations
@@ -17,16 +15,17 @@ from math import sqrt
 
 import numpy as np
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats, Place, PlaceTuple, View, ViewTuple
-from cardbox_tracker.estimation.cost.row_sums import RowSums
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
     HEIGHT,
     TOP_WIDTH,
     UPPER_ARM,
-    _pose,
-    _pose_arm,
+    BodyTuple,
+    Floats,
+    body_of,
 )
+from cardbox_tracker.estimation.cost.kinematics import pose_arm, state_pose
+from cardbox_tracker.estimation.cost.row_sums import RowSums
 
 # Points of the upper arm, the elbow among them, and of the forearm, to the end of the fingers.
 _POINTS = (3, 4)
@@ -34,10 +33,7 @@ _POINTS = (3, 4)
 _NEAREST_M = 0.05
 
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-
-
-@_compile
+@kernel
 def joints_of_arms(
     arms: Floats, side: float, parts: Floats, girdle: Floats, joints: Floats
 ) -> None:
@@ -47,18 +43,14 @@ def joints_of_arms(
     """
     directions = np.empty(6)
     for i in range(arms.shape[0]):
-        _pose_arm(arms[i], side, parts, girdle, joints[i], directions)
+        pose_arm(arms[i], side, parts, girdle, joints[i], directions)
 
 
-@_compile
+@kernel
 def add_costs_of_arms(
     joints: Floats,
     torso: Floats,
-    parts: Floats,
-    drawn: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
+    body: BodyTuple,
     uncovered: RowSums,
     scale: float,
     costs: Floats,
@@ -68,19 +60,17 @@ def add_costs_of_arms(
     Args:
         joints: of the arms in the torso's frame, (N, 3, 3), metres.
         torso: state whose trunk the arms are at.
-        parts: the measured parts, (6, 6), metres.
-        drawn: those whose outlines are drawn, (6, 6), metres.
-        girdle: where the shoulders are, (5,).
-        place: where the hips are in the body model.
-        view: the camera.
+        body: of the person.
         uncovered: row sums beside trunk and other arm, (rows, W + 1).
         scale: 1 / (pixels of the silhouette).
         costs: shares of the silhouette.
     """
     rows, width = uncovered.shape[0], uncovered.shape[1] - 1
-    rotation, hip, lens = np.empty((3, 3)), np.empty(3), View(*view)
+    of = body_of(body)
+    lens, drawn, parts = of.camera, of.drawn, of.parts
+    rotation, hip = np.empty((3, 3)), np.empty(3)
     seen_m, axis = np.empty((3, 3)), np.empty(3)
-    _pose(torso, Place(*place), lens, rotation, hip)
+    state_pose(torso, of.place, lens, rotation, hip)
     for i in range(joints.shape[0]):
         for joint in range(3):
             x, y, z = joints[i, joint, 0], joints[i, joint, 1], joints[i, joint, 2]

@@ -1,7 +1,7 @@
 """The silhouette's term, compiled: equal results, a fraction of the time.
 
-What it equals is in :mod:`cardbox_tracker.estimation.cost.silhouette`; see
-:mod:`cardbox_tracker.estimation.cost.kernels` for how it works.
+:mod:`cardbox_tracker.estimation.cost.silhouette` is the reference;
+:mod:`cardbox_tracker.estimation.cost.cardbox_kernels` explains the method.
 """
 
 from __future__ import annotations
@@ -13,10 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import LEFT_ARM, N_JOINTS, TORSO
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost import kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
-from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost import cardbox_kernels as kernels
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    CardboxTuple,
+    intrinsics_of,
+    place_of,
+    shape_of,
+)
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
@@ -34,7 +39,7 @@ class CompiledSilhouette(SilhouetteTerm):
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernels if they are not yet."""
         super().__init__(body, camera)
-        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
+        self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
         self._sums = np.int16 if camera.width < 2**15 else np.int32
         self.warm_up()
@@ -46,10 +51,11 @@ class CompiledSilhouette(SilhouetteTerm):
         # Pixels out of a message are read-only, which is another type to the compiler.
         empty.setflags(write=False)
         observation = self.look(empty)
-        observation.torsos_beside(np.zeros(12))(np.zeros((1, 4)))
-        observation.arms_beside(np.zeros(4))("left", np.zeros((1, 4)))
-        observation.postures(np.zeros((1, 12)))
-        observation.bodies(self.body.sizes[None], np.zeros((1, 12)))
+        posture = np.zeros((1, N_JOINTS))
+        observation.torsos_beside(posture[0])(posture[:, TORSO])
+        observation.arms_beside(posture[0, TORSO])("left", posture[:, LEFT_ARM])
+        observation.postures(posture)
+        observation.bodies(self.body.sizes[None], posture)
 
     def observe(self, frame: Frame) -> CompiledObservation:
         """See :class:`SilhouetteTerm`."""
@@ -57,7 +63,7 @@ class CompiledSilhouette(SilhouetteTerm):
         words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
         row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
         fill_row_sums(upper, words, row_sums)
-        return CompiledObservation(frame, row_sums, *self._constants)
+        return CompiledObservation(frame, row_sums, self._cardbox)
 
     def look(self, silhouette: Silhouette) -> CompiledObservation:
         """See :class:`SilhouetteTerm`."""
@@ -71,18 +77,12 @@ class CompiledObservation(SilhouetteObservation):
     Attributes:
         frame: the frame.
         row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
-        parts: lengths of the body's parts, (6, 6), metres (``kernel_arguments``).
-        shoulder: where the shoulder joints are in the torso's frame, (2,), metres.
-        place: where the hips are.
-        view: the camera.
+        cardbox: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Cardbox`.
     """
 
     frame: Frame
     row_sums: NDArray[Any]
-    parts: FloatArray
-    shoulder: FloatArray
-    place: PlaceTuple
-    view: ViewTuple
+    cardbox: CardboxTuple
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """See :class:`SilhouetteObservation`."""
@@ -90,24 +90,12 @@ class CompiledObservation(SilhouetteObservation):
         if arms is not None:
             row_sums = np.empty_like(self.row_sums)
             posture = np.array(arms, dtype=np.float64)
-            base += int(
-                kernels.cover_arms(
-                    posture,
-                    self.parts,
-                    self.shoulder,
-                    self.place,
-                    self.view,
-                    self.row_sums,
-                    row_sums,
-                )
-            )
+            base += int(kernels.cover_arms(posture, self.cardbox, self.row_sums, row_sums))
 
         def costs(torsos: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(torsos, dtype=np.float64)
             counts = np.empty(len(particles), np.int64)
-            kernels.trunk_costs(
-                particles, self.parts, self.place, self.view, row_sums, base, counts
-            )
+            kernels.trunk_costs(particles, self.cardbox, row_sums, base, counts)
             return counts.astype(np.float64)
 
         return costs
@@ -117,24 +105,14 @@ class CompiledObservation(SilhouetteObservation):
         pose = np.array(torso, dtype=np.float64)
         covered = np.empty_like(self.row_sums)
         base = self.frame.foreground_px + int(
-            kernels.cover_trunk(pose, self.parts, self.place, self.view, self.row_sums, covered)
+            kernels.cover_trunk(pose, self.cardbox, self.row_sums, covered)
         )
 
         def costs(side: str, arms: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(arms, dtype=np.float64)
             counts = np.empty(len(particles), np.int64)
-            kernels.arm_costs(
-                particles,
-                _SIDE_SIGN[side],
-                pose,
-                self.parts,
-                self.shoulder,
-                self.place,
-                self.view,
-                covered,
-                base,
-                counts,
-            )
+            sign = _SIDE_SIGN[side]
+            kernels.arm_costs(particles, sign, pose, self.cardbox, covered, base, counts)
             return counts.astype(np.float64)
 
         return costs
@@ -157,9 +135,7 @@ class CompiledObservation(SilhouetteObservation):
         costs = np.empty(len(sizes), np.int64)
         kernels.body_costs(
             np.ascontiguousarray(postures, dtype=np.float64),
-            *shape_of(np.asarray(sizes, dtype=np.float64)),
-            self.place,
-            self.view,
+            (*shape_of(np.asarray(sizes, dtype=np.float64)), *self.cardbox[2:]),
             self.row_sums,
             self.frame.foreground_px,
             costs,
@@ -171,7 +147,7 @@ class CompiledObservation(SilhouetteObservation):
         costs = np.empty(len(corners_m), np.int64)
         kernels.polygon_costs(
             np.ascontiguousarray(corners_m, dtype=np.float64),
-            self.view,
+            self.cardbox[3],
             self.row_sums,
             self.frame.foreground_px,
             costs,
@@ -184,10 +160,7 @@ class CompiledObservation(SilhouetteObservation):
         areas = np.empty(len(contiguous), np.int64)
         kernels.full_costs(
             contiguous,
-            self.parts,
-            self.shoulder,
-            self.place,
-            self.view,
+            self.cardbox,
             self.row_sums,
             self.frame.foreground_px,
             costs,
@@ -201,11 +174,11 @@ class CompiledKeypoints:
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
-        self._constants = (*shape_of(body.sizes), place_of(body), view_of(camera))
-        self(np.zeros(12))
+        self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
+        self(np.zeros(N_JOINTS))
 
     def __call__(self, posture: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a posture (12,), metres in the optical frame."""
         points = np.empty((6, 3))
-        kernels.keypoints(np.array(posture, dtype=np.float64), *self._constants, points)
+        kernels.keypoints(np.array(posture, dtype=np.float64), self._cardbox, points)
         return points

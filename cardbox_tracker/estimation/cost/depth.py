@@ -1,10 +1,10 @@
 """The term of a measured depth: the model's visible surface against a depth image.
 
-An outline says little of how far away a part is. A depth image (of a depth camera, or of a
+An outline hardly shows how far away a part is. A depth image (of a depth camera, or of a
 rectified pair, :mod:`cardbox_tracker.vision.stereo`) says it wherever the surface was measured. The
 term compares both at points of trunk, head and limbs, inside the silhouette, see
 :mod:`cardbox_tracker.estimation.cost.depth_kernels`. A difference far beyond ``unit_m`` costs no
-more than an even larger one. Without a depth image the term says nothing.
+more than an even larger one. Without a depth image the term is zero.
 """
 
 from __future__ import annotations
@@ -15,10 +15,21 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_STATE, PLACE, POSTURE, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import depth_kernels as kernels
-from cardbox_tracker.estimation.cost import whole_body_kernels as state
 from cardbox_tracker.estimation.cost.inner_cue_arms import torsos_of
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    BOTTOM_WIDTH,
+    FOREARM,
+    HEAD,
+    HEIGHT,
+    TOP_WIDTH,
+    UPPER_ARM,
+    WAIST,
+    Drawn,
+)
+from cardbox_tracker.estimation.cost.kernel_arguments import TORSO as TORSO_PART
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
     ArmCosts,
@@ -81,27 +92,22 @@ class DepthTerm:
         """Prepare for one body before one camera, and compile the kernel if it is not yet."""
         self.config = config
         model = WholeBodyCost(body, camera, WholeBodyCostConfig())
-        self.parts, self.girdle, self.place, self.view = (
-            model.parts,
-            model.girdle,
-            model.place,
-            model.view,
-        )
-        # As at the place of the body model: whoever comes nearer is not to gain.
+        self.body = model.body
+        # As at the place of the body model, so that nobody gains by coming nearer.
         per_m = camera.fx / body.placement.distance_m
-        rows = [state.TORSO, state.WAIST, state.HEAD, state.UPPER_ARM, state.FOREARM]
-        wide = 0.5 * (self.parts[rows, state.BOTTOM_WIDTH] + self.parts[rows, state.TOP_WIDTH])
-        areas_px = config.weight * per_m**2 * self.parts[rows, state.HEIGHT] * wide
+        parts = model.parts[[TORSO_PART, WAIST, HEAD, UPPER_ARM, FOREARM]]
+        wide = 0.5 * (parts[:, BOTTOM_WIDTH] + parts[:, TOP_WIDTH])
+        areas_px = config.weight * per_m**2 * parts[:, HEIGHT] * wide
         self.areas_px = np.ascontiguousarray(areas_px)
-        # Of two arms.
+        # A body has two arms.
         self.body_px = float(areas_px[:3].sum() + 2.0 * areas_px[3:].sum())
-        self.costs(np.zeros((1, 14)), np.zeros((camera.height, camera.width), np.float32))
+        self.costs(np.zeros((1, N_STATE)), np.zeros((camera.height, camera.width), np.float32))
 
     def observe(self, frame: Frame) -> TermObservation:
-        """Return what the depth image says, or that there is none."""
+        """Return the term's observation, which is zero without a depth image."""
         if frame.depth_m is None:
             return _SILENCE
-        # At the outline a pixel may show the person or what is behind.
+        # At the outline a pixel may show the person or the background.
         inside = cv2.erode(frame.silhouette, np.ones((3, 3), np.uint8))
         known = (inside > 0) & np.isfinite(frame.depth_m)
         return DepthObservation(self, np.where(known, frame.depth_m, 0.0).astype(np.float32))
@@ -110,25 +116,15 @@ class DepthTerm:
         self,
         states: FloatArray,
         depth_m: DepthImage,
-        has_trunk: bool = True,
-        has_left: bool = True,
-        has_right: bool = True,
+        drawn: Drawn = (True, True, True),
     ) -> FloatArray:
         """Return the costs (N,), px, of some parts of states (N, 14)."""
         costs = np.empty(len(states))
         kernels.depth_costs(
             np.ascontiguousarray(states, dtype=np.float64),
-            has_trunk,
-            has_left,
-            has_right,
-            self.parts,
-            self.girdle,
-            self.place,
-            self.view,
-            depth_m,
-            self.areas_px,
-            self.config.unit_m,
-            self.config.expected,
+            drawn,
+            self.body,
+            (depth_m, self.areas_px, self.config.unit_m, self.config.expected),
             costs,
         )
         return costs
@@ -150,10 +146,7 @@ class DepthObservation:
         """Rate trunk and head alone."""
 
         def costs(torsos: FloatArray) -> FloatArray:
-            states = np.zeros((len(torsos), 14))
-            states[:, :4] = torsos[:, :4]
-            states[:, 12 : 8 + torsos.shape[1]] = torsos[:, 4:]
-            return self.term.costs(states, self.depth_m, has_left=False, has_right=False)
+            return self.term.costs(_states(torsos), self.depth_m, (True, False, False))
 
         return costs
 
@@ -161,18 +154,24 @@ class DepthObservation:
         """Rate arms of a body whose torso is at ``torso``."""
 
         def costs(side: str, arms: FloatArray) -> FloatArray:
-            states = np.zeros((len(arms), 14))
-            states[:, :4] = torso[:4]
-            states[:, 12 : 8 + len(torso)] = torso[4:]
+            states = _states(np.tile(torso, (len(arms), 1)))
             states[:, ARMS[side]] = arms
             is_left = side == "left"
-            return self.term.costs(states, self.depth_m, False, is_left, not is_left)
+            return self.term.costs(states, self.depth_m, (False, is_left, not is_left))
 
         return costs
 
     def postures(self, postures: FloatArray) -> FloatArray:
         """Rate whole bodies."""
-        states = np.zeros((len(postures), 14))
-        states[:, :12] = postures[:, :12]
-        states[:, 12:] = torsos_of(postures)[:, 4:]
+        states = _states(torsos_of(postures))
+        states[:, POSTURE] = postures[:, POSTURE]
         return self.term.costs(states, self.depth_m)
+
+
+def _states(torsos: FloatArray) -> FloatArray:
+    """Return states (N, 14) of torsos (N, 4), or (N, 6) with x and z, without arms."""
+    states = np.zeros((len(torsos), N_STATE))
+    places = torsos[:, TORSO.stop :]
+    states[:, TORSO] = torsos[:, TORSO]
+    states[:, PLACE.start : PLACE.start + places.shape[1]] = places
+    return states

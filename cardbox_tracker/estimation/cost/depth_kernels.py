@@ -8,22 +8,18 @@ a point's pixel has a measured depth, the difference
 costs e^2 / (e^2 + unit^2) - expected of the area for which the point stands; half of the first
 where the measured surface is nearer, since something else may be in front; nothing where nothing
 was measured.
-
-Who changes ``whole_body_kernels.py`` has to delete the cache of this file's compiled code.
 """
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats, Place, PlaceTuple, View, ViewTuple
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    ARM_ANGLES,
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
     BOTTOM,
     BOTTOM_WIDTH,
     DEPTH,
@@ -31,19 +27,24 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import (
     FORWARD,
     HEAD,
     HEIGHT,
-    LEFT_ARM,
     TOP_WIDTH,
     TORSO,
     UPPER_ARM,
     WAIST,
-    _new_arm,
-    _pose,
-    _pose_arm,
-    _turn_arm,
+    BodyTuple,
+    Drawn,
+    Floats,
+    Intrinsics,
+    body_of,
 )
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+from cardbox_tracker.estimation.cost.kinematics import (
+    angles_in,
+    new_arm,
+    pose_arm,
+    side_of,
+    state_pose,
+    turn_arm,
+)
 
 DepthMap = NDArray[np.float32]
 
@@ -56,42 +57,57 @@ _THICKEST = 2.0
 _OCCLUDED = 0.5
 
 
-@_inline
+class Surface(NamedTuple):
+    """A measured surface and how differences from it count.
+
+    Attributes:
+        depth: (H, W), metres along the optical axis; 0 where it is not known.
+        areas_px: of torso, waist, head, upper arm and forearm, (5,).
+        unit_m: difference that costs a half.
+        expected: mean cost of a point, which is subtracted.
+    """
+
+    depth: DepthMap
+    areas_px: Floats
+    unit_m: float
+    expected: float
+
+
+SurfaceTuple = tuple[DepthMap, Floats, float, float]
+
+
+@inlined_kernel
 def _compare(
     x: float,
     y: float,
     z: float,
     before_m: float,
-    view: View,
-    depth: Any,
-    unit_m: float,
-    expected: float,
+    camera: Intrinsics,
+    surface: Surface,
 ) -> float:
     """Cost of a surface ``before_m`` in front of the point (x, y, z) of the optical frame."""
-    cost = 0.0
+    cost, depth = 0.0, surface.depth
     if z > 0.1:
-        u = int(view.fx * x / z + view.cx + 0.5)
-        v = int(view.fy * y / z + view.cy + 0.5)
+        u = int(camera.fx * x / z + camera.cx + 0.5)
+        v = int(camera.fy * y / z + camera.cy + 0.5)
         if 0 <= u < depth.shape[1] and 0 <= v < depth.shape[0] and depth[v, u] > 0.0:
             error = depth[v, u] - (z - before_m)
-            cost = error * error / (error * error + unit_m * unit_m)
+            cost = error * error / (error * error + surface.unit_m * surface.unit_m)
             if error < 0.0:
                 cost *= _OCCLUDED
-            cost -= expected
+            cost -= surface.expected
     return cost
 
 
-@_inline
+@inlined_kernel
 def _limb(
     start: Floats,
     axis: Floats,
     length: float,
     half: float,
     fractions: Any,
-    view: View,
-    depth: Any,
-    unit_m: float,
-    expected: float,
+    camera: Intrinsics,
+    surface: Surface,
 ) -> float:
     """Mean cost of the points of a limb from ``start`` (3,) along ``axis`` (3,)."""
     total = 0.0
@@ -103,20 +119,18 @@ def _limb(
         far = sqrt(x * x + y * y + z * z) + 1e-9
         cosine = (x * axis[0] + y * axis[1] + z * axis[2]) / far
         before = half * min(1.0 / sqrt(max(1.0 - cosine * cosine, 1e-6)), _THICKEST)
-        total += _compare(x, y, z, before, view, depth, unit_m, expected)
+        total += _compare(x, y, z, before, camera, surface)
     return total / len(fractions)
 
 
-@_inline
+@inlined_kernel
 def _part(
     part: Floats,
     rows: int,
     rotation: Floats,
     hip: Floats,
-    view: View,
-    depth: Any,
-    unit_m: float,
-    expected: float,
+    camera: Intrinsics,
+    surface: Surface,
 ) -> float:
     """Mean cost of the points on the side of an elliptic frustum that faces the camera.
 
@@ -145,68 +159,37 @@ def _part(
             y = my + px * rotation[1, 0] + py * rotation[1, 1]
             z = mz + px * rotation[2, 0] + py * rotation[2, 1]
             before = reach * sqrt(1.0 - column * column)
-            total += _compare(x, y, z, before, view, depth, unit_m, expected)
+            total += _compare(x, y, z, before, camera, surface)
     return total / (rows * len(_COLUMNS))
 
 
-@_compile
+@kernel
 def depth_costs(
-    states: Floats,
-    has_trunk: bool,
-    has_left: bool,
-    has_right: bool,
-    parts: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
-    depth: DepthMap,
-    areas_px: Floats,
-    unit_m: float,
-    expected: float,
-    costs: Floats,
+    states: Floats, drawn: Drawn, body: BodyTuple, measured: SurfaceTuple, costs: Floats
 ) -> None:
-    """Write the costs (N,), px, of states (N, 14) before a measured depth (H, W), metres.
-
-    ``areas_px`` are those of torso, waist, head, upper arm and forearm, (5,).
-    """
-    rotation, hip, arm = np.empty((3, 3)), np.empty(3), _new_arm()
-    seen = View(*view)
+    """Write the costs (N,), px, of the ``drawn`` parts of states (N, 14) before a ``Surface``."""
+    of, surface = body_of(body), Surface(*measured)
+    parts, camera, areas_px = of.parts, of.camera, surface.areas_px
+    rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()
+    upper_m, upper_half_m = parts[UPPER_ARM, HEIGHT], 0.5 * parts[UPPER_ARM, TOP_WIDTH]
+    fore_m, fore_half_m = parts[FOREARM, HEIGHT], 0.5 * parts[FOREARM, TOP_WIDTH]
     for i in range(states.shape[0]):
-        _pose(states[i], Place(*place), seen, rotation, hip)
+        state_pose(states[i], of.place, camera, rotation, hip)
         total = 0.0
-        if has_trunk:
-            found = _part(parts[TORSO], _ROWS, rotation, hip, seen, depth, unit_m, expected)
-            total += areas_px[0] * found
-            found = _part(parts[WAIST], _ROWS // 2, rotation, hip, seen, depth, unit_m, expected)
-            total += areas_px[1] * found
-            found = _part(parts[HEAD], _ROWS // 2, rotation, hip, seen, depth, unit_m, expected)
-            total += areas_px[2] * found
+        if drawn[0]:
+            total += areas_px[0] * _part(parts[TORSO], _ROWS, rotation, hip, camera, surface)
+            total += areas_px[1] * _part(parts[WAIST], _ROWS // 2, rotation, hip, camera, surface)
+            total += areas_px[2] * _part(parts[HEAD], _ROWS // 2, rotation, hip, camera, surface)
         for k in range(2):
-            if (k == 0 and has_left) or (k == 1 and has_right):
-                first = LEFT_ARM + ARM_ANGLES * k
-                angles = states[i, first : first + ARM_ANGLES]
-                _pose_arm(angles, 1.0 - 2.0 * k, parts, girdle, arm.points, arm.directions)
-                _turn_arm(arm, rotation, hip)
+            if drawn[1 + k]:
+                angles = angles_in(states[i], k)
+                pose_arm(angles, side_of(k), parts, of.girdle, arm.points, arm.directions)
+                turn_arm(arm, rotation, hip)
+                upper, fore = arm.joints[0], arm.joints[1]
                 total += areas_px[3] * _limb(
-                    arm.joints[0],
-                    arm.axes[0],
-                    parts[UPPER_ARM, HEIGHT],
-                    0.5 * parts[UPPER_ARM, TOP_WIDTH],
-                    _UPPER_ARM_AT,
-                    seen,
-                    depth,
-                    unit_m,
-                    expected,
+                    upper, arm.axes[0], upper_m, upper_half_m, _UPPER_ARM_AT, camera, surface
                 )
                 total += areas_px[4] * _limb(
-                    arm.joints[1],
-                    arm.axes[1],
-                    parts[FOREARM, HEIGHT],
-                    0.5 * parts[FOREARM, TOP_WIDTH],
-                    _FOREARM_AT,
-                    seen,
-                    depth,
-                    unit_m,
-                    expected,
+                    fore, arm.axes[1], fore_m, fore_half_m, _FOREARM_AT, camera, surface
                 )
         costs[i] = total

@@ -1,10 +1,10 @@
-"""Compiled signed distances of pixels from the outline of a mask, as far as they matter.
+"""Compiled signed distances of pixels from the outline of a mask, up to ``FAR_PX``.
 
 Euclidean distances between pixels' centres, found in two passes as of Felzenszwalb and Huttenlocher
 ("Distance Transforms of Sampled Functions", 2012): along the columns, then along the rows, where
-the least of nearby squares is taken. Farther than ``FAR_PX`` all are alike, so few are near enough,
-and all loops are short and without branches. OpenCV's ``distanceTransform`` knows one side at a
-time, takes longer for both than this, and is only approximate unless it is given more time still.
+the least of nearby squares is taken. Distances beyond ``FAR_PX`` are cut off, so that all loops are
+short and have no branches. OpenCV's ``distanceTransform`` measures one side at a time, takes longer
+for both than this function, and is approximate unless it is given more time still.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
 
 # An index of this type is never negative, so no code is made to count from an array's end.
 _index = np.uint64
 _FAR = int(FAR_PX)
 
 
-@_compile
+@kernel
 def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32]) -> None:
     """Write the distance of each pixel from the nearest one of the other side, px.
 
@@ -65,7 +63,7 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
             row[_index(u)] = -side[_index(u)] * np.sqrt(best[_index(u)])
 
 
-@_compile
+@kernel
 def _along_columns(mask: NDArray[np.uint8], distances: NDArray[np.float32]) -> None:
     """Write how far above or below the nearest pixel of the other side is, px."""
     height, width = mask.shape

@@ -1,19 +1,18 @@
 """The cue inside the outline: hands and forearms by their colours.
 
-An outline says nothing of an arm before the torso. This term knows from the initialization what the
-person's parts look like (``BodyModel.appearance``):
+An outline does not show an arm before the torso. The initialization has learned the colours of the
+person's parts (``BodyModel.appearance``):
 
 1. The brightness of the torso is followed slowly, so that the colours stay comparable.
 2. Within the silhouette's bounding box every pixel gets two log-likelihood ratios, of the hand and
-   of the forearm, against what else would be there: torso, head, or what is below the hips, by
-   where the last posture has them.
+   of the forearm, against the part that the last posture has there: torso, head, or the legs.
 3. An arm gains the mean ratio over its hand and over its forearm, each times the area, as at the
    place where the person is expected: a sum over pixels, so that a limb is not rewarded for being
    short, and not for coming nearer.
 4. A hand gains less where the other forearm is, and nothing behind the torso.
 
 The gain is subtracted from the cost. Without an image, without a posture before, or for a person
-whose colours are not known, the term says nothing.
+whose colours are not known, the term is zero.
 """
 
 from __future__ import annotations
@@ -35,8 +34,9 @@ from cardbox_tracker.body.appearance import (
     steps_of_levels,
 )
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
+from cardbox_tracker.estimation.cost.inner_cue_arms import N_TORSO, ArmView, torsos_of
 from cardbox_tracker.estimation.cost.inner_cue_kernels import ratio_maps
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
@@ -54,11 +54,11 @@ from cardbox_tracker.vision.camera import Camera
 
 # One pixel says no more than this: histograms of a few hundred pixels are not that certain.
 _LIMIT_NATS = 2.5
-# Parts whose Bhattacharyya distance is below this look alike and say nothing.
+# Parts whose Bhattacharyya distance is below this look alike; their ratios are zero.
 _ALIKE = 0.05
 # The light is not believed to change beyond this.
 _DARKEST, _BRIGHTEST = 0.6, 1.6
-# Every so many pixels of the torso, at least so many rows and columns, and pixels in the outline.
+# Step between pixels of the torso; fewest rows and columns, and fewest pixels in the outline.
 _STRIDE, _LEAST_SIDE_PX, _LEAST_PX = 3, 6, 20
 
 _OTHER = {"left": "right", "right": "left"}
@@ -96,7 +96,7 @@ class InnerCue:
         check(self)
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term, which says nothing of a body without an appearance."""
+        """Return the term, which is zero for a body without an appearance."""
         return Silence() if body.appearance is None else InnerCueTerm(self, body, camera)
 
 
@@ -127,12 +127,14 @@ class InnerCueTerm:
         """Run every kernel once, so that no live image waits for the compiler."""
         shape = (camera.height, camera.width)
         image = np.zeros(shape if self._appearance.is_grey else (*shape, 3), np.uint8)
-        observation = self.observe(Frame(np.full(shape, 255, np.uint8), 1, 1, image, np.zeros(14)))
+        observation = self.observe(
+            Frame(np.full(shape, 255, np.uint8), 1, 1, image, np.zeros(N_STATE))
+        )
         observation.arms_beside(np.zeros(4))("left", np.zeros((1, 4)))
         self._brightness = self._appearance.brightness.copy()
 
     def observe(self, frame: Frame) -> TermObservation:
-        """Return what the image says, or that it says nothing."""
+        """Return the term's observation, which is zero without an image or a last posture."""
         if frame.posture is None:
             # Tracking starts anew, maybe after a while and in another light.
             self._brightness = self._appearance.brightness.copy()
@@ -234,8 +236,8 @@ class InnerCueObservation:
         return _SILENCE.postures
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Rate arms by what is seen at their place; the other arm is where it was last."""
-        torsos = np.zeros((1, 6))
+        """Rate arms by the image at their place; the other arm is where it was last."""
+        torsos = np.zeros((1, N_TORSO))
         torsos[0, : len(torso)] = torso
 
         def costs(side: str, arms: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Where a person's arms are in the image, and what they gain there: the kernels with one person."""
+"""Places of one person's arms in the image, and their gains."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
+from cardbox_tracker.body.posture import PLACE_NAMES, POSTURE, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import inner_cue_kernels as kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import place_of, view_of
-from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
 
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
+
+N_TORSO = TORSO.stop + len(PLACE_NAMES)
+"""Values of a torso: d1..d4, ``torso_x`` and ``torso_z``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,17 +27,13 @@ class ArmView:
     """One person before one camera: what does not change from frame to frame.
 
     Attributes:
-        lengths: of the body, :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Lengths`.
-        place: where the hips are expected.
-        view: the camera.
-        px_per_m: pixels a metre at that place.
+        person: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Person`.
+        forearm: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Forearm`.
         weights: px of the outline that one of hand and forearm is worth for each nat, (2,).
     """
 
-    lengths: kernels.LengthsTuple
-    place: PlaceTuple
-    view: ViewTuple
-    px_per_m: float
+    person: kernels.PersonTuple
+    forearm: kernels.ForearmTuple
     weights: FloatArray
 
     @classmethod
@@ -47,7 +46,8 @@ class ArmView:
         """
         px_per_m = float(camera.fx) / body.placement.distance_m
         lengths = _lengths(body, lifts_shoulders)
-        return cls(lengths, place_of(body), view_of(camera), px_per_m, weights)
+        person = tuple(lengths), place_of(body), intrinsics_of(camera)
+        return cls(person, (lengths.forearm, lengths.forearm_width, px_per_m), weights)
 
     def project(
         self, torsos: FloatArray, arms: FloatArray, side: str
@@ -58,9 +58,7 @@ class ArmView:
             torsos,
             np.ascontiguousarray(arms, dtype=np.float64),
             _SIDE_SIGN[side],
-            self.lengths,
-            self.place,
-            self.view,
+            self.person,
             points,
             hidden,
         )
@@ -84,59 +82,47 @@ class ArmView:
             corner: column and row of the image where the maps begin.
         """
         gains = np.empty(len(points))
-        body = kernels.Lengths(*self.lengths)
-        kernels.arm_gains(
-            points,
-            hidden,
-            others,
-            maps,
-            *corner,
-            body.forearm,
-            body.forearm_width,
-            self.px_per_m,
-            self.weights,
-            gains,
-        )
+        seen = maps, *corner
+        kernels.arm_gains(points, hidden, others, seen, self.forearm, self.weights, gains)
         return gains
 
     def zones(self, posture: FloatArray) -> FloatArray:
-        """Return where head and torso of a posture (12,) or (14,) are in the image, (6,), px.
+        """Return the places of head and torso of a posture (12,) or (14,) in the image, (6,), px.
 
         Centre of the head (u, v), half axes of an ellipse around it, the row of the hips, and the
         row of the torso's top.
         """
         zones = np.empty(6)
-        kernels.torso_zones(torsos_of(posture[None])[0], self.lengths, self.place, self.view, zones)
+        kernels.torso_zones(torsos_of(posture[None])[0], self.person, zones)
         return zones
 
 
 def torsos_of(postures: FloatArray) -> FloatArray:
     """Torsos (N, 6) of postures (N, 12), or (N, 14) with ``torso_x`` and ``torso_z`` at the end."""
-    torsos = np.zeros((len(postures), 6))
-    torsos[:, :4] = postures[:, :4]
-    torsos[:, 4 : 4 + postures.shape[1] - 12] = postures[:, 12:]
+    torsos = np.zeros((len(postures), N_TORSO))
+    places = postures[:, POSTURE.stop :]
+    torsos[:, TORSO] = postures[:, TORSO]
+    torsos[:, TORSO.stop : TORSO.stop + places.shape[1]] = places
     return torsos
 
 
-def _lengths(body: BodyModel, lifts_shoulders: bool) -> kernels.LengthsTuple:
+def _lengths(body: BodyModel, lifts_shoulders: bool) -> kernels.Lengths:
     girdle = WholeBodyCostConfig()
     parts = body_parts(body.sizes)
-    return tuple(
-        kernels.Lengths(
-            parts.shoulder_aside_m,
-            parts.shoulder_height_m,
-            parts.upper_arm.height_m,
-            parts.forearm.height_m,
-            parts.forearm.top_width_m,
-            parts.torso.top_m,
-            parts.torso.top_width_m,
-            parts.head.middle_m,
-            parts.head.forward_m,
-            parts.head.top_width_m,
-            parts.head.height_m,
-            parts.waist.height_m,
-            girdle.clavicle * body.size("shoulder_breadth"),
-            girdle.lift_gain if lifts_shoulders else 0.0,
-            float(np.radians(girdle.lift_from_deg)),
-        )
+    return kernels.Lengths(
+        parts.shoulder_aside_m,
+        parts.shoulder_height_m,
+        parts.upper_arm.height_m,
+        parts.forearm.height_m,
+        parts.forearm.top_width_m,
+        parts.torso.top_m,
+        parts.torso.top_width_m,
+        parts.head.middle_m,
+        parts.head.forward_m,
+        parts.head.top_width_m,
+        parts.head.height_m,
+        parts.waist.height_m,
+        girdle.clavicle * body.size("shoulder_breadth"),
+        girdle.lift_gain if lifts_shoulders else 0.0,
+        float(np.radians(girdle.lift_from_deg)),
     )

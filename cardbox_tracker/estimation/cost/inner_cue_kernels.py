@@ -1,9 +1,7 @@
-"""The cue inside the outline, compiled: maps of a frame, arms in the image, and their gains.
+"""Compiled cue inside the outline: maps of a frame, arms in the image, and their gains.
 
-All in one file, since the cache of compiled code asks only the file of the function that is called
-whether it has changed (``cost/kernels.py``). A torso is (6,): d1..d4, and how far the hips are
-nearer to the camera and higher than their place, metres. Rotations are as in ``body/kinematics.py``
-and the optical frame as in ``cost/kernels.py``.
+A torso is (6,): d1..d4, and how far the hips are nearer to the camera and higher than their place,
+metres.
 """
 
 from __future__ import annotations
@@ -13,11 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    Intrinsics,
+    IntrinsicsTuple,
+    Place,
+    PlaceTuple,
+)
+from cardbox_tracker.estimation.cost.kinematics import torso_pose, turn_limb
 
-# The forearm's patch: where it begins and ends, as fractions of elbow to fist (then comes the
-# hand), and its width as a fraction of the forearm's, for a wider one samples what lies beside.
+# The forearm's patch begins and ends at these fractions of elbow to fist (then comes the hand); its
+# width is this fraction of the forearm's, since a wider one would sample what lies beside.
 _BEGIN, _END, _WIDTH = 0.04, 0.76, 0.7
 _POINTS = (6, 3)
 # The hand's patch: a fist is nearly as long as wide, and its middle lies before the forearm's end.
@@ -25,16 +29,14 @@ _HAND_LENGTH_M, _HAND_WIDTH_M, _HAND_BEFORE_END_M = 0.09, 0.075, 0.02
 _HAND_POINTS = (4, 3)
 # Half of a hand's gain goes where the other forearm covers it: the pixels are one hand's only.
 _CLAIM = 0.5
-# How far from the axis of the other forearm it, or its hand, still covers anything.
+# Beyond this distance from its axis the other forearm, or its hand, covers nothing.
 _CLAIM_REACH_M = 0.09
 # A hand further behind the torso's middle than this, and within its width, is covered by it.
-_BEHIND_M = 0.03
-_NEAREST_M = 0.1
+_BEHIND_M, _NEAREST_M = 0.03, 0.1
+# Values of a torso (6,) behind d1..d4.
+_X, _Z = 4, 5
 
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 class Lengths(NamedTuple):
@@ -61,69 +63,78 @@ class Lengths(NamedTuple):
     lift_from: float
 
 
+class Person(NamedTuple):
+    """A person before a camera."""
+
+    lengths: Lengths
+    place: Place
+    camera: Intrinsics
+
+
+class Maps(NamedTuple):
+    """Log-likelihood ratios (2, h, w), nats, of hand and forearm, from column u0 and row v0 on."""
+
+    ratios: Any
+    u0: int
+    v0: int
+
+
+class Forearm(NamedTuple):
+    """A forearm and how large it is in the image.
+
+    Attributes:
+        length_m: with the fist.
+        width_m: of the forearm.
+        px_per_m: where the person is expected; areas count as there, so that nobody gains by coming
+            nearer to the camera.
+    """
+
+    length_m: float
+    width_m: float
+    px_per_m: float
+
+
 LengthsTuple = tuple[float, ...]
+PersonTuple = tuple[LengthsTuple, PlaceTuple, IntrinsicsTuple]
+MapsTuple = tuple[Any, int, int]
+ForearmTuple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
-@_inline
-def _torso_pose(torso: Any, place: PlaceTuple, view: ViewTuple, rotation: Any, hip: Any) -> None:
+@inlined_kernel
+def _person_of(fields: PersonTuple) -> Person:
+    """Return a person with its fields named."""
+    lengths, place, camera = fields
+    return Person(Lengths(*lengths), Place(*place), Intrinsics(*camera))
+
+
+@inlined_kernel
+def _torso_pose(torso: Any, place: Place, camera: Intrinsics, rotation: Any, hip: Any) -> None:
     """Write rotation (3, 3) and mid-hip (3,) of a torso (6,) in the optical frame."""
-    cr, sr = cos(torso[1]), sin(torso[1])
-    cp, sp = cos(torso[2]), sin(torso[2])
-    cw, sw = cos(torso[3]), sin(torso[3])
-    cv, sv = view[4], view[5]
-    for j in range(3):
-        if j == 0:
-            x, y, z = cw * cp, sw * cp, -sp
-        elif j == 1:
-            x, y, z = cw * sp * sr - sw * cr, sw * sp * sr + cw * cr, cp * sr
-        else:
-            x, y, z = cw * sp * cr + sw * sr, sw * sp * cr - cw * sr, cp * cr
-        rotation[0, j] = y
-        rotation[1, j] = -cv * z + sv * x
-        rotation[2, j] = -sv * z - cv * x
-    distance, height = place[0] - torso[4], place[1] + torso[5]
-    hip[0] = torso[0]
-    hip[1] = -cv * height - sv * distance
-    hip[2] = -sv * height + cv * distance
+    moved = Place(place.distance_m - torso[_X], place.hip_height_m + torso[_Z])
+    torso_pose(torso, moved, camera, rotation, hip)
 
 
-@_inline
-def _turn_limb(parent: Any, abduction: float, flexion: float, rotation: Any) -> None:
-    """Write parent Rx(abduction) Ry(-flexion), each (3, 3)."""
-    ca, sa = cos(abduction), sin(abduction)
-    cf, sf = cos(flexion), sin(flexion)
-    for j in range(3):
-        px, py, pz = parent[j, 0], parent[j, 1], parent[j, 2]
-        y = ca * py + sa * pz
-        z = ca * pz - sa * py
-        rotation[j, 0] = cf * px + sf * z
-        rotation[j, 1] = y
-        rotation[j, 2] = cf * z - sf * px
-
-
-@_compile
-def torso_zones(
-    torso: Any, lengths: LengthsTuple, place: PlaceTuple, view: ViewTuple, zones: Any
-) -> None:
-    """Write where the head and the torso of a torso (6,) are in the image: ``zones`` (6,), px.
+@kernel
+def torso_zones(torso: Any, person: PersonTuple, zones: Any) -> None:
+    """Write the places of head and torso of a torso (6,) in the image: ``zones`` (6,), px.
 
     Centre of the head (u, v), half axes of an ellipse around it, the row of the hips, and the row
     of the torso's top.
     """
-    body = Lengths(*lengths)
+    body, place, camera = _person_of(person)
     rotation, hip = np.empty((3, 3)), np.empty(3)
-    _torso_pose(torso, place, view, rotation, hip)
+    _torso_pose(torso, place, camera, rotation, hip)
     heights = (body.head_middle, 0.6 * body.waist_height, body.torso_top)
     for i in range(3):
         forward = body.head_forward if i == 0 else 0.0
         x = hip[0] + forward * rotation[0, 0] + heights[i] * rotation[0, 2]
         y = hip[1] + forward * rotation[1, 0] + heights[i] * rotation[1, 2]
         z = max(hip[2] + forward * rotation[2, 0] + heights[i] * rotation[2, 2], _NEAREST_M)
-        row = view[1] * y / z + view[3]
+        row = camera.fy * y / z + camera.cy
         if i == 0:
-            per_m = view[0] / z
-            zones[0], zones[1] = view[0] * x / z + view[2], row
+            per_m = camera.fx / z
+            zones[0], zones[1] = camera.fx * x / z + camera.cx, row
             zones[2], zones[3] = 0.6 * body.head_width * per_m, 0.6 * body.head_height * per_m
         elif i == 1:
             zones[4] = row
@@ -131,7 +142,7 @@ def torso_zones(
             zones[5] = row + 0.02 * per_m
 
 
-@_compile
+@kernel
 def ratio_maps(
     pixels: Any, inside: Any, steps_of_levels: Any, steps: int, ratios: Any, zones: Any, maps: Any
 ) -> None:
@@ -163,30 +174,28 @@ def ratio_maps(
             maps[1, v, u] = ratios[zone, 1, color]
 
 
-@_compile
+@kernel
 def project_arms(
     torsos: Any,
     arms: Any,
     side: float,
-    lengths: LengthsTuple,
-    place: PlaceTuple,
-    view: ViewTuple,
+    person: PersonTuple,
     points: Any,
     hidden: Any,
 ) -> None:
-    """Write where arms are in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
+    """Write the places of arms in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
 
     Points are u, v, px a metre of elbow and hand (the forearm's end) of ``arms`` (N, 4), rad, at
     ``torsos`` (N, 6), or (1, 6) for all of them; hidden is a hand behind the torso. ``side`` is 1
     for left arms, -1 for right ones.
     """
-    body = Lengths(*lengths)
+    body, place, camera = _person_of(person)
     torso, upper, fore = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     hip, joint = np.empty(3), np.empty(3)
     for i in range(arms.shape[0]):
         if i == 0 or torsos.shape[0] > 1:
-            _torso_pose(torsos[i], place, view, torso, hip)
-        _turn_limb(torso, side * arms[i, 0], arms[i, 1], upper)
+            _torso_pose(torsos[i], place, camera, torso, hip)
+        turn_limb(torso, side * arms[i, 0], arms[i, 1], upper)
         aside, height = body.shoulder_aside, body.shoulder_height
         if body.lift_gain > 0.0:
             upright = 0.0
@@ -199,12 +208,12 @@ def project_arms(
         for c in range(3):
             joint[c] = hip[c] + side * aside * torso[c, 1] + height * torso[c, 2]
             joint[c] -= body.upper_arm * upper[c, 2]
-        _turn_limb(upper, side * arms[i, 2], arms[i, 3], fore)
+        turn_limb(upper, side * arms[i, 2], arms[i, 3], fore)
         for j in range(2):
             z = max(joint[2], _NEAREST_M)
-            points[i, j, 0] = view[0] * joint[0] / z + view[2]
-            points[i, j, 1] = view[1] * joint[1] / z + view[3]
-            points[i, j, 2] = view[0] / z
+            points[i, j, 0] = camera.fx * joint[0] / z + camera.cx
+            points[i, j, 1] = camera.fy * joint[1] / z + camera.cy
+            points[i, j, 2] = camera.fx / z
             if j == 0:
                 for c in range(3):
                     joint[c] -= body.forearm * fore[c, 2]
@@ -217,9 +226,9 @@ def project_arms(
         hidden[i] = x < -_BEHIND_M and abs(y) < width / 2
 
 
-@_compile
+@kernel
 def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
-    """Mean of ``ratios`` (h, w) over a grid of so many points, along and across, of a patch.
+    """Mean of ``ratios`` (h, w) over a grid of ``points``, along and across, of a patch.
 
     ``half`` is half the patch along the limb, ``aside`` half of it across, px; outside is 0.
     """
@@ -237,9 +246,9 @@ def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int,
     return total / (along * across)
 
 
-@_inline
+@inlined_kernel
 def _claimed(u: float, v: float, other: Any, u0: int, v0: int) -> float:
-    """How much of a hand at (u, v) the other forearm, or its hand, covers: 1 all, 0 nothing."""
+    """Share, 0 to 1, of a hand at (u, v) that the other forearm, or its hand, covers."""
     eu, ev = other[0, 0] - u0, other[0, 1] - v0
     du, dv = other[1, 0] - u0 - eu, other[1, 1] - v0 - ev
     along = ((u - eu) * du + (v - ev) * dv) / max(du * du + dv * dv, 1e-6)
@@ -249,17 +258,13 @@ def _claimed(u: float, v: float, other: Any, u0: int, v0: int) -> float:
     return covered
 
 
-@_compile
+@kernel
 def arm_gains(
     points: Any,
     hidden: Any,
     others: Any,
-    maps: Any,
-    u0: int,
-    v0: int,
-    forearm_m: float,
-    width_m: float,
-    px_per_m: float,
+    maps: MapsTuple,
+    forearm: ForearmTuple,
     weights: Any,
     gains: Any,
 ) -> None:
@@ -269,16 +274,13 @@ def arm_gains(
         points: (N, 2, 3), see :func:`project_arms`.
         hidden: (N,), the hand shows nothing.
         others: (N, 2, 3), or (1, 2, 3) for all: points of the other arm.
-        maps: ratios of hand and forearm, (2, h, w), nats.
-        u0: first column of the maps in the image.
-        v0: first row of the maps.
-        forearm_m: length of the forearm with fist.
-        width_m: of the forearm.
-        px_per_m: where the person is expected; areas count as there, or whatever comes nearer to
-            the camera, and so covers more, would gain.
+        maps: fields of :class:`Maps`.
+        forearm: fields of :class:`Forearm`.
         weights: px of the outline that one of hand and forearm is worth for each nat, (2,).
         gains: written.
     """
+    ratios, u0, v0 = maps
+    forearm_m, width_m, px_per_m = forearm
     for i in range(points.shape[0]):
         gains[i] = 0.0
         if hidden[i]:
@@ -293,7 +295,7 @@ def arm_gains(
         before = _HAND_BEFORE_END_M / forearm_m
         centre = (hu - before * du, hv - before * dv)
         half, aside = (au * along, av * along), (-av * across, au * across)
-        hand = _mean(maps[0], centre, half, aside, _HAND_POINTS)
+        hand = _mean(ratios[0], centre, half, aside, _HAND_POINTS)
         if hand > 0.0:
             other = others[i if others.shape[0] > 1 else 0]
             hand *= 1.0 - _CLAIM * _claimed(hu, hv, other, u0, v0)
@@ -302,7 +304,7 @@ def arm_gains(
         across = 0.5 * _WIDTH * width_m * per_m
         centre = (eu + middle * du, ev + middle * dv)
         half, aside = (reach * du, reach * dv), (-av * across, au * across)
-        forearm = _mean(maps[1], centre, half, aside, _POINTS)
+        covered = _mean(ratios[1], centre, half, aside, _POINTS)
         # A forearm that points to the camera shows less: its length in the image counts.
         area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
-        gains[i] += weights[1] * forearm * area_m2 * px_per_m**2
+        gains[i] += weights[1] * covered * area_m2 * px_per_m**2

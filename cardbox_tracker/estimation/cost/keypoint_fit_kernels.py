@@ -1,12 +1,10 @@
-"""Compiled: the state whose keypoints are nearest to where they are wanted.
+"""Compiled fit of a state to wanted keypoints.
 
-The inverse of the kinematics finds it, but for what bones of given lengths, the torso's angles and
-the limits do not allow. Gauss-Newton steps share that out. Each step solves, with the Jacobian J of
-the keypoints K(state) and damping in units of ``stddev``,
+Inverse kinematics gives the first state. Bones of given lengths, the torso's angles and the limits
+leave a difference, which Gauss-Newton steps share out among all values. With the Jacobian J of the
+keypoints K(state) and damping in units of ``stddev``, each step solves
 
     (J' J / SPREAD_M^2 + diag(1 / stddev^2)) change = J' (wanted - K(state)) / SPREAD_M^2
-
-Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code of this file.
 """
 
 from __future__ import annotations
@@ -15,60 +13,44 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats, Place, PlaceTuple, View, ViewTuple
-from cardbox_tracker.estimation.cost.linear_kernels import solve
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    ARM_ANGLES,
-    N_STATE,
-    TORSO_X,
-    TORSO_Y,
-    TORSO_Z,
-    _first_angle,
-    _pose,
-    _pose_arm,
-    _side_of,
+from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, TORSO_X, TORSO_Y, TORSO_Z
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
+from cardbox_tracker.estimation.cost.kinematics import (
+    first_angle,
     keypoints,
+    pose_arm,
+    side_of,
+    state_pose,
 )
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+from cardbox_tracker.estimation.cost.linear_kernels import solve
 
 KEYPOINTS = 6
 SPREAD_M = 0.01
-"""How near to the wanted places the keypoints come where a joint has to turn by a deviation."""
+"""Distance from a wanted keypoint that costs as much as a joint that turns by its deviation."""
 
 
-@_compile
-def pose_at_keypoints(
-    state: Floats,
-    parts: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
-    wanted: Floats,
-    limits: Floats,
-) -> None:
+@kernel
+def pose_at_keypoints(state: Floats, body: BodyTuple, wanted: Floats, limits: Floats) -> None:
     """Change arms and place of ``state`` (14,) so that its keypoints are near ``wanted``.
 
-    The inverse of the kinematics. Bones point where they are wanted to, or as near to that as the
-    limits let them; a forearm begins at the elbow as it is then. The torso keeps its angles, and
-    its place is such that the middle of the shoulders is the wanted one.
+    Inverse kinematics: bones point to the wanted keypoints, or as near to that as the limits allow;
+    a forearm begins at the elbow found first. The torso keeps its angles and moves so that the
+    middle of the shoulders is the wanted one.
 
     Args:
         state: to begin with; changed.
-        parts: as of :func:`~.whole_body_kernels.keypoints`, like the next three.
-        girdle: see there.
-        place: see there.
-        view: see there.
+        body: of the person.
         wanted: keypoints (6, 3), metres in the optical frame.
         limits: lowest and highest value of each, (14, 2).
     """
     rotation, hip = np.empty((3, 3)), np.empty(3)
     points, ahead, now = np.empty((3, 3)), np.empty(3), np.empty((KEYPOINTS, 3))
     directions = np.empty(6)
-    _pose(state, Place(*place), View(*view), rotation, hip)
+    of = body_of(body)
+    state_pose(state, of.place, of.camera, rotation, hip)
     for arm in range(2):
-        first, side = _first_angle(arm), _side_of(arm)
+        first, side = first_angle(arm), side_of(arm)
         angles = state[first : first + ARM_ANGLES]
         within = limits[first : first + ARM_ANGLES]
         shoulder, elbow, hand = wanted[3 * arm], wanted[3 * arm + 1], wanted[3 * arm + 2]
@@ -79,7 +61,7 @@ def pose_at_keypoints(
         ca, sa = cos(side * abduction), sin(side * abduction)
         flexion = atan2(ahead[0], sa * ahead[1] - ca * ahead[2])
         angles[0], angles[1] = abduction, _nearest(flexion, within[1, 0], within[1, 1])
-        _pose_arm(angles, side, parts, girdle, points, directions)
+        pose_arm(angles, side, of.parts, of.girdle, points, directions)
         # Where the forearm would point from the elbow as it is now.
         _in_torso(rotation, shoulder, hand, ahead)
         for c in range(3):
@@ -92,10 +74,10 @@ def pose_at_keypoints(
         ce, se = cos(side * turned), sin(side * turned)
         bent = atan2(along_x, se * along_y - ce * along_z)
         angles[2], angles[3] = turned, _nearest(bent, within[3, 0], within[3, 1])
-    keypoints(state, parts, girdle, place, view, now)
+    keypoints(state, body, now)
     for c in range(3):
         ahead[c] = 0.5 * (wanted[0, c] + wanted[3, c] - now[0, c] - now[3, c])
-    cos_pitch, sin_pitch = view[4], view[5]
+    cos_pitch, sin_pitch = of.camera.cos_pitch, of.camera.sin_pitch
     state[TORSO_Y] += ahead[0]
     state[TORSO_X] += sin_pitch * ahead[1] - cos_pitch * ahead[2]
     state[TORSO_Z] += -cos_pitch * ahead[1] - sin_pitch * ahead[2]
@@ -103,7 +85,7 @@ def pose_at_keypoints(
         state[j] = min(max(state[j], limits[j, 0]), limits[j, 1])
 
 
-@_compile
+@kernel
 def _in_torso(rotation: Floats, begin: Floats, end: Floats, ahead: Floats) -> None:
     """Write the way between two points of the optical frame to ``ahead``, in the torso's frame."""
     for c in range(3):
@@ -112,7 +94,7 @@ def _in_torso(rotation: Floats, begin: Floats, end: Floats, ahead: Floats) -> No
             ahead[c] += rotation[r, c] * (end[r] - begin[r])
 
 
-@_compile
+@kernel
 def _nearest(angle: float, least: float, most: float) -> float:
     """Return ``angle``, rad, or the limit that is the shorter way round from it."""
     middle = 0.5 * (least + most)
@@ -120,13 +102,10 @@ def _nearest(angle: float, least: float, most: float) -> float:
     return min(max(middle + off, least), most)
 
 
-@_compile
+@kernel
 def fit_keypoints(
     state: Floats,
-    parts: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
+    body: BodyTuple,
     wanted: Floats,
     stddev: Floats,
     limits: Floats,
@@ -137,12 +116,9 @@ def fit_keypoints(
 
     Args:
         state: to begin with.
-        parts: as of :func:`~.whole_body_kernels.keypoints`, like the next three.
-        girdle: see there.
-        place: see there.
-        view: see there.
+        body: of the person.
         wanted: keypoints (6, 3), metres in the optical frame.
-        stddev: how easily each value of the state moves, (14,); 0: not at all.
+        stddev: deviation by which each value of the state moves, (14,); one of 0 stays.
         limits: lowest and highest value of each, (14, 2).
         steps: of the central differences, (14,).
         count: how many steps.
@@ -154,16 +130,16 @@ def fit_keypoints(
     matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
     scale = 1.0 / (SPREAD_M * SPREAD_M)
     for _ in range(count):
-        keypoints(state, parts, girdle, place, view, now)
+        keypoints(state, body, now)
         for j in range(N_STATE):
             if stddev[j] == 0.0:
                 jacobian[j] = 0.0
                 continue
             trial[:] = state
             trial[j] = state[j] + steps[j]
-            keypoints(trial, parts, girdle, place, view, above)
+            keypoints(trial, body, above)
             trial[j] = state[j] - steps[j]
-            keypoints(trial, parts, girdle, place, view, below)
+            keypoints(trial, body, below)
             for i in range(KEYPOINTS * 3):
                 jacobian[j, i] = (above[i // 3, i % 3] - below[i // 3, i % 3]) / (2.0 * steps[j])
         for j in range(N_STATE):

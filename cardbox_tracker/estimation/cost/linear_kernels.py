@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from math import sqrt
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import Floats
 
 
-@_compile
+@kernel
 def solve(matrix: Floats, right: Floats) -> None:
     """Solve a system of equations in place, by Cholesky's decomposition.
 

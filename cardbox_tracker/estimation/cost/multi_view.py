@@ -17,9 +17,9 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import Silhouette, TermObservation
+from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
 
@@ -53,7 +53,7 @@ class MultiViewCost:
         self.seeing: tuple[int, ...] = (0,)
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle
-        self.place, self.view = first.place, first.view
+        self.place, self.view, self.body = first.place, first.view, first.body
         self.anchor = first.anchor
 
     def see(self, silhouettes: Sequence[Silhouette], state: FloatArray) -> None:
@@ -68,10 +68,11 @@ class MultiViewCost:
             # Its priors count all the same.
             self.costs[0].see_nothing()
 
-    def observe(self, terms: Sequence[Sequence[TermObservation]]) -> None:
-        """Take what further terms of each camera say; of those that do not see, nothing counts."""
-        for number, (cost, said) in enumerate(zip(self.costs, terms, strict=True)):
-            cost.terms = tuple(said) if number in self.seeing else ()
+    def observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> None:
+        """Take what the further terms of each camera that sees say of its frame."""
+        for number, cost in enumerate(self.costs):
+            counting = terms[number] if number in self.seeing else ()
+            cost.terms = tuple(term.observe(frames[number]) for term in counting)
 
     @property
     def silhouette_px(self) -> int:
@@ -114,6 +115,18 @@ class MultiViewCost:
                 areas_px += more[2]
         ratings /= len(self.seeing)
         return ratings, costs_px, areas_px
+
+    def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
+        """Return how well a state (14,) covers each camera's silhouette, as IoU.
+
+        None of cameras that are not among ``seeing``.
+        """
+        found: list[float | None] = [None] * len(self.costs)
+        for number in seeing:
+            cost = self.costs[number]
+            _, (differ_px,), (drawn_px,) = cost.bodies(self.to_views[number](state)[None])
+            found[number] = iou_of(cost.silhouette_px, drawn_px, differ_px)
+        return found
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the first optical frame."""

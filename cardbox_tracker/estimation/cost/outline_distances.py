@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.posture import ARM_ANGLES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.vision.camera import Camera
@@ -19,16 +20,16 @@ WIDTH = 320
 """Images are compared at this width, px."""
 
 HALF_PX, FAR_PX = 5.0, 10.0
-"""A distance that weighs a quarter, and the one beyond which all are alike."""
+"""Distance that weighs a quarter, and the one at which distances are cut off."""
 
 # Pixels from one point of the grid to the next.
 _GRID = 4
 # fillConvexPoly paints every pixel that an edge touches.
 _TOO_WIDE_PX = 0.5
 ABOVE_HIPS_PX = 4
-"""The legs, which the model does not have, begin so many pixels above the hips."""
+"""The legs, which the model does not have, begin this far above the hips."""
 
-STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * 8, 0.04, 0.02])
+STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * (2 * ARM_ANGLES), 0.04, 0.02])
 """Steps (14,) of central differences: about 2 px. Nearer ones see the outline's whole pixels."""
 
 # Beside the person, what the model may cover while it is moved.

@@ -1,22 +1,28 @@
 """Compiled Gauss-Newton steps that draw the model's outline onto a silhouette's.
 
-The outline of a state (14,) are points on the edges of its patches that no other patch covers.
-Each has a distance from the outline of its camera's silhouette, r, px; with weights as of Geman and
-McClure, and kept near the state to begin with by squares in units of ``stddev``, the steps lower
+The outline of a state (14,) consists of points on the edges of its patches that no other patch
+covers. Each has a distance from the outline of its camera's silhouette, r, px. With weights after
+Geman and McClure, and kept near the first state by squares in units of ``stddev``, the steps lower
 
     INFORMATION * sum(length * r^2 / (1 + r^2 / HALF^2)) + sum(((state - begin) / stddev)^2)
-
-Who changes ``whole_body_kernels.py`` or ``outline_points.py`` has to delete the cache of compiled
-code of this file.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats, PlaceTuple, ViewTuple
+from cardbox_tracker.body.posture import N_STATE
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.body_outline import (
+    BODY_PATCHES,
+    TRUNK_PATCHES,
+    new_scratch,
+    place_patches,
+)
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
 from cardbox_tracker.estimation.cost.outline_points import (
@@ -28,25 +34,52 @@ from cardbox_tracker.estimation.cost.outline_points import (
     point_on_edge,
     project_corners,
 )
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    BODY_PATCHES,
-    N_STATE,
-    TRUNK_PATCHES,
-    new_figure,
-    place_patches,
-)
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
 
 SHARES = (0.0, 0.2, 0.5, 1.0)
-"""What of a change is tried."""
+"""Fractions of a change that are tried."""
 
-# What a pixel of outline says, in 1 / px^2: 312 neighbouring points do not err on their own.
+# Weight of a pixel of outline, 1 / px^2: the errors of 312 neighbouring points are not independent.
 INFORMATION = 0.01
 _MOST_CHANGE = 0.25
+_ALL = (True, True, True)
 
 
-@_compile
+class Seen(NamedTuple):
+    """One camera and the silhouette that it sees.
+
+    Attributes:
+        turned: the state of the first camera times this, (14, 14), plus
+        moved: this, (14,), is the state as this camera has it.
+        lens: fx, fy, cx, cy of the image of ``field``, (4,).
+        field: signed distances from the silhouette's outline, (H, W), px, negative inside.
+        end_row: rows from it on do not count.
+    """
+
+    turned: Floats
+    moved: Floats
+    lens: Floats
+    field: NDArray[np.float32]
+    end_row: float
+
+
+class Outline(NamedTuple):
+    """Points of an outline.
+
+    Attributes:
+        edges: patch, and corner at which the edge of the point begins, (n, 2).
+        points: share of the edge, and length of outline that the point stands for, px, (n, 2).
+    """
+
+    edges: Ints
+    points: Floats
+
+
+SeenTuple = tuple[Floats, Floats, Floats, NDArray[np.float32], float]
+OutlineTuple = tuple[Ints, Floats]
+EquationsTuple = tuple[Floats, Floats]
+
+
+@kernel
 def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> None:
     """Write the state (14,) as another camera has it."""
     for j in range(N_STATE):
@@ -56,56 +89,39 @@ def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> N
         there[j] = total + moved[j]
 
 
-@_compile
+@kernel
 def add_equations(
     state: Floats,
-    turned: Floats,
-    moved: Floats,
-    parts: Floats,
-    drawn: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
-    lens: Floats,
-    field: NDArray[np.float32],
-    end_row: float,
+    camera: SeenTuple,
+    body: BodyTuple,
     steps: Floats,
-    matrix: Floats,
-    right: Floats,
-    edges: Ints,
-    points: Floats,
+    equations: EquationsTuple,
+    outline: OutlineTuple,
 ) -> int:
-    """Add to the normal equations of ``state`` (14,) what one camera's outline says.
+    """Add the outline that one camera sees to the normal equations of ``state`` (14,).
 
     Args:
         state: of the first camera.
-        turned: ``state`` times this, (14, 14), plus
-        moved: this, (14,), is the state as this camera has it.
-        parts: as of :func:`~.whole_body_kernels.corners_of_body`, like the next four.
-        drawn: see there.
-        girdle: see there.
-        place: see there.
-        view: see there.
-        lens: fx, fy, cx, cy of the image of ``field``, (4,).
-        field: signed distances from the silhouette's outline, (H, W), px, negative inside.
-        end_row: rows from it on do not count.
+        camera: fields of :class:`Seen`.
+        body: of the person before this camera.
         steps: of the central differences, (14,).
-        matrix: (14, 14), of which the lower triangle is used.
-        right: (14,).
-        edges: written: where the points of the outline are, (312, 2).
-        points: written: how far along their edges, and how much outline each stands for, (312, 2).
+        equations: matrix (14, 14), of which the lower triangle is used, and right side (14,).
+        outline: fields of :class:`Outline`, written, (312, 2) each.
 
     Returns:
-        How many points there are.
+        Number of points of the outline.
     """
-    figure = parts, drawn, girdle, place, view
-    work, arm = new_figure()
+    seen, of = Seen(*camera), body_of(body)
+    turned, moved, lens, field = seen.turned, seen.moved, seen.lens, seen.field
+    matrix, right = equations
+    edges, points = outline
+    work, arm = new_scratch()
     trial, there, behind = np.empty(N_STATE), np.empty(N_STATE), np.empty(N_STATE)
     corners_px, less_px = np.empty((BODY_PATCHES, 4, 2)), np.empty((BODY_PATCHES, 4, 2))
     _seen_from(state, turned, moved, there)
-    place_patches(there, True, (True, True), *figure, work, arm)
+    place_patches(there, _ALL, of, work, arm)
     project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
-    count = find_outline(corners_px, (field.shape[1], field.shape[0]), end_row, edges, points)
+    count = find_outline(corners_px, (field.shape[1], field.shape[0]), seen.end_row, edges, points)
     first_point = np.empty(BODY_PATCHES + 1, np.int64)
     first_points(edges, count, first_point)
     now, weights, by_state = np.empty(count), np.empty(count), np.empty(count)
@@ -115,7 +131,7 @@ def add_equations(
         )
         outlying = 1.0 + (now[i] / HALF_PX) ** 2
         weights[i] = INFORMATION * points[i, 1] / (outlying * outlying)
-    # Of each value of a state only the points that move with it count.
+    # Each value of a state moves some of the points only.
     jacobian, span = np.empty((N_STATE, count)), np.empty((N_STATE, 2), np.int64)
     for j in range(N_STATE):
         trial[:] = state
@@ -125,10 +141,10 @@ def add_equations(
         _seen_from(trial, turned, moved, behind)
         first, end = moved_patches(there, behind)
         span[j, 0], span[j, 1] = first_point[first], first_point[end]
-        has_arm = first <= TRUNK_PATCHES < end, end == BODY_PATCHES
-        place_patches(there, first == 0, has_arm, *figure, work, arm)
+        drawn = first == 0, first <= TRUNK_PATCHES < end, end == BODY_PATCHES
+        place_patches(there, drawn, of, work, arm)
         project_corners(work.corners, lens, first, end, corners_px)
-        place_patches(behind, first == 0, has_arm, *figure, work, arm)
+        place_patches(behind, drawn, of, work, arm)
         project_corners(work.corners, lens, first, end, less_px)
         for i in range(span[j, 0], span[j, 1]):
             p, c, share = edges[i, 0], edges[i, 1], points[i, 0]
@@ -150,69 +166,55 @@ def add_equations(
     return count
 
 
-@_compile
+@kernel
 def costs_along(
     state: Floats,
     change: Floats,
-    turned: Floats,
-    moved: Floats,
-    parts: Floats,
-    drawn: Floats,
-    girdle: Floats,
-    place: PlaceTuple,
-    view: ViewTuple,
-    lens: Floats,
-    field: NDArray[np.float32],
-    edges: Ints,
-    points: Floats,
+    camera: SeenTuple,
+    body: BodyTuple,
+    outline: OutlineTuple,
     costs: Floats,
 ) -> None:
-    """Add to ``costs``, of each of ``SHARES`` of a change, what one camera's outline costs.
+    """Add the costs of one camera's outline after each of ``SHARES`` of a change to ``costs``.
 
     Args:
         state: of the first camera, (14,).
         change: of it, (14,).
-        turned: as of :func:`add_equations`, like the rest.
-        moved: see there.
-        parts: see there.
-        drawn: see there.
-        girdle: see there.
-        place: see there.
-        view: see there.
-        lens: see there.
-        field: see there.
-        edges: (n, 2), as written there.
-        points: (n, 2), as written there.
+        camera: fields of :class:`Seen`.
+        body: of the person before this camera.
+        outline: fields of :class:`Outline`, as :func:`add_equations` wrote them.
         costs: one for each share.
     """
-    work, arm = new_figure()
+    seen, of = Seen(*camera), body_of(body)
+    edges, points = outline
+    work, arm = new_scratch()
     trial, there = np.empty(N_STATE), np.empty(N_STATE)
     corners_px = np.empty((BODY_PATCHES, 4, 2))
     for number in range(len(SHARES)):
         for j in range(N_STATE):
             trial[j] = state[j] + SHARES[number] * change[j]
-        _seen_from(trial, turned, moved, there)
-        place_patches(there, True, (True, True), parts, drawn, girdle, place, view, work, arm)
-        project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
+        _seen_from(trial, seen.turned, seen.moved, there)
+        place_patches(there, _ALL, of, work, arm)
+        project_corners(work.corners, seen.lens, 0, BODY_PATCHES, corners_px)
         for i in range(len(points)):
             x, y = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
-            square = distance_at(field, x, y) ** 2
+            square = distance_at(seen.field, x, y) ** 2
             costs[number] += INFORMATION * points[i, 1] * square / (1.0 + square / HALF_PX**2)
 
 
-@_compile
+@kernel
 def solve_equations(
     state: Floats, begin: Floats, stddev: Floats, matrix: Floats, right: Floats, costs: Floats
 ) -> None:
-    """Write the change of ``state`` into ``right``, and what leaving ``begin`` costs.
+    """Write the change of ``state`` into ``right``, and the cost of leaving ``begin``.
 
     Args:
         state: (14,).
-        begin: the state near which it is kept, in units of
-        stddev: these, (14,).
+        begin: the state near which it is kept, (14,).
+        stddev: units of the distance from there, (14,).
         matrix: of the normal equations, (14, 14); overwritten.
         right: their right side; overwritten by the change, (14,).
-        costs: written: of each of ``SHARES`` of the change.
+        costs: written, one for each of ``SHARES`` of the change.
     """
     for j in range(N_STATE):
         matrix[j, j] += 1.0 / stddev[j] ** 2

@@ -1,6 +1,6 @@
-"""Compiled: the points of a body's outline in an image, and where they are when it moves.
+"""Compiled points of a body's outline in an image.
 
-The outline are points on the edges of the patches that no other patch covers.
+The outline consists of points on the edges of the patches that no other patch covers.
 """
 
 from __future__ import annotations
@@ -10,26 +10,27 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kernels import Floats
-from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
+from cardbox_tracker.body.posture import (
     ARM_ANGLES,
-    ARM_PATCHES,
-    BODY_PATCHES,
-    LEFT_ARM,
+    FIRST_ANGLES,
     PITCH,
     ROLL,
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
-    TRUNK_PATCHES,
     YAW,
 )
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.body_outline import (
+    ARM_PATCHES,
+    BODY_PATCHES,
+    TRUNK_PATCHES,
+)
+from cardbox_tracker.estimation.cost.kernel_arguments import Floats
+from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
 
 Ints = NDArray[np.int64]
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
 
 # Points on each edge of a patch.
 _ON_EDGE = 6
@@ -38,7 +39,7 @@ POINTS = BODY_PATCHES * 4 * _ON_EDGE
 _COVERED_PX, _BORDER_PX = 0.5, 3.0
 
 
-@_compile
+@kernel
 def project_corners(
     corners_m: Floats, lens: Floats, first: int, end: int, corners_px: Floats
 ) -> None:
@@ -59,7 +60,7 @@ def project_corners(
             corners_px[p, c, 1] = lens[1] * y / z + lens[3]
 
 
-@_compile
+@kernel
 def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[float, float]:
     """Return the point at a share of the edge that begins at corner ``c`` of patch ``p``, px."""
     d = (c + 1) % 4
@@ -67,7 +68,7 @@ def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[flo
     return x + share * (corners_px[p, d, 0] - x), y + share * (corners_px[p, d, 1] - y)
 
 
-@_compile
+@kernel
 def _turns(corners_px: Floats, turns: Floats, sides_px: Floats) -> None:
     """Write how patches lie.
 
@@ -90,7 +91,7 @@ def _turns(corners_px: Floats, turns: Floats, sides_px: Floats) -> None:
         turns[p] = 1.0 if twice_area > 0.0 else -1.0
 
 
-@_compile
+@kernel
 def _is_inside(
     corners_px: Floats, sides_px: Floats, p: int, turn: float, x: float, y: float
 ) -> bool:
@@ -108,7 +109,7 @@ def _is_inside(
     return True
 
 
-@_compile
+@kernel
 def find_outline(
     corners_px: Floats, size: tuple[int, int], end_row: float, edges: Ints, points: Floats
 ) -> int:
@@ -123,7 +124,7 @@ def find_outline(
             (312, 2).
 
     Returns:
-        How many they are.
+        Number of points.
     """
     width, height = size
     end = min(end_row, height - _BORDER_PX)
@@ -154,7 +155,7 @@ def find_outline(
     return count
 
 
-@_compile
+@kernel
 def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
     """Return the value of ``field`` (H, W) at a point, linear between pixels."""
     height, width = field.shape
@@ -168,7 +169,7 @@ def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
     return distance
 
 
-@_compile
+@kernel
 def first_points(edges: Ints, count: int, first: Ints) -> None:
     """Write where the points of each patch begin, and where the last ones end, (14,).
 
@@ -186,7 +187,7 @@ def first_points(edges: Ints, count: int, first: Ints) -> None:
         first[later] = count
 
 
-@_compile
+@kernel
 def moved_patches(one: Floats, other: Floats) -> tuple[int, int]:
     """Return the first and the end of the patches that differ between two states (14,)."""
     for j in (TORSO_Y, ROLL, PITCH, YAW, TORSO_X, TORSO_Z):
@@ -194,7 +195,7 @@ def moved_patches(one: Floats, other: Floats) -> tuple[int, int]:
             return 0, BODY_PATCHES
     first, end = BODY_PATCHES, 0
     for arm in range(2):
-        for j in range(LEFT_ARM + ARM_ANGLES * arm, LEFT_ARM + ARM_ANGLES * (arm + 1)):
+        for j in range(FIRST_ANGLES[arm], FIRST_ANGLES[arm] + ARM_ANGLES):
             if one[j] != other[j]:
                 first = min(first, TRUNK_PATCHES + ARM_PATCHES * arm)
                 end = TRUNK_PATCHES + ARM_PATCHES * (arm + 1)

@@ -1,4 +1,4 @@
-"""A learned prior of one arm's posture: what people do with their arms.
+"""A learned prior of one arm's posture.
 
 An outline is alike for an arm that points to the camera and one that points away. The prior is a
 mixture of Gaussians over six numbers, the unit vectors of upper arm and forearm in the torso's
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import inlined_kernel
 
 FLOOR_NATS = 8.0
 """About what a posture costs that was nowhere in the motion capture; none is impossible, so an arm
@@ -69,7 +69,7 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
     return drawn
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
     """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm; ``away`` is scratch."""
     density = rest

@@ -1,4 +1,4 @@
-"""Running sums along the rows of a silhouette, compiled: what the costs are read from.
+"""Compiled running sums along the rows of a silhouette, from which the costs are read.
 
 With f = 1 for foreground and 0 for background, row v of the row sums is
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import inlined_kernel, kernel
 
 RowSums = NDArray[np.signedinteger[Any]]
 """Shape (rows, W + 1), of 16 bits where the image is narrow enough, else of 32."""
@@ -24,7 +24,7 @@ _FOREGROUND = np.uint64(0xFFFFFFFFFFFFFFFF)
 _index = np.uint64
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def _count_on(
     row_sums: RowSums, v: int, u: np.uint64, count: int, sums: np.int32, step: np.int32
 ) -> None:
@@ -33,7 +33,7 @@ def _count_on(
         row_sums[v, u + _index(i) + _index(1)] = np.int32(sums + step + np.int32(i) * step)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_row_sums(
     silhouette: NDArray[np.uint8], words: NDArray[np.uint64], row_sums: RowSums
 ) -> int:
@@ -41,8 +41,8 @@ def fill_row_sums(
 
     Args:
         silhouette: shape (rows, W), 0 or 255.
-        words: the same memory as (rows, W / 8) of 64 bits: where eight pixels are alike, and as the
-            eight before, they are done by the run. With no words, (rows, 0), pixel after pixel.
+        words: the same memory as (rows, W / 8) of 64 bits, so that runs of alike pixels are counted
+            eight at a time; without words, (rows, 0), every pixel is counted by itself.
         row_sums: written.
 
     Returns:
@@ -78,3 +78,41 @@ def fill_row_sums(
             row_sums[v, u] = sums
         total += (width - sums) // 2
     return total
+
+
+@kernel
+def leave_out(row_sums: RowSums, first_row: int, start: int, end: int) -> int:
+    """Let the columns ``start`` to ``end`` of the rows from ``first_row`` on, the legs, not count.
+
+    Returns the foreground pixels there.
+    """
+    taken = 0
+    for v in range(first_row, row_sums.shape[0]):
+        level = int(row_sums[v, start])
+        gain = int(row_sums[v, end]) - level
+        taken += ((end - start) - gain) // 2
+        for u in range(start + 1, end):
+            row_sums[v, u] = level
+        for u in range(end, row_sums.shape[1]):
+            row_sums[v, u] -= gain
+    return taken
+
+
+@kernel
+def median_column(row_sums: RowSums) -> float:
+    """Column that halves the foreground, from every 8th row and every 4th column, pixels."""
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    counts = np.zeros(width // 4 + 1, np.int64)
+    total = 0
+    for v in range(0, rows, 8):
+        for u in range(0, width - 3, 4):
+            if row_sums[v, u + 4] < row_sums[v, u]:
+                counts[u // 4] += 1
+                total += 1
+    seen = 0
+    for i in range(counts.shape[0]):
+        seen += counts[i]
+        if 2 * seen >= total:
+            return 4.0 * i + 2.0
+    middle: float = width / 2.0
+    return middle

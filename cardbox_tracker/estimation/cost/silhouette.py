@@ -2,7 +2,7 @@
 
     W(d, I_t) = sum over x, y of h(x, y, d) XOR f(x, y, I_t)
 
-Only the rows above the hips count: a model of the upper body says nothing about legs. The middle of
+Only the rows above the hips count: a model of the upper body has no legs. The middle of
 the hips never moves up or down, so the first row below it is a constant of body and camera.
 
 :class:`SilhouetteTerm` is what all its implementations share; :class:`ReferenceSilhouette` does
@@ -59,7 +59,7 @@ class SilhouetteObservation(TermObservation):
 
 
 class SilhouetteTerm(ABC):
-    """What all implementations of the silhouette's term share."""
+    """Base of all implementations of the silhouette's term."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body before one camera, pitched as it stands."""
@@ -105,7 +105,7 @@ class SilhouetteTerm(ABC):
 
 
 def rows_above_hips(body: BodyModel, camera: Camera) -> int:
-    """Return how many rows of the image, from its top, show what is above the hips.
+    """Return the number of rows of the image, from its top, above the hips.
 
     The hips' row is taken where the torso stands; at the image's edges a pitched camera would see
     the same height in the same row as well, since it turns about the rows' direction only.

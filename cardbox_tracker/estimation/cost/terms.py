@@ -64,6 +64,7 @@ class Frame:
         depth_m: (H, W), metres along the optical axis, not finite or 0 where it is not known; None
             without a depth image.
         interval_s: since the frame before, s.
+        stamp_ns: when it was taken, ns; None where that is not known.
     """
 
     silhouette: Silhouette
@@ -73,6 +74,7 @@ class Frame:
     posture: FloatArray | None = None
     depth_m: DepthImage | None = None
     interval_s: float = USUAL_INTERVAL_S
+    stamp_ns: int | None = None
 
 
 class TermObservation(Protocol):

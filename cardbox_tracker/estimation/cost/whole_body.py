@@ -1,8 +1,8 @@
-"""Rate whole bodies against one silhouette after the other: what the whole-body filter asks.
+"""Ratings of whole bodies against one silhouette after the other.
 
-See :mod:`cardbox_tracker.estimation.cost.whole_body_kernels` for what a rating is. Rows down to a
-hand's breadth below hanging hands count, but not where the legs are; so the rows and columns that
-count depend on where the hips were found last.
+:mod:`cardbox_tracker.estimation.cost.whole_body_kernels` defines the rating. Rows down to a hand's
+breadth below hanging hands count, but not the columns of the legs there; so the rows and columns
+that count depend on the place where the hips were found last.
 """
 
 from __future__ import annotations
@@ -13,14 +13,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import (
+    N_STATE,
+    POSTURE,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    reference_posture,
+)
+from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost import body_priors as priors
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms, joints_of_arms
-from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
-from cardbox_tracker.estimation.cost.kernels import PlaceTuple, ViewTuple
+from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    BOTTOM,
+    FOREARM,
+    HEAD,
+    HEIGHT,
+    NECK,
+    WAIST,
+    BodyTuple,
+    intrinsics_of,
+    place_of,
+    shape_of,
+)
+from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
-from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
+from cardbox_tracker.estimation.cost.row_sums import fill_row_sums, leave_out, median_column
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
@@ -30,32 +51,31 @@ _NO_WORDS = np.zeros((1, 0), np.uint64)
 # The neck is drawn this far into the head, as a fraction of the head's height: an outline has no
 # gap below the jaw.
 _NECK_INTO_HEAD = 0.25
-_TORSO_OF_TERMS = [0, 1, 2, 3, kernels.TORSO_X, kernels.TORSO_Z]
-
-
-_Figure = tuple[FloatArray, FloatArray, FloatArray, PlaceTuple, ViewTuple]
+_TORSO_OF_TERMS = [*range(TORSO_ANGLES.stop), TORSO_X, TORSO_Z]
+_BOTH_ARMS, _TRUNK = (False, True, True), (True, False, False)
 
 
 class WholeBodyCost:
     """Ratings of states (N, 14) of one body before one camera; sees one silhouette at a time.
 
     Attributes:
-        parts: the measured parts, (6, 6), metres (``kernel_arguments.shape_of``).
-        girdle: where the shoulders are, and how they are lifted, (5,).
-        place: where the hips are in the body model.
-        view: the camera.
+        body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
+        parts: of these, the measured parts, (6, 6), metres.
+        girdle: of these, (5,).
+        place: of these, the place of the hips.
+        view: of these, the camera.
         pitch_rad: how far the camera looks down.
         is_measured: the body was measured, not guessed from proportions.
         frontal_px: pixels of the model in the front reference posture.
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
             (4,).
-        terms: what further terms say of the present frame.
+        terms: observations of further terms in the present frame.
     """
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
         """Prepare for one body before one camera, pitched as it stands."""
-        self._body, self._camera, self._config = body, camera, config
+        self._model, self._camera, self._config = body, camera, config
         self.parts, shoulder = shape_of(body.sizes, config.neck_to_head)
         self.girdle = np.array(
             [
@@ -65,10 +85,11 @@ class WholeBodyCost:
                 np.radians(config.lift_from_deg),
             ]
         )
-        self.place, self.view = place_of(body), view_of(camera)
+        self.place, self.view = place_of(body), intrinsics_of(camera)
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
-        self._drawn = _drawn_parts(self.parts, config)
+        drawn = _drawn_parts(self.parts, config)
+        self.body: BodyTuple = self.parts, drawn, self.girdle, self.place, self.view
         self._rules = _rules(config)
         self._gmm = np.array(load_gmm())
         # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
@@ -78,9 +99,9 @@ class WholeBodyCost:
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
-        front = np.zeros((1, kernels.N_STATE))
-        front[0, :12] = reference_posture("front")
-        front[0, 0] = body.placement.lateral_m
+        front = np.zeros((1, N_STATE))
+        front[0, POSTURE] = reference_posture("front")
+        front[0, TORSO_Y] = body.placement.lateral_m
         self.see(np.zeros((camera.height, camera.width), np.uint8), front[0])
         self.frontal_px = max(1, int(self.bodies(front)[2][0]))
 
@@ -100,15 +121,15 @@ class WholeBodyCost:
         self._seen, self._beside, self._beside_trunk = (table[:rows] for table in self._all_rows)
         self.silhouette_px = int(fill_row_sums(upper, words, self._seen))
         if hip_row < rows:
-            half = config.legs * self._body.size("waist_width") * camera.fx / depth_m
+            half = config.legs * self._model.size("waist_width") * camera.fx / depth_m
             ends = (int(np.clip(end, 0, camera.width)) for end in (column - half, column + half))
-            self.silhouette_px -= kernels.leave_out(self._seen, hip_row, *ends)
+            self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
 
     def _hips(self, state: FloatArray, camera: Camera) -> FloatArray:
-        x_m = self._body.placement.distance_m - state[kernels.TORSO_X]
-        z_m = self._body.placement.hip_height_m + state[kernels.TORSO_Z]
-        return camera.reference_to_optical(np.array([-x_m, state[kernels.TORSO_Y], z_m]))
+        x_m = self._model.placement.distance_m - state[TORSO_X]
+        z_m = self._model.placement.hip_height_m + state[TORSO_Z]
+        return camera.reference_to_optical(np.array([-x_m, state[TORSO_Y], z_m]))
 
     def hip_row(self, state: FloatArray, camera: Camera) -> float:
         """Return the row of the hips of a state (14,) in the image of ``camera``, at any size."""
@@ -116,33 +137,23 @@ class WholeBodyCost:
         return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
 
     def see_nothing(self) -> None:
-        """Let this frame's silhouette and terms say nothing: ratings are the priors alone."""
+        """Ignore this frame's silhouette and terms: ratings are the priors alone."""
         self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
         self._seen[:] = 0
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
 
     def bearing(self) -> float:
         """Bearing of the silhouette's median column, aside over ahead."""
-        column = kernels.median_column(self._seen)
+        column = median_column(self._seen)
         return (float(column) - self._camera.cx) / self._camera.fx
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
         """Rate torsos (N,), with the arms of a state drawn where they are in the image."""
         self._beside_arm = None
-        gain = kernels.cover(arms_of, False, True, True, *self.figure, self._seen, self._beside)
+        gain = kernels.cover(arms_of, _BOTH_ARMS, self.body, self._seen, self._beside)
         ratings = np.empty(len(states))
-        kernels.rate_trunks(
-            states,
-            self._drawn,
-            self.place,
-            self.view,
-            self._beside,
-            self.silhouette_px + gain,
-            self._scale,
-            self.anchor,
-            self._rules,
-            ratings,
-        )
+        observed = self._beside, self.silhouette_px + gain, self._scale
+        kernels.rate_trunks(states, self.body, observed, self._prior, ratings)
         for term in self.terms:
             ratings += self._scale * term.torsos_beside(None)(states[:, _TORSO_OF_TERMS])
         return ratings
@@ -150,17 +161,15 @@ class WholeBodyCost:
     def fix_torso(self, torso: FloatArray) -> None:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
         self._torso, self._beside_arm = torso, None
-        gain = kernels.cover(
-            torso, True, False, False, *self.figure, self._seen, self._beside_trunk
-        )
+        gain = kernels.cover(torso, _TRUNK, self.body, self._seen, self._beside_trunk)
         self._base_px = self.silhouette_px + gain
         self._arm_terms = [term.arms_beside(torso[_TORSO_OF_TERMS]) for term in self.terms]
 
     def uncovered(self, arm: int) -> NDArray[Any]:
         """Row sums beside the fixed torso and the other arm than ``arm``, 0 left or 1 right."""
         if self._beside_arm != arm:
-            is_left, seen = arm == 1, (self._seen, self._beside)
-            kernels.cover(self._torso, True, is_left, not is_left, *self.figure, *seen)
+            drawn = True, arm == 1, arm == 0
+            kernels.cover(self._torso, drawn, self.body, self._seen, self._beside)
             self._beside_arm = arm
         return self._beside
 
@@ -171,30 +180,21 @@ class WholeBodyCost:
         return joints
 
     def arms_by_points(self, joints: FloatArray, arm: int) -> FloatArray:
-        """Return about what arms with ``joints`` cost, 0 left or 1 right, without priors, (N,).
+        """Return approximate costs (N,) of arms with ``joints``, 0 left or 1 right, without priors.
 
         See :mod:`cardbox_tracker.estimation.cost.arm_points`.
         """
         costs = np.zeros(len(joints))
         seen = self.uncovered(arm), self._scale
-        add_costs_of_arms(joints, self._torso, *self.figure, *seen, costs)
+        add_costs_of_arms(joints, self._torso, self.body, *seen, costs)
         return costs
 
     def arms(self, arms: FloatArray, arm: int) -> FloatArray:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso."""
         ratings = np.empty(len(arms))
-        kernels.rate_arms(
-            arms,
-            1.0 - 2.0 * arm,
-            self._torso,
-            *self.figure,
-            self._beside_trunk,
-            self._base_px,
-            self._scale,
-            self._rules,
-            self._gmm,
-            ratings,
-        )
+        observed = self._beside_trunk, self._base_px, self._scale
+        side = 1.0 - 2.0 * arm
+        kernels.rate_arms(arms, side, self._torso, self.body, observed, self._prior, ratings)
         for costs in self._arm_terms:
             ratings += self._scale * costs(SIDES[arm], arms)
         return ratings
@@ -202,19 +202,9 @@ class WholeBodyCost:
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels, each (N,)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))
-        kernels.rate_bodies(
-            states,
-            *self.figure,
-            self._seen,
-            self.silhouette_px,
-            self._scale,
-            self.anchor,
-            self._rules,
-            self._gmm,
-            ratings,
-            costs_px,
-            areas_px,
-        )
+        observed = self._seen, self.silhouette_px, self._scale
+        rated = ratings, costs_px, areas_px
+        kernels.rate_bodies(states, self.body, observed, self._prior, *rated)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
         return ratings, costs_px, areas_px
@@ -234,20 +224,20 @@ class WholeBodyCost:
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
         points = np.empty((6, 3))
-        kernels.keypoints(state, self.parts, self.girdle, self.place, self.view, points)
+        keypoints(state, self.body, points)
         return points
 
     def corners(self, state: FloatArray) -> FloatArray:
         """Return the drawn patches (13, 4, 3) of a state (14,), metres in the optical frame."""
-        corners_m = np.empty((kernels.BODY_PATCHES, 4, 3))
-        kernels.corners_of_body(state, *self.figure, corners_m)
+        corners_m = np.empty((BODY_PATCHES, 4, 3))
+        corners_of_body(state, self.body, corners_m)
         return corners_m
 
     def corners_before(self, state: FloatArray, body: BodyModel, camera: Camera) -> FloatArray:
         """Return :meth:`corners` of the same person, placed as ``body``, before another camera."""
-        corners_m = np.empty((kernels.BODY_PATCHES, 4, 3))
-        figure = self.parts, self._drawn, self.girdle, place_of(body), view_of(camera)
-        kernels.corners_of_body(state, *figure, corners_m)
+        corners_m = np.empty((BODY_PATCHES, 4, 3))
+        moved = *self.body[:3], place_of(body), intrinsics_of(camera)
+        corners_of_body(state, moved, corners_m)
         return corners_m
 
     @property
@@ -256,9 +246,8 @@ class WholeBodyCost:
         return len(self._seen)
 
     @property
-    def figure(self) -> _Figure:
-        """What the kernels know of the body and its camera."""
-        return self.parts, self._drawn, self.girdle, self.place, self.view
+    def _prior(self) -> priors.PriorTuple:
+        return self.anchor, self._rules, self._gmm
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
@@ -270,28 +259,28 @@ def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
 def _drawn_parts(parts: FloatArray, config: WholeBodyCostConfig) -> FloatArray:
     """Return the parts (6, 6) whose outlines are drawn."""
     drawn = parts.copy()
-    drawn[kernels.WAIST, kernels.BOTTOM] -= config.waist_extension_m
-    drawn[kernels.WAIST, kernels.HEIGHT] += config.waist_extension_m
-    into_m = _NECK_INTO_HEAD * parts[kernels.HEAD, kernels.HEIGHT]
-    drawn[kernels.NECK, kernels.HEIGHT] += into_m
-    drawn[kernels.FOREARM, kernels.HEIGHT] += config.fingers_m
+    drawn[WAIST, BOTTOM] -= config.waist_extension_m
+    drawn[WAIST, HEIGHT] += config.waist_extension_m
+    into_m = _NECK_INTO_HEAD * parts[HEAD, HEIGHT]
+    drawn[NECK, HEIGHT] += into_m
+    drawn[FOREARM, HEIGHT] += config.fingers_m
     return drawn
 
 
 def _rules(config: WholeBodyCostConfig) -> FloatArray:
-    """Return what the kernels call ``rules``, (15,)."""
-    rules = np.empty(kernels.N_RULES)
-    rules[kernels.WEIGHT] = config.weight
-    rules[kernels.ROLL_UNIT] = np.radians(config.roll_deg)
-    rules[kernels.PITCH_REST] = np.radians(config.pitch_rest_deg)
-    rules[kernels.FORWARD_UNIT] = np.radians(config.pitch_forward_deg)
-    rules[kernels.BACK_UNIT] = np.radians(config.pitch_back_deg)
-    rules[kernels.YAW_UNIT] = np.radians(config.yaw_deg)
-    rules[kernels.ANGLE_CAP] = config.angle_cap
-    rules[kernels.X_STEP], rules[kernels.Z_STEP] = config.x_step_m, config.z_step_m
-    rules[kernels.STEP_CAP] = config.step_cap
-    rules[kernels.X_HOME], rules[kernels.Z_HOME] = config.x_home_m, config.z_home_m
-    rules[kernels.HOME_CAP] = config.home_cap
-    rules[kernels.PENETRATION] = config.penetration
-    rules[kernels.UNKNOWN_DENSITY] = np.exp(-config.unknown_nats)
+    """Return the values of ``rules``, (15,), see :mod:`.body_priors`."""
+    rules = np.empty(priors.N_RULES)
+    rules[priors.WEIGHT] = config.weight
+    rules[priors.ROLL_UNIT] = np.radians(config.roll_deg)
+    rules[priors.PITCH_REST] = np.radians(config.pitch_rest_deg)
+    rules[priors.FORWARD_UNIT] = np.radians(config.pitch_forward_deg)
+    rules[priors.BACK_UNIT] = np.radians(config.pitch_back_deg)
+    rules[priors.YAW_UNIT] = np.radians(config.yaw_deg)
+    rules[priors.ANGLE_CAP] = config.angle_cap
+    rules[priors.X_STEP], rules[priors.Z_STEP] = config.x_step_m, config.z_step_m
+    rules[priors.STEP_CAP] = config.step_cap
+    rules[priors.X_HOME], rules[priors.Z_HOME] = config.x_home_m, config.z_home_m
+    rules[priors.HOME_CAP] = config.home_cap
+    rules[priors.PENETRATION] = config.penetration
+    rules[priors.UNKNOWN_DENSITY] = np.exp(-config.unknown_nats)
     return rules

@@ -8,13 +8,13 @@ import numpy as np
 
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.pose_prior import sample_bank
-from cardbox_tracker.estimation.cost.whole_body_kernels import angles_of_arms
 
 
 @cache
 def bank_of_arms() -> FloatArray:
-    """Return angles (3000, 4), rad, of an arm; outward angles are alike on both sides."""
+    """Return angles (3000, 4), rad, of an arm; they serve for both sides."""
     limits = np.ascontiguousarray(JOINT_LIMITS[LEFT_ARM])
     arms: FloatArray = angles_of_arms(sample_bank(), 1.0, limits)
     arms.setflags(write=False)

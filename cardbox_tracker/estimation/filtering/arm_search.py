@@ -8,7 +8,7 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering import arm_proposals, state_choice
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
@@ -44,10 +44,10 @@ class ArmSearch:
         config, cost = self._config, self._cost
         arms = self._proposed(pool, arm, *draws.for_arms(self._candidates * config.arms))
         ratings = cost.arms(arms, arm)
-        self.spreads_m[2 * arm : 2 * arm + 2] = moves.spread_of_arm(
+        self.spreads_m[2 * arm : 2 * arm + 2] = state_choice.spread_of_arm(
             arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
         )
-        near = moves.around_best(
+        near = arm_proposals.around_best(
             arms,
             ratings,
             config.best_arms,
@@ -76,8 +76,7 @@ class ArmSearch:
                     arm,
                     self._config,
                     cost.costs[number],
-                    normals[begin:end],
-                    uniforms[begin:end],
+                    (normals[begin:end], uniforms[begin:end]),
                     count,
                     times,
                 )

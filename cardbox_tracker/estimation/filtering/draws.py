@@ -1,14 +1,14 @@
-"""Random numbers drawn at once and handed out in pieces: a call costs more than the numbers."""
+"""Random numbers of a search, drawn at once, since a call costs more than the numbers."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.whole_body_kernels import ARM_ANGLES, N_STATE
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
-# Uniform numbers of a torso, an arm, a state of the last rounds.
+# Uniform numbers for a torso, an arm, and a state of the last rounds.
 _OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
 
 
@@ -19,9 +19,9 @@ class Draws:
         """Draw.
 
         Args:
-            rng: from which.
-            config: how many torsos, arms and states are rated.
-            candidates: arms that are proposed for each one that is rated.
+            rng: source of the numbers.
+            config: numbers of torsos, arms and states that are rated.
+            candidates: number of arms that are proposed for each one that is rated.
         """
         c, together = config, config.rounds * config.together
         arms, near = (2 * candidates * count for count in (c.arms, c.arms_again))

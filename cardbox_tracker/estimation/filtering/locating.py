@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.posture import STATE_LIMITS, TORSO_X, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body_kernels import TORSO_X, TORSO_Y
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 # Deviation of where lines of sight meet: medians of outlines are not the same point of a body.

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.posture import PITCH, TORSO_X, YAW
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.whole_body_kernels import PITCH, TORSO_X, YAW
 
 
 class Evidence(NamedTuple):

@@ -202,12 +202,12 @@ def read_recurrent_network(path: Path) -> RecurrentNetwork:
         input_layer, gru_input, gru_hidden, first, last = (
             (data[f"weights{i}"], data[f"biases{i}"]) for i in range(5)
         )
-        network = RecurrentNetwork(
-            *(data["mean"], data["scale"], float(data["most"])),
-            *(input_layer, gru_input, gru_hidden, (first, last), data["unit"]),
-        )
+        mean, scale, most, unit = data["mean"], data["scale"], float(data["most"]), data["unit"]
     except (KeyError, TypeError) as error:
         raise CardboxError(f"{path} is no recurrent network: {error}; {_MADE_BY}") from None
+    network = RecurrentNetwork(
+        mean, scale, most, input_layer, gru_input, gru_hidden, (first, last), unit
+    )
     _check_shapes(path, network, data)
     return network
 

@@ -1,10 +1,9 @@
-"""States are fitted to the silhouette's outline.
+"""Fit of states to the silhouette's outline.
 
 The filter counts pixels, and hair, clothes and fingers, which the model lacks, count as much as a
 torso that is too far away. Distances between outlines with robust weights tell them apart
-(:mod:`cardbox_tracker.estimation.cost.outline_fit_kernels`). Postures that look alike stay what
-they are: the state moves by little. What a correction has in common with the last ones counts, the
-rest is noise, so corrections are smoothed.
+(:mod:`cardbox_tracker.estimation.cost.outline_fit_kernels`). The state moves by little, so that it
+does not change to another posture that looks alike. Corrections are smoothed over time.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
@@ -28,21 +28,18 @@ from cardbox_tracker.estimation.cost.outline_points import POINTS
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.vision.camera import Camera
 
-# How far a state may go: roll, pitch, yaw, arms in rad, places in m.
-_STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * 8, 0.1, 0.1])
-# Share of the last correction in the next one. Without it the error of the acceleration grows by a
-# third.
+# Deviations of a state around the filter's: angles in rad, places in m.
+_STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])
+# Share of the last correction in the next one, against jitter.
 _KEPT = 0.6
-# Around the silhouette, more than the distance beyond which all are alike.
+# Around the silhouette, more than the distance at which distances are cut off.
 _MARGIN_PX = 12
 
 
 class _Lens:
-    """One camera: how it sees states of the first one, and what it says in this frame."""
+    """One camera, the transform of states into its frame, and its silhouette of this frame."""
 
     def __init__(
         self, cost: WholeBodyCost, camera: Camera, turned: FloatArray, moved: FloatArray
@@ -62,49 +59,26 @@ class _Lens:
             )
         there = state @ self._turned + self._moved
         row = self._cost.hip_row(there, camera) - ABOVE_HIPS_PX
-        left, top, self._field = signed_distances(silhouette, row)
-        self._end_row = row - top
-        self._lens_now = self._lens - np.array([0.0, 0.0, left, top])
-        return bool(self._field.size)
+        left, top, field = signed_distances(silhouette, row)
+        lens = self._lens - np.array([0.0, 0.0, left, top])
+        self._seen = self._turned, self._moved, lens, field, row - top
+        return bool(field.size)
 
     def add_equations(self, state: FloatArray, matrix: FloatArray, right: FloatArray) -> None:
         edges, points = np.empty((POINTS, 2), np.int64), np.empty((POINTS, 2))
-        count = add_equations(
-            state,
-            self._turned,
-            self._moved,
-            *self._cost.figure,
-            self._lens_now,
-            self._field,
-            self._end_row,
-            STATE_STEP,
-            matrix,
-            right,
-            edges,
-            points,
-        )
-        self._edges, self._points = edges[:count], points[:count]
+        equations, outline = (matrix, right), (edges, points)
+        count = add_equations(state, self._seen, self._cost.body, STATE_STEP, equations, outline)
+        self._outline = edges[:count], points[:count]
 
     def add_costs(self, state: FloatArray, change: FloatArray, costs: FloatArray) -> None:
-        costs_along(
-            state,
-            change,
-            self._turned,
-            self._moved,
-            *self._cost.figure,
-            self._lens_now,
-            self._field,
-            self._edges,
-            self._points,
-            costs,
-        )
+        costs_along(state, change, self._seen, self._cost.body, self._outline, costs)
 
 
 class OutlineFit:
     """Fits states of one body before one camera or several.
 
     Attributes:
-        seeing: cameras that count, by their number; the first one is 0.
+        seeing: numbers of the cameras that count; the first one is 0.
     """
 
     def __init__(
@@ -119,8 +93,8 @@ class OutlineFit:
         Args:
             cost: of the first camera.
             camera: the first one.
-            steps: how many.
-            others: what the further cameras rate by, and how they see the body.
+            steps: number of Gauss-Newton steps.
+            others: costs of the further cameras, and their views of the body.
         """
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))
         self._lenses = [_Lens(cost, camera, np.eye(N_STATE), np.zeros(N_STATE))]
@@ -128,7 +102,7 @@ class OutlineFit:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: the next state is of somebody else, or of another place."""
+        """Forget the last corrections: the next state is of another person or place."""
         self._correction: FloatArray | None = None
         self._frames: Sequence[Frame] | None = None
         self._looking: list[_Lens] = []
@@ -136,7 +110,7 @@ class OutlineFit:
     def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
         """Return a state (14,) that fits the outlines of the cameras' silhouettes better.
 
-        Depth images say more of the distance than an outline; with them the state stays.
+        With a depth image, which shows the distance better than an outline, the state stays.
         """
         if self._steps == 0 or frames[0].depth_m is not None:
             return state.copy()
@@ -175,11 +149,11 @@ def signed_distances(
 ) -> tuple[int, int, NDArray[np.float32]]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
-    At most ``FAR_PX`` either way.
+    They are cut off at ``FAR_PX`` either way.
 
     Returns:
-        The first column and row of the window around what is foreground above ``end_row``, and
-        there the distances, px; empty if nothing is.
+        The first column and row of the window around the foreground above ``end_row``, and the
+        distances there, px; empty without foreground.
     """
     rows = silhouette[: int(np.clip(end_row + _MARGIN_PX, 0, len(silhouette)))]
     if not rows.size:

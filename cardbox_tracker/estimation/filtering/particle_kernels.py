@@ -1,4 +1,4 @@
-"""What a filter does to all its particles in every iteration, compiled."""
+"""Compiled steps of one iteration over all particles of a filter."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.compiling import njit
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+from cardbox_tracker.compiling import kernel
 
 
-@_compile
+@kernel
 def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
     """Turn ``steps`` (N, D) of unit noise into new particles, in place.
 
@@ -25,7 +23,7 @@ def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
             steps[i, d] = particles[ancestor, d] + steps[i, d] * sigma[d]
 
 
-@_compile
+@kernel
 def clip(particles: Any, limits: Any) -> None:
     """Move every joint of ``particles`` (N, D) into its ``limits`` (D, 2), in place."""
     for i in range(particles.shape[0]):
@@ -33,7 +31,7 @@ def clip(particles: Any, limits: Any) -> None:
             particles[i, d] = min(max(particles[i, d], limits[d, 0]), limits[d, 1])
 
 
-@_compile
+@kernel
 def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any:
     """Standard deviation (D,) around ``mean`` (D,) of particles (N, D) with ``costs`` (N,).
 
@@ -52,7 +50,7 @@ def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any
     return squares
 
 
-@_compile
+@kernel
 def _cheapest(costs: Any, count: int) -> Any:
     """Indices (``count``,), ascending, of the lowest ``costs`` (N,); of equals the first ones."""
     limit = np.partition(costs, count - 1)[count - 1]
@@ -71,7 +69,7 @@ def _cheapest(costs: Any, count: int) -> Any:
     return chosen
 
 
-@_compile
+@kernel
 def truncate(costs: Any, count: int) -> Any:
     """Ancestors (N,): the best of ``costs`` (N,), the others of the ``count`` best, then the best.
 
@@ -87,7 +85,7 @@ def truncate(costs: Any, count: int) -> Any:
     return ancestors
 
 
-@_compile
+@kernel
 def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
     """Mean (D,) of the ``count`` cheapest of the particles (N, D) with ``costs`` (N,).
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import N_JOINTS, STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.loss import calibrated_deviations
 
 

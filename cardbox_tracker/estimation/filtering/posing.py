@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from cardbox_tracker.body.posture import ARM_ANGLES, STATE_LIMITS, TURNS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 
 # Place and arms move; the torso keeps its angles.
-_STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * 8, 0.1, 0.1])
+_STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * (2 * ARM_ANGLES), 0.1, 0.1])
 _STEPS = 1
-# Roll, pitch and yaw of the torso in a state.
-_TURNS = slice(1, 4)
 
 
 class SmoothedPosing:
@@ -41,9 +39,8 @@ class SmoothedPosing:
         """
         cost = self._cost
         posed = state.copy()
-        posed[_TURNS] = self._turns(state[_TURNS], interval_s)
-        figure = cost.parts, cost.girdle, cost.place, cost.view
+        posed[TURNS] = self._turns(state[TURNS], interval_s)
         wanted_m = self._keypoints(keypoints_m, interval_s)
-        pose_at_keypoints(posed, *figure, wanted_m, STATE_LIMITS)
-        fit_keypoints(posed, *figure, wanted_m, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
+        pose_at_keypoints(posed, cost.body, wanted_m, STATE_LIMITS)
+        fit_keypoints(posed, cost.body, wanted_m, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
         return posed

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.posture import N_STATE, YAW
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.whole_body_kernels import N_STATE, YAW
 
 _OTHER_ARM = np.array([0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13])
 _MIRROR = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * 10])

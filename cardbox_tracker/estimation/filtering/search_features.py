@@ -2,8 +2,6 @@
 
 Where the rated states have their elbows and hands says which other postures explain the silhouette
 nearly as well, and the evidence of loss says how well the best one does.
-
-Who changes ``whole_body_kernels.py`` has to delete the cache of compiled code of this file.
 """
 
 from __future__ import annotations
@@ -15,8 +13,8 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_kernels import keypoints
 from cardbox_tracker.estimation.filtering.loss import Evidence, freshness, log_area
 
 # States that weigh less than this, beside 1 of the best, do not count.
@@ -63,8 +61,7 @@ def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray
         result_m: keypoints of the result, (6, 3), metres in the optical frame.
     """
     features = np.empty((2, SEARCH_FEATURES))
-    figure = cost.parts, cost.girdle, cost.place, cost.view
-    _fill(search.states, search.ratings, search.spread, result_m, *figure, features)
+    _fill(search.states, search.ratings, search.spread, result_m, cost.body, features)
     seen = search.evidence
     features[:, OF_EVIDENCE] = (
         seen.residual,
@@ -85,10 +82,7 @@ def _fill(
     ratings: Any,
     spread: float,
     result_m: Any,
-    parts: Any,
-    girdle: Any,
-    place: Any,
-    view: Any,
+    body: Any,
     features: Any,
 ) -> None:
     """Write the places of :func:`features_of_search` to ``features`` (2, F)."""
@@ -99,7 +93,7 @@ def _fill(
         weight = exp((best - ratings[n]) / spread)
         if weight < _LEAST_WEIGHT:
             continue
-        keypoints(states[n], parts, girdle, place, view, points)
+        keypoints(states[n], body, points)
         total += weight
         _beside_middle(points, seen)
         for j in range(count + 1):

@@ -1,10 +1,10 @@
 """The whole-body filter: a few dozen whole postures survive from frame to frame.
 
 A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
-the best torso, then all joints together. ``docs/architecture.md`` has the steps with their numbers
-and what was tried. Proposals are in :mod:`.whole_body_moves`, ratings in
-:mod:`cardbox_tracker.estimation.cost.multi_view`, what depends on the number of cameras in
-:mod:`.search_plan`.
+the best torso, then all joints together (``docs/architecture.md``). Proposals are in
+:mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
+:mod:`cardbox_tracker.estimation.cost.multi_view`, and :mod:`.search_plan` has all that depends on
+the number of cameras.
 """
 
 from __future__ import annotations
@@ -13,24 +13,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.posture import (
+    N_JOINTS,
+    N_STATE,
+    STATE_LIMITS,
+    TORSO_X,
+    TORSO_Z,
+    reference_posture,
+)
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.kernel_arguments import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
-from cardbox_tracker.estimation.cost.whole_body_kernels import (
-    N_STATE,
-    TORSO,
-    TORSO_X,
-    TORSO_Z,
+from cardbox_tracker.estimation.cost.whole_body import iou_of
+from cardbox_tracker.estimation.filtering import (
+    joint_moves,
+    loss,
+    state_choice,
+    torso_proposals,
 )
-from cardbox_tracker.estimation.filtering import loss
-from cardbox_tracker.estimation.filtering import whole_body_moves as moves
 from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
-from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, STATE_LIMITS
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
@@ -90,7 +96,7 @@ class WholeBodyFilter:
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
         self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
         # From the hips to the torso's top: about where the shoulders are.
-        self._lever_m = float(cost.parts[TORSO, 0] + cost.parts[TORSO, 1])
+        self._lever_m = float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -100,7 +106,6 @@ class WholeBodyFilter:
         self._age, self._home_m = 0, 0.0
         self._locator.forget()
         self._output: FloatArray | None = None
-        self._result: FloatArray | None = None
         self.refine.forget()
         self._arm.forget()
         self._chance: float | None = None
@@ -122,15 +127,12 @@ class WholeBodyFilter:
     def look(self, frames: Sequence[Frame]) -> Presence:
         """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
-        found = [self._presence_in(cost) for cost in self._cost.costs]
+        limits = self._config.smallest_person, self._config.largest_person
+        found = [presence_of(c.silhouette_px / c.frontal_px, *limits) for c in self._cost.costs]
         self._seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if self._seeing:
             return Presence.PERSON
         return Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY
-
-    def _presence_in(self, cost: WholeBodyCost) -> Presence:
-        share = cost.silhouette_px / cost.frontal_px
-        return presence_of(share, self._config.smallest_person, self._config.largest_person)
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -159,12 +161,7 @@ class WholeBodyFilter:
         self.refine.see(seeing)
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
-        cost.observe(
-            [
-                [term.observe(frame) for term in some] if number in seeing else []
-                for number, (frame, some) in enumerate(zip(frames, terms, strict=True))
-            ]
-        )
+        cost.observe(frames, terms)
         return location
 
     def _search(self, frames: Sequence[Frame], location: Location) -> None:
@@ -179,12 +176,14 @@ class WholeBodyFilter:
         pool = self._torsos(before, location, draws)
         ratings = cost.bodies(pool)[0]
         best = pool[np.argmin(ratings)]
-        by_rating = moves.best_states(pool, ratings, min(len(pool), config.survivors))
+        by_rating = state_choice.best_states(pool, ratings, min(len(pool), config.survivors))
         cost.fix_torso(best)
         (left, left_ratings), (right, right_ratings) = (
             self._arm(by_rating, arm, draws) for arm in (0, 1)
         )
-        pairs = moves.combine(best, left, left_ratings, right, right_ratings, config.paired_arms)
+        pairs = joint_moves.combine(
+            best, left, left_ratings, right, right_ratings, config.paired_arms
+        )
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(frames, states, ratings, draws)
@@ -197,30 +196,17 @@ class WholeBodyFilter:
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = config.fresh_torsos if is_settled else config.torso_explorers
-        torsos = moves.propose_torsos(
+        torsos = torso_proposals.propose_torsos(
             self._survivors,
-            self._torso_sigma,
-            self._lever_m,
-            config.torso_explorers,
-            upright,
-            fresh,
-            fresh_x_m,
-            location.bearing,
+            (self._torso_sigma, STATE_LIMITS, self._lever_m),
             location.step_m,
-            self._body.placement.distance_m,
-            STATE_LIMITS,
-            *draws.for_torsos(config.torsos),
+            config.torso_explorers,
+            (upright, fresh, fresh_x_m, location.bearing, self._body.placement.distance_m),
+            draws.for_torsos(config.torsos),
         )
         ratings = cost.torsos(torsos, before)
-        pool = moves.pool_of(
-            self._survivors,
-            torsos,
-            ratings,
-            config.best_torsos,
-            before,
-            cost.place,
-            cost.view,
-            ARM_LIMITS,
+        pool = torso_proposals.pool_of(
+            self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
         return np.concatenate([pool, torsos[len(torsos) - upright :]])
@@ -239,15 +225,15 @@ class WholeBodyFilter:
             if number == 0:
                 sources = self._apart(states, ratings)
             else:
-                sources = moves.best_states(states, ratings, min(config.survivors, len(states)))
-            moved = moves.move_all(
+                sources = state_choice.best_states(
+                    states, ratings, min(config.survivors, len(states))
+                )
+            moved = joint_moves.move_all(
                 sources,
-                sigma,
-                self._lever_m,
+                (sigma, STATE_LIMITS, self._lever_m),
                 int(config.differing * config.together),
                 config.difference_scale,
-                STATE_LIMITS,
-                *draws.for_states(config.together),
+                draws.for_states(config.together),
             )
             states = np.concatenate([states, moved])
             ratings = np.concatenate([ratings, cost.bodies(moved)[0]])
@@ -260,20 +246,20 @@ class WholeBodyFilter:
     ) -> FloatArray:
         """Return a few states (N, 14) that differ, fitted to all outlines."""
         cost, outline = self._cost, self.refine.outline
-        kept = moves.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
+        kept = state_choice.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
         fitted = [outline.fitted(frames, state, _FIT_STEPS) for state in states[kept]]
         return np.clip(np.array(fitted), *STATE_LIMITS.T)
 
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
         c, cost = self._config, self._cost
         kept = (c.survivors, c.alike, c.apart_m)
-        return states[moves.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
+        return states[state_choice.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:
         """Return the smoothed mean of the best states, and how far to believe it."""
         config, cost, frame = self._config, self._cost, frames[0]
         rated = self.states, self.ratings
-        mean, stddev = moves.mean_and_spread(*rated, config.average, config.spread)
+        mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
@@ -310,12 +296,6 @@ class WholeBodyFilter:
 
     def ious(self) -> list[float | None]:
         """See :class:`~.pose_filter.PoseFilter`."""
-        found: list[float | None] = [None] * len(self._cost.costs)
-        if self._output is None or self._result is None:
-            return found
-        for number in self._seeing:
-            cost = self._cost.costs[number]
-            state = self._cost.to_views[number](self._result)
-            _, (differ_px,), (drawn_px,) = cost.bodies(state[None])
-            found[number] = iou_of(cost.silhouette_px, drawn_px, differ_px)
-        return found
+        if self._output is None:
+            return [None] * len(self._cost.costs)
+        return self._cost.ious(self._result, self._seeing)

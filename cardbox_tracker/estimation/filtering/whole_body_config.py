@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -230,11 +231,11 @@ class WholeBodyConfig:
         if self.effort == 1.0:
             return self
         # Totals are rounded up and parts down, so parts stay within their totals.
-        totals = {
+        totals: dict[str, Any] = {
             name: max(least, math.ceil(self.effort * getattr(self, name)))
             for name, least in _LEAST_TOTALS.items()
         }
-        parts = {
+        parts: dict[str, Any] = {
             name: max(least, int(self.effort * getattr(self, name)))
             for name, least in _LEAST_PARTS.items()
         }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
+from cardbox_tracker.body.posture import REFERENCE_NAMES, TORSO_Y, reference_posture
 from cardbox_tracker.body.proportions import sizes_of_stature
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
@@ -59,7 +59,7 @@ def outline_ious(
         row = int(np.clip(view.project(hips)[1], 1, view.height))
         for name in REFERENCE_NAMES:
             posture = reference_posture(name, config.side_turn)
-            posture[0] = lateral_m(silhouette, view, config.distance_m)
+            posture[TORSO_Y] = lateral_m(silhouette, view, config.distance_m)
             drawn = render(cardbox_patches(body, posture), view)[:row] > 0
             union = np.count_nonzero(drawn | seen[:row])
             iou = np.count_nonzero(drawn & seen[:row]) / union if union else 0.0

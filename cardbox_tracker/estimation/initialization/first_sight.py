@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_STATE, PLACE, POSTURE, TORSO_Y
 from cardbox_tracker.body.proportions import BREADTHS
 from cardbox_tracker.body.sizes import SIZE_INDEX, SIZE_LIMITS, FloatArray
 from cardbox_tracker.errors import InitializationError
@@ -159,14 +160,14 @@ class _Search:
         cost = self._cost(body, postures)
         _, costs_px, areas_px = cost.bodies(postures)
         iou = iou_of(cost.silhouette_px, areas_px[0], costs_px[0])
-        x_m, z_m = postures[0, 12:].tolist()
+        x_m, z_m = postures[0, PLACE].tolist()
         place, unknown = body.placement, body.unknown
         body = body.with_values(
             distance_m=place.distance_m - (x_m if "distance_m" in unknown else 0.0),
             hip_height_m=place.hip_height_m + (z_m if "hip_height_m" in unknown else 0.0),
-            lateral_m=float(postures[0, 0]),
+            lateral_m=float(postures[0, TORSO_Y]),
         )
-        return body, postures[0, :12], iou
+        return body, postures[0, POSTURE], iou
 
     def _standing(self, distance_m: float) -> BodyModel:
         """Return the body at a distance, aligned with the silhouette's head."""
@@ -206,7 +207,7 @@ class _Search:
         search = WholeBodyFilter(self._config, silhouette, self._rng)
         frames = [silhouette.frame(self._seen)]
         if search.look(frames) is not Presence.PERSON:
-            return np.zeros((1, 14)), np.array([np.inf])
+            return np.zeros((1, N_STATE)), np.array([np.inf])
         search.follow(frames, [()])
         order = np.argsort(search.ratings, kind="stable")[:_POSTURES]
         return search.states[order], search.ratings[order]

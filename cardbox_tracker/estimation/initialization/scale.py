@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import TORSO_Y, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BodyModelError, CameraError, InitializationError
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
@@ -240,5 +240,5 @@ def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -
 def _held(name: str, body: BodyModel) -> FloatArray:
     """Return the state (14,) of a reference posture at the measured place."""
     state = np.append(reference_posture(name), [0.0, 0.0])
-    state[0] = body.placement.lateral_m
+    state[TORSO_Y] = body.placement.lateral_m
     return state

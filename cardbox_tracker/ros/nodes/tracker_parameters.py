@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
+from cardbox_tracker.estimation.filtering.corrector_loading import load_corrector
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.estimation.settings_file import read_settings
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
     RESTARTS,
@@ -16,10 +19,33 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
     parameter,
     shared,
 )
-from cardbox_tracker.settings import settings_of
+from cardbox_tracker.settings import NoEffectError, nested, settings_of
 from cardbox_tracker.vision.pairing import camera_names
 
 _NEXT_START = "next start of tracking"
+
+_PARAMETERS = MappingProxyType(
+    {
+        "strategy": "strategy",
+        "torso.particles": "particles",
+        "arm.particles": "particles",
+        "cycles": "cycles",
+        "average": "average",
+        "torso.survival_rate": "torso_survival_rate",
+        "arm.survival_rate": "arm_survival_rate",
+        "torso.rotation_noise_rad": "torso_rotation_noise_rad",
+        "torso.translation_noise_m": "torso_translation_noise_m",
+        "arm.rotation_noise_rad": "arm_rotation_noise_rad",
+        "whole_body.effort": "effort",
+        "whole_body.corrector": "corrector",
+        "whole_body.output_smoothing_s": "output_smoothing_s",
+        "relocalize": "relocalize",
+        "select_person": "select_person",
+        "lost_iou": "lost_iou",
+        "lost_frames": "lost_frames",
+    }
+)
+"""Settings of the core that are parameters, with the name of each."""
 
 MOST_MOVES = 20_000
 """Particles of a filter times cycles: an image then takes about 0.2 s at 320x240 and 0.3 s at
@@ -43,11 +69,6 @@ def _of_preset(
         description=f"{part}{core.description}{more}; 0: preset",
         limits=(0, core.maximum if most is None else most),
     )
-
-
-def _chosen(text: str, preset: bool) -> bool:
-    """Return what ``preset``, ``always`` or ``never`` means."""
-    return preset if text == "preset" else text == "always"
 
 
 @dataclass(frozen=True)
@@ -81,6 +102,15 @@ class TrackerParameters(NodeParameters):
     torso_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "torso: ")
     torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
     arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
+    effort: float = shared(WholeBodyConfig, "effort")
+    corrector: str = shared(WholeBodyConfig, "corrector", read_only=True)
+    output_smoothing_s: float = shared(WholeBodyConfig, "output_smoothing_s")
+    settings_file: str = parameter(
+        "",
+        "YAML file with further settings, by the names at the end of docs/parameters.md; what "
+        "differs from a default here goes before; empty: none",
+        read_only=True,
+    )
     relocalize: str = shared(
         TrackerConfig,
         "relocalize",
@@ -139,35 +169,36 @@ class TrackerParameters(NodeParameters):
     )
 
     def config(self) -> TrackerConfig:
-        """Return the settings of the core; raises ValueError where they do not go together."""
+        """Return the settings of the core.
+
+        Raises:
+            CardboxError: the settings file cannot be used.
+            ValueError: values do not go together, or one has no effect.
+        """
         base = PRESETS[self.preset]()
         if self.depth:
             base = base.with_depth()
-        if self.particles:
-            base = base.with_particles(self.particles)
-        return replace(
-            base,
-            torso=self._filter(base.torso, "torso"),
-            arm=self._filter(base.arm, "arm"),
-            strategy=base.strategy if self.strategy == "preset" else self.strategy,
-            cycles=self.cycles or base.cycles,
-            average=self.average or base.average,
-            relocalize=_chosen(self.relocalize, base.relocalize),
-            select_person=_chosen(self.select_person, base.select_person),
-            lost_iou=self.lost_iou,
-            lost_frames=self.lost_frames,
-        )
+        if self.settings_file:
+            base = read_settings(self.settings_file, base)
+        try:
+            return base.changed(nested(self._given()))
+        except NoEffectError as error:
+            raise ValueError(error.renamed(_PARAMETERS)) from None
 
-    def _filter(self, base: FilterConfig, part: str) -> FilterConfig:
-        given = {
-            entry.name: getattr(self, f"{part}_{entry.name}", 0) for entry in fields(FilterConfig)
-        }
-        chosen: dict[str, Any] = {name: value for name, value in given.items() if value}
-        return replace(base, **chosen)
+    def _given(self) -> dict[str, Any]:
+        """Return the values that differ from the defaults, by the names of the core's settings."""
+        given = {}
+        for setting, name in _PARAMETERS.items():
+            value = getattr(self, name)
+            if value != getattr(type(self), name):
+                is_switch = name in ("relocalize", "select_person")
+                given[setting] = value == "always" if is_switch else value
+        return given
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together."""
+        """Raise ValueError or CardboxError where values do not go together."""
         config = self.config()
+        load_corrector(config.whole_body.corrector)
         if (len(self.cameras) > 1 or self.depth) and not config.has_several_views:
             raise ValueError(
                 f"several cameras and depth need the preset default, but it is {self.preset}, "

@@ -18,6 +18,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.log_limit import LogLimit
 from cardbox_tracker.vision.stamps import WINDOW, StreamStatistics
 
@@ -75,7 +76,10 @@ class NodeDiagnostics:
         self._latencies_ms: deque[float] = deque(maxlen=WINDOW)
         self._before = (time.monotonic(), 0, 0)
         self._publisher = node.create_publisher(
-            DiagnosticArray, "/diagnostics", QoSProfile(depth=10)
+            DiagnosticArray,
+            "/diagnostics",
+            QoSProfile(depth=10),
+            event_callbacks=qos.publisher_events("/diagnostics", self.warn),
         )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD_S, self.publish, clock=steady)
@@ -152,8 +156,8 @@ class NodeDiagnostics:
             return {}
         return {
             "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
-            f"{period_ms:.0f} ms, so that images wait or are left out; take fewer particles or "
-            "cycles, a smaller working resolution, or fewer images a second"
+            f"{period_ms:.0f} ms, so that images wait or are left out; lower the effort of "
+            "the tracker, take a smaller working resolution, or fewer images a second"
         }
 
     def _remarks(self) -> list[str]:

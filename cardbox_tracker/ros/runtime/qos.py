@@ -101,14 +101,19 @@ def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
 
 def subscription_events(topic: str, report: Callable[[str], None]) -> SubscriptionEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
+    # The default callbacks wait for other events, which lengthens every wait of the executor.
     return SubscriptionEventCallbacks(
-        incompatible_qos=partial(_report_mismatch, topic, report, True)
+        incompatible_qos=partial(_report_mismatch, topic, report, True),
+        use_default_callbacks=False,
     )
 
 
 def publisher_events(topic: str, report: Callable[[str], None]) -> PublisherEventCallbacks:
     """Return callbacks that pass a mismatch of QoS on ``topic`` to ``report``."""
-    return PublisherEventCallbacks(incompatible_qos=partial(_report_mismatch, topic, report, False))
+    return PublisherEventCallbacks(
+        incompatible_qos=partial(_report_mismatch, topic, report, False),
+        use_default_callbacks=False,
+    )
 
 
 def _report_mismatch(

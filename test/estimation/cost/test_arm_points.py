@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.cost.whole_body_kernels import angles_of_arms
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.vision.camera import Camera
 

@@ -15,9 +15,10 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import BodyParts, Part, body_parts
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
-from cardbox_tracker.estimation.cost import kernels
+from cardbox_tracker.estimation.cost import kernel_arguments
+from cardbox_tracker.estimation.cost.cardbox_kernels import trunk_costs
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
-from cardbox_tracker.estimation.cost.kernel_arguments import place_of, shape_of, view_of
+from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of, shape_of
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import (
     ReferenceSilhouette,
@@ -188,14 +189,14 @@ def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
 @given(SMALL_CASES)
 def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
     reference, compiled = case.terms()
-    parts, _ = shape_of(case.body.sizes, 0.6)
-    place, view = place_of(case.body), view_of(case.camera)
+    parts, shoulder = shape_of(case.body.sizes, 0.6)
+    cardbox = parts, shoulder, place_of(case.body), intrinsics_of(case.camera)
     torsos = np.ascontiguousarray(case.postures[:, TORSO])
     row_sums = np.zeros((compiled.rows, case.camera.width + 1), np.int32)
     silhouette = case.silhouette[: compiled.rows]
     silhouette_px = fill_row_sums(silhouette, np.zeros((1, 0), np.uint64), row_sums)
     got = np.zeros(len(torsos), np.int64)
-    kernels.trunk_costs(torsos, parts, place, view, row_sums, silhouette_px, got)
+    trunk_costs(torsos, cardbox, row_sums, silhouette_px, got)
     for cost, posture in zip(got, case.postures, strict=True):
         patches = cardbox_patches(case.body, posture, 0.6)
         trunk = np.concatenate([patches[TORSO_PATCHES], patches[NECK_PATCHES]])
@@ -204,10 +205,10 @@ def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
 
 
 def test_the_kernels_take_parts_and_lengths_in_their_order() -> None:
-    names = [f"_{name.removesuffix('_m').upper()}" for name in (*BodyParts._fields[:6],)]
-    assert [getattr(kernels, name) for name in names] == list(range(6))
-    names = [f"_{name.removesuffix('_m').upper()}" for name in Part._fields]
-    assert [getattr(kernels, name) for name in names] == list(range(6))
+    names = [name.removesuffix("_m").upper() for name in BodyParts._fields[:6]]
+    assert [getattr(kernel_arguments, name) for name in names] == list(range(6))
+    names = [name.removesuffix("_m").upper() for name in Part._fields]
+    assert [getattr(kernel_arguments, name) for name in names] == list(range(6))
     parts, shoulder = shape_of(DEFAULT_SIZES)
     expected = body_parts(DEFAULT_SIZES)
     np.testing.assert_array_equal(parts, expected[:6])

@@ -7,13 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.vision.camera import Camera
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -25,8 +24,7 @@ STDDEV = np.full(14, 0.3)
 
 def fitted(wanted: np.ndarray, stddev: np.ndarray = STDDEV, steps: int = 4) -> np.ndarray:
     state = BEGIN.copy()
-    skeleton = COST.parts, COST.girdle, COST.place, COST.view
-    fit_keypoints(state, *skeleton, wanted, stddev, STATE_LIMITS, STATE_STEP, steps)
+    fit_keypoints(state, COST.body, wanted, stddev, STATE_LIMITS, STATE_STEP, steps)
     return state
 
 
@@ -55,7 +53,7 @@ def test_limits_hold() -> None:
 
 def posed(begin: np.ndarray, wanted: np.ndarray, cost: WholeBodyCost = COST) -> np.ndarray:
     state = begin.copy()
-    pose_at_keypoints(state, cost.parts, cost.girdle, cost.place, cost.view, wanted, STATE_LIMITS)
+    pose_at_keypoints(state, cost.body, wanted, STATE_LIMITS)
     return state
 
 

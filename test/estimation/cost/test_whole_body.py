@@ -15,6 +15,17 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
+from cardbox_tracker.estimation.cost.body_priors import penetration, priors
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    BOTTOM,
+    BOTTOM_WIDTH,
+    FOREARM,
+    HEIGHT,
+    TOP_WIDTH,
+    TORSO,
+    WAIST,
+)
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms, directions_of_arm
 from cardbox_tracker.estimation.cost.pose_prior import FLOOR_NATS, load_gmm, nats_of
 from cardbox_tracker.estimation.cost.terms import Silence
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
@@ -95,12 +106,12 @@ def test_below_the_start_the_shoulder_stays() -> None:
 def test_angles_and_directions_are_each_others_inverse(seed: int) -> None:
     for angles in random_states(5, seed)[:, 4:8]:
         for side in (1.0, -1.0):
-            directions = kernels.directions_of_arm(angles, side)
+            directions = directions_of_arm(angles, side)
             assert np.linalg.norm(directions[:3]) == pytest.approx(1.0)
             assert np.linalg.norm(directions[3:]) == pytest.approx(1.0)
             wide = np.array([[-10.0, 10.0]] * 4)
-            back = kernels.angles_of_arms(directions[None], side, wide)[0]
-            again = kernels.directions_of_arm(back, side)
+            back = angles_of_arms(directions[None], side, wide)[0]
+            again = directions_of_arm(back, side)
             np.testing.assert_allclose(again, directions, atol=1e-6)
 
 
@@ -132,7 +143,7 @@ def test_a_trunk_looks_as_wide_from_the_side_as_it_is_deep() -> None:
     body = somebody(torso_depth=0.1, waist_depth=0.1).with_values(distance_m=8.0)
     of = cost(body=body)
     for yaw, width_m in ((0.0, body.size("waist_width")), (np.pi / 2, 0.1)):
-        corners = of.corners(state(d4=yaw))[kernels.WAIST]
+        corners = of.corners(state(d4=yaw))[WAIST]
         assert np.ptp(corners[:, 0]) == pytest.approx(width_m, abs=1e-3)
 
 
@@ -155,14 +166,11 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     trunk = of.torsos(one[None], one)[0]
     left, right = (of.arms(one[None, 4 + 4 * k : 8 + 4 * k], k)[0] for k in (0, 1))
     px, _ = of.bodies(one[None])[1:]
-    rules = of._rules
-    torso, left_prior, right_prior = kernels.priors(
-        one, of.anchor, of.parts, of.girdle, rules, of._gmm
-    )
+    torso, left_prior, right_prior = priors(one, of.body, of._prior)
     share = px[0] / of.silhouette_px
     assert trunk == pytest.approx(share + torso)
     beside = of.silhouette_px + kernels.cover(
-        one, True, False, False, *of.figure, of._seen, of._beside_trunk
+        one, (True, False, False), of.body, of._seen, of._beside_trunk
     )
     both = left - left_prior + right - right_prior - beside / of.silhouette_px
     assert both == pytest.approx(share)
@@ -174,7 +182,7 @@ def test_the_torsos_prior_by_hand() -> None:
     anchor = np.array([0.1, 0.0, 0.14, np.radians(7.0)])
 
     def prior(one: np.ndarray) -> float:
-        found: float = kernels.priors(one, anchor, of.parts, of.girdle, of._rules, of._gmm)[0]
+        found: float = priors(one, of.body, (anchor, *of._prior[1:]))[0]
         return found / 0.012
 
     def capped(square: float, cap: float) -> float:
@@ -205,7 +213,7 @@ def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:
     free, inside = state(d5=1.0, d9=1.0), state(d5=0.3, d6=0.2, d7=-1.4, d8=0.1)
 
     def of_left(one: np.ndarray) -> float:
-        found: float = kernels.priors(one, of.anchor, of.parts, of.girdle, of._rules, of._gmm)[1]
+        found: float = priors(one, of.body, of._prior)[1]
         return found / 0.012
 
     def learned(one: np.ndarray) -> float:
@@ -222,15 +230,13 @@ def test_how_deep_a_point_is_inside_by_hand() -> None:
     """On the axis of the torso's middle a hand costs 1, half way to its side a half."""
     parts = cost().parts
     parts = parts.copy()
-    parts[kernels.FOREARM, kernels.TOP_WIDTH] = 0.0  # no margin
-    high = parts[kernels.TORSO, kernels.BOTTOM] + parts[kernels.TORSO, kernels.HEIGHT] / 2
-    half = (
-        parts[kernels.TORSO, kernels.TOP_WIDTH] + parts[kernels.TORSO, kernels.BOTTOM_WIDTH]
-    ) / 4
+    parts[FOREARM, TOP_WIDTH] = 0.0  # no margin
+    high = parts[TORSO, BOTTOM] + parts[TORSO, HEIGHT] / 2
+    half = (parts[TORSO, TOP_WIDTH] + parts[TORSO, BOTTOM_WIDTH]) / 4
     far = np.array([2.0, 0.0, high])
     for aside, depth in ((0.0, 1.0), (half / 2, 0.5), (half * 1.1, 0.0)):
         points = np.array([far, far, [0.0, aside, high]])
-        assert kernels.penetration(points, parts) == pytest.approx(depth)
+        assert penetration(points, parts) == pytest.approx(depth)
 
 
 def test_rows_below_the_hips_count_but_not_the_legs() -> None:

@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering.arms import STATE_LIMITS
 from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
 from cardbox_tracker.estimation.filtering.networks import Network, load_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of

@@ -11,16 +11,16 @@ import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset
-from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.kinematics import directions_of_arm
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering import whole_body_moves as moves
+from cardbox_tracker.estimation.filtering import arm_proposals, state_choice, torso_proposals
 from cardbox_tracker.estimation.filtering.loss import Evidence, chance_of_loss, state_stddev
 from cardbox_tracker.estimation.filtering.pose_filter import Presence
-from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS, WholeBodyFilter
+from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -83,11 +83,11 @@ def test_survivors_are_the_best_and_then_apart() -> None:
     states[:, 5] += 0.001 * np.arange(30)  # all alike, but
     states[25:, 7] = 1.2 + 0.3 * np.arange(5)  # these bend an elbow
     ratings = np.arange(30.0)
-    chosen = moves.choose_apart(states, ratings, 16, 4, 0.1, COST.parts, COST.girdle)
+    chosen = state_choice.choose_apart(states, ratings, 16, 4, 0.1, COST.parts, COST.girdle)
     assert chosen[:4].tolist() == [0, 1, 2, 3]
     assert chosen[4] == 25
     assert set(chosen[4:].tolist()) <= set(range(25, 30))
-    alike = moves.choose_apart(states, ratings, 16, 16, 0.1, COST.parts, COST.girdle)
+    alike = state_choice.choose_apart(states, ratings, 16, 16, 0.1, COST.parts, COST.girdle)
     assert alike.tolist() == list(range(16))
 
 
@@ -99,23 +99,14 @@ def arms_for(
     of.see(silhouette, state)
     of.fix_torso(state)
     bank = np.tile([0.1, 0.2, 0.3, 0.4], (5, 1))
-    return moves.propose_arms(
+    kinds = [counts.get(kind, 0) for kind in ("mirrors", "tips", "banked")]
+    return arm_proposals.propose_arms(
         state[None],
         arm,
-        16,
-        0.2,
-        counts.get("mirrors", 0),
-        counts.get("tips", 0),
-        bank,
-        counts.get("banked", 0),
+        (16, 0.2, *kinds, bank, ARM_LIMITS),
         of.uncovered(arm),
-        of.parts,
-        of.girdle,
-        of.place,
-        of.view,
-        ARM_LIMITS,
-        rng.standard_normal((40, 4)),
-        rng.random((40, 3)),
+        of.body,
+        (rng.standard_normal((40, 4)), rng.random((40, 3))),
     )
 
 
@@ -164,14 +155,14 @@ def test_a_mirrored_arm_points_to_the_other_side_in_depth(arm: int) -> None:
     state[first : first + 4] = 1.2, 0.5, 0.1, 0.4
     mirrored = arms_for(np.zeros((120, 160), np.uint8), state, arm, mirrors=20)[-20:]
     side = 1.0 - 2.0 * arm
-    before = kernels.directions_of_arm(state[first : first + 4], side)
+    before = directions_of_arm(state[first : first + 4], side)
     shoulder = COST.keypoints(state)[3 * arm]
     sight = shoulder / np.linalg.norm(shoulder)
     # Optical to torso's frame of somebody upright: X towards the camera, Y right, Z up.
     sight = np.array([-sight[2], sight[0], -sight[1]])
     kinds = set()
     for angles in mirrored:
-        directions = kernels.directions_of_arm(angles, side)
+        directions = directions_of_arm(angles, side)
         flips = []
         for half in (slice(0, 3), slice(3, 6)):
             turned = before[half] - 2 * (before[half] @ sight) * sight
@@ -187,10 +178,13 @@ def test_torsos_that_turn_about_the_shoulders_leave_them_where_they_are() -> Non
     sigma = np.zeros(14)
     sigma[1:3] = 0.2
     lever_m = float(BODY.size("waist_height") + BODY.size("torso_height"))
-    torsos = moves.propose_torsos(
-        *(upright()[None], sigma, lever_m, 0, 0, upright(), 0.0, 0.0, 0.0, 2.0, STATE_LIMITS),
-        rng.standard_normal((20, 14)),
-        rng.random((20, 2)),
+    torsos = torso_proposals.propose_torsos(
+        upright()[None],
+        (sigma, STATE_LIMITS, lever_m),
+        0.0,
+        0,
+        (0, upright(), 0.0, 0.0, 2.0),
+        (rng.standard_normal((20, 14)), rng.random((20, 2))),
     )
     middle = [COST.keypoints(torso)[[0, 3]].mean(0) for torso in (upright(), *torsos)]
     moved = np.linalg.norm(np.array(middle[1:]) - middle[0], axis=1)
@@ -202,8 +196,8 @@ def test_fixed_arms_keep_their_directions_in_space() -> None:
     before, torso = upright(), upright()
     before[4:8] = 0.9, 0.3, 0.2, 0.5
     torso[1:4] = 0.1, 0.2, 0.4
-    pool = moves.pool_of(
-        before[None], torso[None], np.zeros(1), 1, before, COST.place, COST.view, ARM_LIMITS
+    pool = torso_proposals.pool_of(
+        before[None], torso[None], np.zeros(1), 1, before, COST.body, ARM_LIMITS
     )
     carried, fixed = pool[1:]
     np.testing.assert_array_equal(carried, torso)
@@ -234,7 +228,7 @@ def test_smoothing_is_a_share_of_the_last_result() -> None:
     of = made(0, replace(default_preset(), whole_body=whole_body))
     first = follow(of, seen(wave(0.0)))
     second = follow(of, seen(wave(0.3)))
-    mean, _ = moves.mean_and_spread(of.states, of.ratings, 150, 0.02)
+    mean, _ = state_choice.mean_and_spread(of.states, of.ratings, 150, 0.02)
     np.testing.assert_allclose(second.posture, 0.5 * first.posture + 0.5 * mean[:12])
 
 

@@ -101,3 +101,22 @@ def joints() -> Callable[..., Any]:
         return message
 
     return make
+
+
+class Hands:
+    """Stands for the nodes of one process: messages are handed over, not sent."""
+
+    def __init__(self) -> None:
+        self.takers: dict[str, Any] = {}
+
+    def take(self, topic: str, taker: Any) -> bool:
+        self.takers[topic] = taker
+        return True
+
+    def give(self, topic: str, message: Any) -> None:
+        self.takers[topic](message, {"source_timestamp": 0})
+
+
+@pytest.fixture
+def hands() -> Hands:
+    return Hands()

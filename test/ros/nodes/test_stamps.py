@@ -27,7 +27,6 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
-from cardbox_tracker.ros.runtime.intra_process import IntraProcess  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -35,25 +34,10 @@ EMPTY = np.zeros((120, 160), np.uint8)
 S = 10**9
 
 
-class Hands(IntraProcess):
-    """Hands messages to the node inside this process."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.takers: dict[str, Any] = {}
-
-    def take(self, topic: str, taker: Any) -> bool:
-        self.takers[topic] = taker
-        return True
-
-    def give(self, topic: str, message: Any) -> None:
-        self.takers[topic](message, {"source_timestamp": 0})
-
-
 class Fed:
     """A tracker node that is handed silhouettes; what it tracked, and how often it began."""
 
-    def __init__(self, node: TrackerNode, hands: Hands, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, node: TrackerNode, hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.node, self._hands = node, hands
         self.trackers: list[Tracker] = []
 
@@ -76,11 +60,10 @@ class Fed:
 
 @pytest.fixture
 def fed(
-    make_node: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make_node: Callable[..., Any], hands: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Fed]:
     path = tmp_path / "body.yaml"
     save_body_model(BodyModel(), path)
-    hands = Hands()
     node = TrackerNode(
         intra_process=hands,
         context=make_node().context,

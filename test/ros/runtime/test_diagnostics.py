@@ -250,4 +250,4 @@ def test_a_node_that_needs_longer_than_a_period_says_what_to_do(
     for frame in range(40):
         diagnostics.input.add(1_000_000_000 + frame * PERIOD_NS)
         diagnostics.working(sent_ns=time.time_ns() - int(periods * PERIOD_NS))
-    assert ("fewer particles" in diagnostics.status().message) is slow
+    assert ("effort" in diagnostics.status().message) is slow

@@ -321,7 +321,6 @@ def test_tracker_settings_override_the_preset() -> None:
         preset="paper",
         strategy="srs",
         particles=50,
-        arm_survival_rate=0.3,
         torso_translation_noise_m=0.05,
         relocalize="always",
         select_person="always",
@@ -329,7 +328,6 @@ def test_tracker_settings_override_the_preset() -> None:
     assert isinstance(config, TrackerConfig)
     assert config.strategy == "srs" and config.relocalize and config.select_person
     assert config.torso.particles == config.arm.particles == 50
-    assert config.arm.survival_rate == 0.3
     assert config.torso.survival_rate == TrackerConfig().torso.survival_rate
     assert config.torso.translation_noise_m == 0.05
 
@@ -337,9 +335,90 @@ def test_tracker_settings_override_the_preset() -> None:
 def test_settings_that_do_not_go_together_are_refused(make_node: Callable) -> None:
     node = make_node()
     live = LiveParameters(node, TrackerParameters)
-    accepted, reason = set_values(node, particles=10, average=50)
+    accepted, reason = set_values(node, preset="paper", particles=10, average=50)
     assert not accepted and "average is 50" in reason
     assert live.value == TrackerParameters()
+
+
+OTHERS: dict[str, dict[str, Any]] = {
+    "paper": {
+        "strategy": "srs",
+        "particles": 150,
+        "cycles": 3,
+        "average": 20,
+        "torso_survival_rate": 0.3,
+        "arm_survival_rate": 0.3,
+        "torso_rotation_noise_rad": 0.2,
+        "torso_translation_noise_m": 0.05,
+        "arm_rotation_noise_rad": 0.1,
+        "relocalize": "always",
+        "select_person": "always",
+        "lost_iou": 0.3,
+        "lost_frames": 9,
+    },
+    "default": {
+        "effort": 0.5,
+        "corrector": "none",
+        "output_smoothing_s": 0.2,
+        "lost_iou": 0.3,
+        "relocalize": "never",
+        "select_person": "never",
+        "lost_frames": 9,
+    },
+}
+INSTEAD = {"effort": "particles", "output_smoothing_s": "particles", "corrector": "particles"}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", sorted(OTHERS["paper"].keys() | OTHERS["default"].keys()))
+def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
+    preset: str, name: str
+) -> None:
+    """What settings of the core do is tested in test/estimation/test_settings_act.py."""
+    values = {**OTHERS["paper"], **OTHERS["default"]}
+    if name in OTHERS[preset]:
+        changed = TrackerParameters(preset=preset, **{name: OTHERS[preset][name]})
+        changed.check()
+        assert changed.config() != TrackerParameters(preset=preset).config()
+        return
+    refused = TrackerParameters(preset=preset, **{name: values[name]})
+    instead = INSTEAD.get(name, r"(whole_body\.|effort)")
+    with pytest.raises(ValueError, match=rf"^{name} has no effect .*{preset}.*; use .*{instead}"):
+        refused.check()
+
+
+def test_a_parameter_without_effect_is_refused_at_the_start(make_node: Callable) -> None:
+    with pytest.raises(CardboxError, match=r"particles has no effect.*use effort"):
+        LiveParameters(make_node("-p", "particles:=300"), TrackerParameters)
+
+
+def test_a_parameter_without_effect_is_refused_live(make_node: Callable) -> None:
+    node = make_node()
+    live = LiveParameters(node, TrackerParameters)
+    accepted, reason = set_values(node, particles=300)
+    assert not accepted and "use effort" in reason
+    assert set_values(node, effort=0.5) == (True, "")
+    assert live.value.config().whole_body.effort == 0.5
+    accepted, reason = set_values(node, preset="paper")
+    assert not accepted and "effort has no effect" in reason and "use particles" in reason
+    assert set_values(node, preset="paper", effort=1.0, particles=300) == (True, "")
+
+
+def test_a_settings_file_gives_what_has_no_parameter(tmp_path: Path, make_node: Callable) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text("lost_frames: 7\nwhole_body: {effort: 0.5, cost: {yaw_deg: 20}}\n")
+    config = TrackerParameters(settings_file=f"{path}", effort=2.0).config()
+    assert (config.lost_frames, config.whole_body.effort) == (7, 2.0)
+    assert config.whole_body.cost.yaw_deg == 20.0
+    path.write_text("lost_frame: 7\n")
+    with pytest.raises(CardboxError, match=r"settings\.yaml.*lost_frame'.*'lost_frames'"):
+        LiveParameters(make_node("-p", f"settings_file:={path}"), TrackerParameters)
+
+
+@pytest.mark.parametrize("name", ["best", "missing.npz", "no_such_module:make", "os:missing"])
+def test_a_corrector_that_is_none_is_refused_at_the_start(make_node: Callable, name: str) -> None:
+    with pytest.raises(CardboxError, match=name):
+        LiveParameters(make_node("-p", f"corrector:={name}"), TrackerParameters)
 
 
 @pytest.mark.parametrize("value", [1e-5, 0.1, 2.0, 0.00012])
@@ -354,8 +433,8 @@ def test_yaml_floats_stay_floats(value: float) -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"particles": 200_000, "cycles": 20}, "particles is 200000; .*20000"),
-        ({"particles": 20_000, "cycles": 2}, "40000; .*20000"),
+        ({"preset": "paper", "particles": 200_000}, "particles is 200000; .*20000"),
+        ({"preset": "paper", "particles": 20_000, "cycles": 2}, "40000; .*20000"),
         ({"preset": "paper", "particles": 1000, "cycles": 100}, "cardbox track"),
     ],
 )
@@ -367,5 +446,6 @@ def test_what_would_make_the_tracker_deaf_is_refused(values: dict[str, Any], wor
 
 @pytest.mark.parametrize("values", [{"particles": 20_000}, {"particles": 200, "cycles": 100}])
 def test_all_that_the_frame_rate_bears_is_allowed(values: dict[str, Any]) -> None:
-    check(TrackerParameters(**values))
-    TrackerParameters(**values).check()
+    parameters = TrackerParameters(preset="paper", **values)
+    check(parameters)
+    parameters.check()

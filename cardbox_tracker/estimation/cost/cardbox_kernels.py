@@ -1,0 +1,305 @@
+"""Compiled costs of the cardbox model: kinematics, projection, rasterisation and XOR in one pass.
+
+With h = 1 where the model is drawn and f = 1 where the silhouette is, (h XOR f) = f + h (1 - 2 f),
+so that equation (2) is
+
+    W = sum of f + sum over the pixels covered by the model of (1 - 2 f)
+
+The first sum is a constant of the image. The second is read from the row sums, see
+:mod:`cardbox_tracker.estimation.cost.union`. For the arms the row sums stay level where the trunk
+covers the image already, so that an arm particle draws its own 4 patches, not 11.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.body_outline import lid
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    BOTTOM,
+    BOTTOM_WIDTH,
+    DEPTH,
+    FOREARM,
+    FORWARD,
+    HEAD,
+    HEIGHT,
+    NECK,
+    TOP_WIDTH,
+    TORSO,
+    UPPER_ARM,
+    WAIST,
+    Cardbox,
+    CardboxTuple,
+    Counts,
+    Floats,
+    Intrinsics,
+    IntrinsicsTuple,
+    cardbox_of,
+)
+from cardbox_tracker.estimation.cost.kinematics import angles_in, side_of, torso_pose, turn_limb
+from cardbox_tracker.estimation.cost.rasterisation import Workspace, draw, new_workspace
+from cardbox_tracker.estimation.cost.row_sums import RowSums
+from cardbox_tracker.estimation.cost.union import cover_patches, sum_union
+
+TRUNK_PATCHES = 8
+"""7 of the paper and one for a neck, which draws nothing without a width: loops of fours."""
+ARM_PATCHES = 4
+_BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
+# An index of this type is never negative, so no code is made to count from an array's end.
+_index = np.uint64
+
+
+@inlined_kernel
+def _joint(axis: int, side: float, shoulder: Floats, torso: Floats, hip: Floats) -> float:
+    """Coordinate of a shoulder joint: hip + torso (0, side aside, height)."""
+    joint: float = hip[axis] + side * shoulder[0] * torso[axis, 1] + shoulder[1] * torso[axis, 2]
+    return joint
+
+
+@inlined_kernel
+def _upright(part: Floats, is_frontal: bool, p: int, shape: Floats) -> None:
+    """Write patch ``p``: a part's frontal trapezoid, in the plane of Y and Z, or its sagittal one.
+
+    Corners: left and right below, then right and left above.
+    """
+    patches = shape.shape[1] // 4
+    half_below = (part[BOTTOM_WIDTH] if is_frontal else part[DEPTH]) / 2
+    half_above = (part[TOP_WIDTH] if is_frontal else part[DEPTH]) / 2
+    for c in range(4):
+        e = c * patches + p
+        half = half_below if c < 2 else half_above
+        aside = half if c == 1 or c == 2 else -half
+        shape[0, e] = part[FORWARD] + (0.0 if is_frontal else aside)
+        shape[1, e] = aside if is_frontal else 0.0
+        shape[2, e] = part[BOTTOM] if c < 2 else part[BOTTOM] + part[HEIGHT]
+
+
+@inlined_kernel
+def _shape_trunk(parts: Floats, shape: Floats) -> None:
+    """Write patches 0 to 7, in the torso's frame; see ``body/cardbox.py``."""
+    _upright(parts[TORSO], True, 0, shape)
+    _upright(parts[TORSO], False, 1, shape)
+    lid(parts[TORSO], 2, shape)
+    _upright(parts[WAIST], True, 3, shape)
+    _upright(parts[WAIST], False, 4, shape)
+    _upright(parts[HEAD], True, 5, shape)
+    _upright(parts[HEAD], False, 6, shape)
+    if parts[NECK, TOP_WIDTH] > 0.0:
+        _upright(parts[NECK], True, 7, shape)
+
+
+@inlined_kernel
+def _shape_arm(parts: Floats, first: int, shape: Floats) -> None:
+    """Write the patches of an upper arm and a forearm, ``first`` on, in their own frames."""
+    _upright(parts[UPPER_ARM], True, first, shape)
+    _upright(parts[UPPER_ARM], False, first + 1, shape)
+    _upright(parts[FOREARM], True, first + 2, shape)
+    _upright(parts[FOREARM], False, first + 3, shape)
+
+
+@inlined_kernel
+def _shape_body(parts: Floats, shape: Floats) -> None:
+    """Write the patches of the trunk, the left and the right arm."""
+    _shape_trunk(parts, shape)
+    for arm in range(2):
+        _shape_arm(parts, TRUNK_PATCHES + ARM_PATCHES * arm, shape)
+
+
+@inlined_kernel
+def _place(
+    shape: Floats, first: int, end: int, rotation: Floats, origin: Floats, corners: Floats
+) -> None:
+    """Turn and move the patches ``first`` to ``end`` from their part's frame to the optical one."""
+    patches = shape.shape[1] // 4
+    for j in range(3):
+        a, b, c, o = rotation[j, 0], rotation[j, 1], rotation[j, 2], origin[j]
+        for corner in range(4):
+            at = corner * patches
+            for e in range(at + first, at + end):
+                x, y, z = shape[0, _index(e)], shape[1, _index(e)], shape[2, _index(e)]
+                corners[j, _index(e)] = o + a * x + b * y + c * z
+
+
+@inlined_kernel
+def _place_trunk(work: Workspace) -> None:
+    """Corners of torso, waist, head and neck, the first patches, in the torso's pose."""
+    _place(work.shape, 0, TRUNK_PATCHES, work.torso, work.hip, work.corners)
+
+
+@inlined_kernel
+def _place_arm(work: Workspace, first: int, angles: Floats, side: float, model: Cardbox) -> None:
+    """Corners of an arm at the torso's pose; ``side`` is 1 for left, -1 for right.
+
+    Its patches are ``first`` on, its angles (4,) abduction and flexion of shoulder and elbow.
+    """
+    elbow, end = first + ARM_PATCHES // 2, first + ARM_PATCHES
+    for j in range(3):
+        work.joint[j] = _joint(j, side, model.shoulder, work.torso, work.hip)
+    turn_limb(work.torso, side * angles[0], angles[1], work.upper_arm)
+    _place(work.shape, first, elbow, work.upper_arm, work.joint, work.corners)
+    for j in range(3):
+        work.joint[j] -= model.parts[UPPER_ARM, HEIGHT] * work.upper_arm[j, 2]
+    turn_limb(work.upper_arm, side * angles[2], angles[3], work.forearm)
+    _place(work.shape, elbow, end, work.forearm, work.joint, work.corners)
+
+
+@inlined_kernel
+def _place_body(work: Workspace, posture: Floats, model: Cardbox) -> None:
+    """Corners of all 16 patches for d1..d12."""
+    torso_pose(posture, model.place, model.camera, work.torso, work.hip)
+    _place_trunk(work)
+    for arm in range(2):
+        first = TRUNK_PATCHES + ARM_PATCHES * arm
+        _place_arm(work, first, angles_in(posture, arm), side_of(arm), model)
+
+
+@kernel
+def trunk_costs(
+    postures: Floats, cardbox: CardboxTuple, row_sums: RowSums, base: int, costs: Counts
+) -> None:
+    """Write the costs (N,) of trunks (N, 4), given the cost ``base`` of drawing nothing."""
+    model = cardbox_of(cardbox)
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    work = new_workspace(TRUNK_PATCHES, rows)
+    _shape_trunk(model.parts, work.shape)
+    for i in range(postures.shape[0]):
+        torso_pose(postures[i], model.place, model.camera, work.torso, work.hip)
+        _place_trunk(work)
+        draw(work, model.camera, rows, width)
+        costs[i] = base + sum_union(work, TRUNK_PATCHES, row_sums)[0]
+
+
+@kernel
+def cover_trunk(
+    torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
+) -> np.int64:
+    """Write the row sums beside a trunk (4,) to ``covered``; return the gain that they lack."""
+    model = cardbox_of(cardbox)
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    work = new_workspace(TRUNK_PATCHES, rows)
+    _shape_trunk(model.parts, work.shape)
+    torso_pose(torso, model.place, model.camera, work.torso, work.hip)
+    _place_trunk(work)
+    draw(work, model.camera, rows, width)
+    cover_patches(work.sides, work.extent, row_sums, covered)
+    gain: np.int64 = sum_union(work, TRUNK_PATCHES, row_sums)[0]
+    return gain
+
+
+@kernel
+def cover_arms(
+    posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
+) -> np.int64:
+    """Write the row sums beside the arms of a posture (12,); return the gain that they lack."""
+    model = cardbox_of(cardbox)
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    work = new_workspace(2 * ARM_PATCHES, rows)
+    torso_pose(posture, model.place, model.camera, work.torso, work.hip)
+    for arm in range(2):
+        first = ARM_PATCHES * arm
+        _shape_arm(model.parts, first, work.shape)
+        _place_arm(work, first, angles_in(posture, arm), side_of(arm), model)
+    draw(work, model.camera, rows, width)
+    cover_patches(work.sides, work.extent, row_sums, covered)
+    gain: np.int64 = sum_union(work, 2 * ARM_PATCHES, row_sums)[0]
+    return gain
+
+
+@kernel
+def arm_costs(
+    postures: Floats,
+    side: float,
+    torso: Floats,
+    cardbox: CardboxTuple,
+    covered: RowSums,
+    base: int,
+    costs: Counts,
+) -> None:
+    """Write the costs (N,) of arms (N, 4) beside a trunk (4,), by its row sums and its cost."""
+    model = cardbox_of(cardbox)
+    rows, width = covered.shape[0], covered.shape[1] - 1
+    work = new_workspace(ARM_PATCHES, rows)
+    _shape_arm(model.parts, 0, work.shape)
+    torso_pose(torso, model.place, model.camera, work.torso, work.hip)
+    for i in range(postures.shape[0]):
+        _place_arm(work, 0, postures[i], side, model)
+        draw(work, model.camera, rows, width)
+        costs[i] = base + sum_union(work, ARM_PATCHES, covered)[0]
+
+
+@kernel
+def full_costs(
+    postures: Floats,
+    cardbox: CardboxTuple,
+    row_sums: RowSums,
+    base: int,
+    costs: Counts,
+    areas: Counts,
+) -> None:
+    """Write costs and drawn areas (N,), px, of whole postures (N, 12)."""
+    model = cardbox_of(cardbox)
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    work = new_workspace(_BODY_PATCHES, rows)
+    _shape_body(model.parts, work.shape)
+    for i in range(postures.shape[0]):
+        _place_body(work, postures[i], model)
+        draw(work, model.camera, rows, width)
+        gain, area = sum_union(work, _BODY_PATCHES, row_sums)
+        costs[i] = base + gain
+        areas[i] = area
+
+
+@kernel
+def body_costs(
+    postures: Floats, bodies: CardboxTuple, row_sums: RowSums, base: int, costs: Counts
+) -> None:
+    """Write the costs (N,) of N ``bodies`` in one place, each in its own posture (N, 12)."""
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    work = new_workspace(_BODY_PATCHES, rows)
+    parts, shoulders, place, camera = bodies
+    for i in range(postures.shape[0]):
+        model = cardbox_of((parts[i], shoulders[i], place, camera))
+        _shape_body(model.parts, work.shape)
+        _place_body(work, postures[i], model)
+        draw(work, model.camera, rows, width)
+        costs[i] = base + sum_union(work, _BODY_PATCHES, row_sums)[0]
+
+
+@kernel
+def polygon_costs(
+    corners_m: Floats, camera: IntrinsicsTuple, row_sums: RowSums, base: int, costs: Counts
+) -> None:
+    """Write the costs (N,) of any quadrilaterals (N, K, 4, 3) of the optical frame, metres."""
+    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    count = corners_m.shape[1]
+    work = new_workspace(count, rows)
+    for i in range(corners_m.shape[0]):
+        for p in range(count):
+            for c in range(4):
+                for axis in range(3):
+                    work.corners[axis, c * count + p] = corners_m[i, p, c, axis]
+        draw(work, Intrinsics(*camera), rows, width)
+        costs[i] = base + sum_union(work, count, row_sums)[0]
+
+
+@kernel
+def keypoints(posture: Floats, cardbox: CardboxTuple, points: Floats) -> None:
+    """Write shoulder, elbow, hand of the left, then the right arm to ``points`` (6, 3).
+
+    Metres in the optical frame.
+    """
+    model = cardbox_of(cardbox)
+    torso, hip = np.empty((3, 3)), np.empty(3)
+    upper_arm, forearm = np.empty((3, 3)), np.empty((3, 3))
+    torso_pose(posture, model.place, model.camera, torso, hip)
+    for arm in range(2):
+        side, angles = side_of(arm), angles_in(posture, arm)
+        turn_limb(torso, side * angles[0], angles[1], upper_arm)
+        turn_limb(upper_arm, side * angles[2], angles[3], forearm)
+        for j in range(3):
+            start = _joint(j, side, model.shoulder, torso, hip)
+            elbow = start - model.parts[UPPER_ARM, HEIGHT] * upper_arm[j, 2]
+            points[3 * arm, j] = start
+            points[3 * arm + 1, j] = elbow
+            points[3 * arm + 2, j] = elbow - model.parts[FOREARM, HEIGHT] * forearm[j, 2]

@@ -1,0 +1,131 @@
+"""Compiled choice and averages of rated states."""
+
+from __future__ import annotations
+
+from math import exp, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.posture import N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import Floats
+from cardbox_tracker.estimation.cost.kinematics import angles_in, pose_arm, side_of
+
+# Metres that a radian of yaw or pitch counts when states are compared.
+_RADIAN_M = 0.3
+Indices = NDArray[np.int64]
+
+
+@kernel
+def spread_of_arm(
+    arms: Floats, ratings: Floats, side: float, spread: float, parts: Floats, girdle: Floats
+) -> tuple[float, float]:
+    """Return the deviations of elbow and hand in the torso's frame, m, weighted by fit.
+
+    Arms (N, 4) weigh exp(-(rating - best) / ``spread``).
+    """
+    points, directions = np.empty((3, 3)), np.empty(6)
+    best = ratings.min()
+    total = 0.0
+    sums, squares = np.zeros((3, 3)), np.zeros((3, 3))
+    for i in range(arms.shape[0]):
+        weight = exp((best - ratings[i]) / spread)
+        if weight < 1e-4:
+            continue
+        pose_arm(arms[i], side, parts, girdle, points, directions)
+        total += weight
+        for j in range(1, 3):
+            for c in range(3):
+                sums[j, c] += weight * points[j, c]
+                squares[j, c] += weight * points[j, c] ** 2
+    elbow, hand = 0.0, 0.0
+    for c in range(3):
+        elbow += max(squares[1, c] / total - (sums[1, c] / total) ** 2, 0.0)
+        hand += max(squares[2, c] / total - (sums[2, c] / total) ** 2, 0.0)
+    return sqrt(elbow), sqrt(hand)
+
+
+@kernel
+def choose_apart(
+    states: Floats,
+    ratings: Floats,
+    most: int,
+    alike: int,
+    apart_m: float,
+    parts: Floats,
+    girdle: Floats,
+) -> Indices:
+    """Return up to ``most`` indices: the best ``alike``, then the best that differ from all chosen.
+
+    States (N, 14) differ if elbows and hands in the torso's frame, its place and its turns, at
+    0.3 m a radian, are ``apart_m`` away, as the root of the summed squares.
+    """
+    order = np.argsort(ratings, kind="mergesort")
+    chosen = np.empty(most, np.int64)
+    features, one = np.empty((most, 16)), np.empty(16)
+    points, directions = np.empty((3, 3)), np.empty(6)
+    found = 0
+    for i in order:
+        state = states[i]
+        for arm in range(2):
+            pose_arm(angles_in(state, arm), side_of(arm), parts, girdle, points, directions)
+            for c in range(3):
+                one[6 * arm + c] = points[1, c]
+                one[6 * arm + 3 + c] = points[2, c]
+        one[12], one[13] = state[TORSO_X], state[TORSO_Y]
+        one[14], one[15] = _RADIAN_M * state[YAW], _RADIAN_M * state[PITCH]
+        is_new = True
+        if found >= alike:
+            for j in range(found):
+                squares = 0.0
+                for c in range(16):
+                    squares += (features[j, c] - one[c]) ** 2
+                if squares < apart_m * apart_m:
+                    is_new = False
+                    break
+        if is_new:
+            features[found] = one
+            chosen[found] = i
+            found += 1
+            if found == most:
+                break
+    return chosen[:found]
+
+
+@kernel
+def best_states(states: Floats, ratings: Floats, count: int) -> Floats:
+    """Return the best ``count`` of ``states`` (N, 14), best first."""
+    order = np.argsort(ratings, kind="mergesort")
+    best = np.empty((count, N_STATE))
+    for i in range(count):
+        best[i] = states[order[i]]
+    return best
+
+
+@kernel
+def mean_and_spread(
+    states: Floats, ratings: Floats, count: int, spread: float
+) -> tuple[Floats, Floats]:
+    """Return the mean (14,) of the best ``count`` states, and deviations (14,) of all around it.
+
+    States (N, 14) weigh exp(-(rating - best) / ``spread``).
+    """
+    order = np.argsort(ratings, kind="mergesort")
+    best = ratings[order[0]]
+    mean, squares = np.zeros(N_STATE), np.zeros(N_STATE)
+    total = 0.0
+    for i in range(min(count, order.shape[0])):
+        weight = exp((best - ratings[order[i]]) / spread)
+        total += weight
+        for d in range(N_STATE):
+            mean[d] += weight * states[order[i], d]
+    for d in range(N_STATE):
+        mean[d] /= total
+    total = 0.0
+    for i in range(states.shape[0]):
+        weight = exp((best - ratings[i]) / spread)
+        total += weight
+        for d in range(N_STATE):
+            squares[d] += weight * (states[i, d] - mean[d]) ** 2
+    return mean, np.sqrt(squares / total)
