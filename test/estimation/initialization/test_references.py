@@ -80,7 +80,7 @@ def test_nobody_in_the_image_is_refused(name: str, advice: str) -> None:
 def test_an_image_full_of_foreground_is_refused() -> None:
     with pytest.raises(
         InitializationError,
-        match=r"reference 'front': 81 % .*background/learn",
+        match=r"'front': 81 % .*learn it again",
     ):
         check_reference("front", block(slice(6, 114), slice(8, 152)))
 

@@ -19,10 +19,10 @@ BODY = BodyModel.of(distance_m=2.3)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fifo", "no file"),
-        ("/dev/zero", "no file"),
-        ("/dev/null", "no file"),
-        (".", "Is a directory"),
+        ("fifo", "a pipe or a device"),
+        ("/dev/zero", "a pipe or a device"),
+        ("/dev/null", "a pipe or a device"),
+        (".", "directory"),
         ("missing/model.yaml", "No such file .*; choose a folder"),
         ("text/model.yaml", "Not a directory"),
         ("n" * 300, "File name too long"),
