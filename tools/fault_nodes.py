@@ -92,7 +92,7 @@ class InsideNodes:
             node.diagnostics.problem(str(error))
 
     def send_all(self, images: Iterable[Sent]) -> None:
-        """Hand over images at once, whatever their pauses."""
+        """Hand over images at once, without their pauses."""
         for sent in images:
             self.send(sent)
 
