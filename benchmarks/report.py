@@ -34,7 +34,8 @@ def report(results: Mapping[str, Any]) -> str:
     parts = [
         "# Benchmarks",
         f"`{COMMAND}` made this page on {results['cpu']} with {results['cores']} cores; "
-        f"{versions}; commit {results['commit']}. [benchmarks.json](benchmarks.json) has all numbers.",
+        f"{versions}; commit {results['commit']}. "
+        "[benchmarks.json](benchmarks.json) has all numbers.",
         "The first four tables were measured on one core, on "
         f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
         "compared trackers take turns of ten images. p95 is the 95th percentile.",
