@@ -27,10 +27,10 @@ VENV := .venv
 BIN := $(CURDIR)/$(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-# Spaces in a path would break the rules of make; no file of ours has any.
+# Spaces in a path would break the rules of make; no file here has any.
 SOURCES := $(shell find cardbox_tracker config launch resource -type f \
 	-not -path '*/__pycache__/*' -not -path '*/.*')
-# A deleted or renamed file is no newer than the stamp; the list of the names shows it.
+# A deleted or renamed file is no newer than the stamp, so the name of the stamp has a checksum.
 NAMES := $(VENV)/sources-$(firstword $(shell printf '%s\n' $(sort $(SOURCES)) | cksum))
 
 .PHONY: help
@@ -73,8 +73,8 @@ lint: $(VENV)/package
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-# Optional libraries, 170 MB for 'view' and 80 for 'retarget', so that their tests are not skipped.
-# 'make setup' does without. By their names, for '.[view]' would install the package once more.
+# Their tests would be skipped without these optional libraries, 170 MB for 'view' and 80 for
+# 'retarget'. They are installed by name, because '.[view]' would install the package once more.
 NEEDED = import importlib.metadata, re; print(*(line.split(";")[0] for line in \
 	importlib.metadata.requires("cardbox_tracker") \
 	if re.search("extra == .(view|retarget)", line)), sep="\n")
@@ -91,7 +91,7 @@ test: lint $(VENV)/extras
 demo: setup
 	$(BIN)/cardbox demo --output demo_output
 
-# The commands of the README, with the times of the synthetic session.
+# These are the commands of the README, with the times of the synthetic session.
 .PHONY: example
 example: setup
 	@mkdir -p example
@@ -101,7 +101,6 @@ example: setup
 	$(BIN)/cardbox track example/session --model example/person.yaml --background 0:3.9 \
 		--start 15.6 --force --csv example/person.csv --video example/person.mp4 --bag example/results
 
-# Few need the extra 'mediapipe', which replaces NumPy by an older one.
 .PHONY: benchmark
 benchmark: setup
 	$(BIN)/cardbox benchmark --json docs/benchmarks.json --report docs/benchmarks.md
@@ -114,7 +113,7 @@ experiments: setup
 	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
 	$(BIN)/python -m tools.readme_figures
 
-# All recorded sessions that lie beside the checkout, against their ground truth.
+# This compares all recorded sessions beside the checkout with their ground truth.
 DATA ?= ../shared/data
 SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json))
 .PHONY: sessions
@@ -128,7 +127,7 @@ EXAMPLES ?= 100000
 reliability: $(VENV)/package
 	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
 
-# In a copy, as in a workspace of its own. 'make test' has run the slow tests already.
+# The build uses a copy, like a workspace of its own. 'make test' runs the slow tests.
 COLCON := build/colcon
 .PHONY: colcon
 colcon: setup

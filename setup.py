@@ -8,11 +8,11 @@ NAME = "cardbox_tracker"
 SHARE = f"share/{NAME}"
 HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
-# On a ROS installation these come with it, so pip installs them only when asked to.
+# A ROS installation has these, so pip installs them only on request.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
-# Learns the package's networks and coefficients anew. 3 GB, so only for those who do.
+# The tools that train the package's networks and coefficients need these 3 GB.
 LEARN = ["scikit-learn>=1.4,<2", "torch>=2.2,<3"]
-# The paper's experiments, in a checkout.
+# The paper's experiments need this; a checkout has them.
 EXPERIMENTS = ["joblib>=1.3,<2"]
 TEST = [
     *EXPERIMENTS,
@@ -30,9 +30,9 @@ TEST = [
     "types-tqdm",
     "yourdfpy>=0.0.56",
 ]
-# 170 MB, so only for those who want the viewer. Its interface changes with each minor version.
+# The viewer, 170 MB; its interface changes with each minor version.
 VIEW = ["rerun-sdk>=0.41,<0.42"]
-# Inverse kinematics of a robot's hand; a joint map does without.
+# Inverse kinematics of a robot's hand; a joint map needs none of these.
 RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
@@ -73,8 +73,8 @@ setup(
         (f"{SHARE}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     python_requires=">=3.11",
-    # Bounded by the next version that may break what we use of it: a major one, or before 1.0 a
-    # minor one of rosbags, whose interface still changes.
+    # The upper bound is the next version that may break the interface: a major one, but a minor
+    # one of rosbags, whose interface still changes.
     install_requires=[
         "lz4>=4.3,<5",
         "matplotlib>=3.8,<4",
@@ -91,7 +91,6 @@ setup(
         "colcon": COLCON,
         "view": VIEW,
         "retarget": RETARGET,
-        "mediapipe": ["mediapipe==0.10.21"],
         "learn": LEARN,
         "experiments": EXPERIMENTS,
     },

@@ -42,7 +42,7 @@ _MOST_S = 3.0
 def follow(
     scene: BenchmarkScene, config: TrackerConfig, cost: str = "compiled"
 ) -> Callable[[int], object]:
-    """Return what tracks the ``i``-th silhouette of ``scene``."""
+    """Return a function that tracks the ``i``-th silhouette of ``scene``."""
     made = make_silhouette_term(cost, scene.body, scene.camera)
     tracker = Tracker(scene.body, scene.camera, config, silhouette=made)
     return partial(_track, tracker, scene)
@@ -55,10 +55,10 @@ def _track(tracker: Tracker, scene: BenchmarkScene, i: int) -> object:
 def frame_times_ms(
     scene: BenchmarkScene, trackers: dict[str, Callable[[int], object]]
 ) -> dict[str, Times]:
-    """Let each of ``trackers`` do all images, in turns; milliseconds of each image, (n,).
+    """Let ``trackers`` process all images in turns; return milliseconds of each image, (n,).
 
-    In the first images of a turn the caches hold the data of the others, which does not happen in a
-    live node; these images count too. Only those of the warm-up are left out.
+    At the beginning of a turn the caches hold the data of other trackers, unlike in a live node.
+    These images count; only those of the warm-up are left out.
     """
     times: dict[str, list[float]] = {name: [] for name in trackers}
     count = len(scene.silhouettes)
@@ -72,9 +72,9 @@ def frame_times_ms(
 
 
 def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
-    """Measure a whole frame: with the paper's settings, with OpenCV's cost, with the default ones.
+    """Measure a whole frame: with both presets, and with the cost drawn by OpenCV.
 
-    ``image_to_posture`` also cuts the silhouette out of the image.
+    ``image_to_posture`` also computes the silhouette from the image.
     """
     extractor = extractor_of(scene)
     whole = Tracker(scene.body, scene.camera, paper_preset())
@@ -96,7 +96,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
 def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
     """Measure a frame, image to posture with the default preset, a 30th of a second apart.
 
-    As in a live node: while it waits, the processor slows down and its caches lose its data.
+    While a live node waits, the processor slows down and the caches lose its data.
     """
     extractor = extractor_of(scene)
     tracker = Tracker(scene.body, scene.camera, default_preset())
@@ -114,9 +114,9 @@ def measure_after_pauses(scene: BenchmarkScene) -> dict[str, float]:
 
 
 def measure_models(scene: BenchmarkScene, particles: int = 200, rounds: int = 30) -> float:
-    """Return how many times as long the box model takes as the cardbox, both compiled.
+    """Return the ratio of the time of the box model to that of the cardbox, both compiled.
 
-    Corners are computed beforehand: only drawing 42 planes and 15 planes is compared.
+    Corners are computed beforehand, so only drawing 42 planes and 15 planes is compared.
     """
     rng = np.random.default_rng(0)
     front = reference_posture("front")
@@ -148,7 +148,7 @@ def measure_resolutions(scenes: list[BenchmarkScene]) -> dict[str, dict[str, flo
 def measure_particles(
     scene: BenchmarkScene, counts: tuple[int, ...] = PARTICLES
 ) -> dict[str, float]:
-    """Measure a frame for several numbers of particles in all filters: median by number, ms."""
+    """Measure the median time of a frame, ms, by the number of particles in all filters."""
     result: dict[str, float] = {}
     for count in counts:
         config = paper_preset().with_particles(count // 3)
@@ -165,7 +165,7 @@ def measure_particles(
 
 
 def particles_at_30hz(particles: dict[str, float]) -> int:
-    """Return how many particles a core manages in 1/30 s, interpolated between those measured."""
+    """Return the number of particles that take 1/30 s on a core, interpolated linearly."""
     counts = np.array([float(count) for count in particles])
     times = np.maximum.accumulate(np.array(list(particles.values())))
     if times[0] > FRAME_30HZ_MS:
@@ -174,7 +174,7 @@ def particles_at_30hz(particles: dict[str, float]) -> int:
 
 
 def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]:
-    """Measure all that needs no ROS; ``report`` is told the finished fraction."""
+    """Measure everything that needs no ROS; ``report`` gets the finished fraction."""
     with pinned(1):
         scene = make_scene(320, 240, frames)
         results = measure_frames(scene)

@@ -1,9 +1,9 @@
 """Latency of the nodes from an image's stamp to the joint states, over real DDS.
 
-A publisher in this process plays a camera: the empty scene, then a person who waves to and fro,
-each image stamped with the time it is sent. The nodes are started as a user would, each a process
-of its own or all in one. The latency ends when a subscriber's callback has the JointState with that
-stamp; the time of its arrival in the subscriber's process is measured, too.
+A publisher in this process plays a camera: the empty scene, then a person who waves, each image
+stamped with the time at which it is sent. The nodes run each in a process of its own or all in one.
+The latency ends when a subscriber's callback has the JointState with that stamp; the time of its
+arrival in the subscriber's process is measured, too.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _measure(
 
 
 class _CameraAndListener:
-    """Publishes images and takes note of when their joint states arrive."""
+    """Publishes images and records the arrival times of their joint states."""
 
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
         import rclpy
@@ -128,9 +128,9 @@ class _CameraAndListener:
                 self._ready.add(status.name.rpartition(": ")[2])
 
     def start(self, name: str, model: Path) -> float:
-        """Start a process; return how long it took until its nodes said that they are ready, s.
+        """Start a process; return the time until its nodes report that they are ready, s.
 
-        They say so once a second.
+        The diagnostics are published once a second.
         """
         began = time.monotonic()
         together = name in TOGETHER
@@ -146,7 +146,7 @@ class _CameraAndListener:
         return time.monotonic() - began
 
     def learn(self, scene: BenchmarkScene, encoding: str) -> None:
-        """Show the empty scene until silhouettes come; the camera changed, so it is learned."""
+        """Publish the empty scene of a new camera until the background is learned."""
         end = time.monotonic() + _START_S
         while self._info.get_subscription_count() == 0 or self._image.get_subscription_count() == 0:
             time.sleep(0.05)
@@ -191,7 +191,7 @@ class _CameraAndListener:
         }
 
     def _publish(self, scene: BenchmarkScene, pixels: NDArray[np.uint8], encoding: str) -> int:
-        """Publish an image, then its calibration, as drivers do, stamped now; the stamp in ns."""
+        """Publish an image and its calibration, stamped now; return the stamp in ns."""
         from builtin_interfaces.msg import Time
         from std_msgs.msg import Header
 
@@ -208,7 +208,7 @@ class _CameraAndListener:
         return now_ns
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Destroy node and executor."""
         from rclpy.utilities import try_shutdown
 
         self._executor.shutdown()
@@ -225,12 +225,12 @@ def _listen(executor: Any) -> None:
 
 
 def _cpu_s(pid: int) -> float:
-    """Processor time of a process so far, seconds."""
+    """Return the processor time of a process so far, seconds."""
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _rss_mb(pid: int) -> float:
-    """Memory that a process holds, MB."""
+    """Return the resident memory of a process, MB."""
     pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -33,11 +33,12 @@ def report(results: Mapping[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
     parts = [
         "# Benchmarks",
-        f"Made by `{COMMAND}` on {results['cpu']} with {results['cores']} cores; {versions}; "
-        f"commit {results['commit']}. Numbers: [benchmarks.json](benchmarks.json).",
+        f"`{COMMAND}` made this page on {results['cpu']} with {results['cores']} cores; "
+        f"{versions}; commit {results['commit']}. "
+        "[benchmarks.json](benchmarks.json) has all numbers.",
         "The first four tables were measured on one core, on "
-        f"{results['measured_frames']} images (320x240) of a synthetic person who waves. What is "
-        "compared takes turns of ten images. p95 is the 95th percentile.",
+        f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
+        "compared trackers take turns of ten images. p95 is the 95th percentile.",
         "## One image",
         _table(
             ("600 particles unless the preset says otherwise", "median", "p95"),
@@ -46,8 +47,7 @@ def report(results: Mapping[str, Any]) -> str:
         f"The compiled cost makes an image {results['ratio_opencv']:.0f} times faster than "
         "`fillConvexPoly`, XOR and `countNonZero` do. Drawn by the same compiled code, the "
         f"volumetric model of 42 planes takes {results['ratio_volumetric']:.1f} times as long as "
-        f"the cardbox model of 15. {_mediapipe(results)} The process holds "
-        f"{results['rss_mb']:.0f} MB.",
+        f"the cardbox model of 15. The process holds {results['rss_mb']:.0f} MB.",
         "## Stages",
         _table(
             ("step", "median", "p95"),
@@ -87,23 +87,8 @@ def readme_section(results: Mapping[str, Any]) -> str:
             "the same with OpenCV drawing the patches takes",
             f"{results['ratio_opencv']:.0f} times as long",
         ),
+        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}"),
     ]
-    if results["ratio_mediapipe"] is not None:
-        measured = results["mediapipe"]
-        rows += [
-            (
-                "MediaPipe Pose (full) on the same synthetic images, one core, takes (it finds a "
-                f"person in {100 * measured['found']:.0f} % of them)",
-                f"{measured['ratio']:.0f} times as long",
-            ),
-            (
-                "the same, compared with image to posture",
-                f"{measured['ratio_from_image']:.1f} times as long",
-            ),
-        ]
-    rows.append(
-        ("particles per image that one core manages at 30 Hz", f"{results['particles_at_30hz']:,}")
-    )
     nodes = results["nodes"]
     for words, measured in (
         (("all nodes in one process", nodes["single_process"]), ("each in its own", nodes))
@@ -156,19 +141,6 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
         f"Ready after: {ready} (from the start of the process, with compiled code in the cache). "
         f"Memory: {memory}.",
     ]
-
-
-def _mediapipe(results: Mapping[str, Any]) -> str:
-    measured = results["mediapipe"]
-    if measured is None:
-        return "MediaPipe was not installed."
-    return (
-        f"MediaPipe Pose, full model, takes {measured['median_ms']:.1f} ms per image: "
-        f"{measured['ratio']:.0f} times as long as silhouette to posture, "
-        f"{measured['ratio_from_image']:.1f} times as long as image to posture. It finds a person "
-        f"in {100 * measured['found']:.0f} % of these synthetic images, and its time depends on "
-        "whether it does."
-    )
 
 
 def _ms(times: Mapping[str, float]) -> tuple[str, str]:

@@ -22,10 +22,10 @@ class BenchmarkScene:
 
     Attributes:
         body: the person.
-        camera: the camera they stand in front of.
-        empty: the scene without them, (m, H, W), brightness.
-        images: with them, (n, H, W), brightness.
-        silhouettes: exact, (n, H, W), 0 or 255.
+        camera: the camera in front of the person.
+        empty: images of the empty scene, (m, H, W), brightness.
+        images: images with the person, (n, H, W), brightness.
+        silhouettes: exact silhouettes, (n, H, W), 0 or 255.
     """
 
     body: BodyModel

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
-    """Measure the steps of a frame one by one, on the particles of a tracker at work."""
+    """Measure the steps of a frame one by one, on the particles of a running tracker."""
     extractor = extractor_of(scene)
     paper = paper_preset()
     term = CompiledSilhouette(scene.body, scene.camera)
@@ -52,7 +52,7 @@ def measure_stages(scene: BenchmarkScene) -> dict[str, dict[str, float]]:
 
 
 class _Filters:
-    """A tracker whose filters can be looked at."""
+    """A hierarchical filter with access to its parts."""
 
     def __init__(
         self, config: TrackerConfig, scene: BenchmarkScene, term: CompiledSilhouette

@@ -14,14 +14,14 @@ from benchmarks.scene import BenchmarkScene
 from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
 
 WARM_UP = 5
-"""Number of first images that are not counted: they wait for memory and for the compiler."""
+"""Number of first images that do not count, as they allocate memory and compile code."""
 
 Times = NDArray[np.float64]
 
 
 @contextmanager
 def pinned(cores: int) -> Iterator[int]:
-    """Keep this thread, and those it starts, on the first ``cores`` cores; yields how many."""
+    """Pin this thread, and those it starts, to the first ``cores`` cores; yield their number."""
     before = os.sched_getaffinity(0)
     chosen = sorted(before)[:cores]
     os.sched_setaffinity(0, chosen)
@@ -40,7 +40,7 @@ def summary(milliseconds: Times | list[float]) -> dict[str, float]:
 
 
 def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
-    """Return what cuts the person out, with the scene's background learned."""
+    """Return an extractor of silhouettes with the learned background of ``scene``."""
     learner = BackgroundLearner()
     for image in scene.empty:
         learner.add(image)
@@ -48,7 +48,7 @@ def extractor_of(scene: BenchmarkScene) -> SilhouetteExtractor:
 
 
 def rss_mb() -> float:
-    """Return the memory that this process holds, in MB; not a number where the system hides it."""
+    """Return the resident memory of this process in MB, or NaN where the system hides it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except OSError:

@@ -1,3 +1,3 @@
-"""What rosdoc2 hands on to Sphinx: links to headings inside the documents."""
+"""Settings of rosdoc2 for Sphinx: links to headings inside the documents."""
 
 myst_heading_anchors = 4

@@ -1,7 +1,7 @@
-"""The settings that each experiment tracks, and its results.
+"""The settings that each experiment compares, and its results.
 
-A cell is one setting on one motion; it has a path in ``results.json``, such as
-("survival_rate", "fast", "0.2"), under which its figures go by motion.
+A cell is one setting on one motion. Its path, such as ("survival_rate", "fast", "0.2"), is the
+place of its figures in ``results.json``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from experiments.tracking import (
 )
 
 COMPARED = ("drs", "srs")
-"""The strategies of the paper."""
+"""The strategies that the paper compares."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class CellFactory:
     """Makes cells of settings on the sessions of one evaluation."""
 
     def __init__(self, sessions: Mapping[str, Session], seed: int) -> None:
-        """Take the session of each motion."""
+        """Store the session of each motion, and the seed."""
         self._sessions = sessions
         self._seed = seed
 
@@ -76,7 +76,7 @@ class CellFactory:
 
 
 def main_cells(factory: CellFactory, runs: int) -> list[Cell]:
-    """Experiments 1 to 3: Table I with DRS and with SRS."""
+    """Return the cells of experiments 1 to 3: Table I with DRS and with SRS."""
     return [
         cell
         for strategy in COMPARED
@@ -85,7 +85,7 @@ def main_cells(factory: CellFactory, runs: int) -> list[Cell]:
 
 
 def side_cells(factory: CellFactory, plan: Plan) -> list[Cell]:
-    """Experiments 4, 5, 6 and 9, and the variants that go beyond the paper."""
+    """Return the cells of experiments 4, 5, 6 and 9, and of the variants beyond the paper."""
     paper = paper_preset()
     cells: list[Cell] = []
     for speed, every in plan.speeds:
@@ -114,7 +114,7 @@ def side_cells(factory: CellFactory, plan: Plan) -> list[Cell]:
 
 
 def _both(config: TrackerConfig, **changes: Any) -> TrackerConfig:
-    """``config`` with the same change in the filters of torso and arms."""
+    """Return ``config`` with the same change in the filters of torso and arms."""
     return replace(
         config, torso=replace(config.torso, **changes), arm=replace(config.arm, **changes)
     )

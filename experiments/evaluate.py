@@ -16,7 +16,7 @@ from experiments.cells import Cell, CellFactory, main_cells, side_cells, side_re
 from experiments.measuring import person_calls, seed_calls, summarize_measuring
 from experiments.models import microseconds_a_particle
 from experiments.parallel import Call, Done, Progress, Runner
-from experiments.plan import Plan, full_plan, quick_plan
+from experiments.plan import Plan
 from experiments.plots import plot_all
 from experiments.report import write_report
 from experiments.results import Curves, write_curves
@@ -29,24 +29,20 @@ Results = dict[str, Any]
 
 def evaluate(
     output: Path,
-    runs: int,
+    plan: Plan,
     seed: int = 0,
-    quick: bool = False,
     session: Path | None = None,
     jobs: int = 1,
-    plan: Plan | None = None,
     progress: Progress = progress_bar,
 ) -> Results:
-    """Run the experiments and write everything into ``output``; resumes what was interrupted.
+    """Run the experiments and write everything into ``output``; resume an interrupted run.
 
     Args:
         output: folder of ``results.json``, ``report.md``, figures, and the cache ``parts``.
-        runs: of experiments 1 to 3; at least 2, as a standard deviation needs.
-        seed: the same seed and runs give the same ``results.json``.
-        quick: everything smaller.
-        session: a recorded session with ground truth: experiments 1 to 3 on it alone.
-        jobs: processes.
-        plan: other sizes of the experiments, instead of ``runs`` and ``quick``.
+        plan: sizes of the experiments; a standard deviation needs two runs or more.
+        seed: the same seed and plan give the same ``results.json``.
+        session: a recorded session with ground truth, for experiments 1 to 3 on it alone.
+        jobs: number of processes.
         progress: makes a progress bar.
 
     Returns:
@@ -55,12 +51,11 @@ def evaluate(
     Raises:
         CardboxError: the output cannot be written, or the session cannot be read.
     """
-    if runs < 2:
-        raise CardboxError(f"runs is {runs}; expected 2 or more, to tell how they differ")
+    if plan.runs < 2:
+        raise CardboxError(f"runs is {plan.runs}; expected 2 or more for a standard deviation")
     start = time.perf_counter()
-    # Once and here, before several processes would do so at the same time.
+    # Compile before the processes start, which would all compile the same code.
     compile_all()
-    plan = plan or (quick_plan if quick else full_plan)(runs)
     runner = Runner(output / "parts", jobs, progress)
     if session is None:
         sessions = _synthetic_sessions(runner, plan, seed)
@@ -91,10 +86,10 @@ def evaluate(
             "images": len(read.silhouettes),
         }
     results |= {
-        "command": _command(output, runs, seed, quick, session),
+        "command": _command(output, plan, seed, session),
         "seed": seed,
         "runs": plan.runs,
-        "quick": quick,
+        "quick": plan.quick,
         **provenance(),
     }
     timing |= {"jobs": jobs, "wall_s": time.perf_counter() - start}
@@ -156,7 +151,7 @@ def _side_timing(
         "particle_us": microseconds_a_particle(
             session.body, session.camera, middle, 200, plan.timing_rounds
         ),
-        # While all cores are busy.
+        # This is measured while all cores are busy.
         "frame_ms": 1e3 * main_s / images,
         "processor_s": {name: _processor_s(cells, done) for name, cells in by_name.items()}
         | {
@@ -170,12 +165,12 @@ def _processor_s(cells: list[Cell], done: Mapping[Call, Done]) -> float:
     return sum(done[call].seconds for call in {call for cell in cells for call in cell.calls})
 
 
-def _command(output: Path, runs: int, seed: int, quick: bool, session: Path | None) -> str:
-    words = [f"cardbox evaluate --runs {runs}"]
+def _command(output: Path, plan: Plan, seed: int, session: Path | None) -> str:
+    words = [f"cardbox evaluate --runs {plan.runs}"]
     if session is not None:
         words.append(f"--session {session}")
     words.append(f"--output {output}")
-    if quick:
+    if plan.quick:
         words.append("--quick")
     words.append(f"--seed {seed}")
     return " ".join(words)

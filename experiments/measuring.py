@@ -1,9 +1,8 @@
 """Accuracy of the measured sizes of people (experiment 8).
 
-Two things are measured separately: the errors of the 18 sizes of many random people, each measured
-once, and the spread of the sizes of one person when only the seed of the search differs. The
-references are drawn without sensor noise, but with angles that are a few degrees off, as those of
-real people are.
+Two quantities are separate: the errors of the 18 sizes of many random people, each measured once,
+and the spread of the sizes of one person over seeds of the search. The references are drawn without
+sensor noise, with angles that differ by some degrees from the reference posture, as people's do.
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ FloatArray = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 
 DISTANCE_M = 2.4
-"""Far enough that the longest arms stay in the image when stretched."""
+"""Distance at which the longest arms fit into the image when stretched."""
 
 POSTURE_MISS_DEG = 2.0
-"""Standard deviation by which each angle of a reference posture is missed."""
+"""Standard deviation of each angle from the reference posture."""
 
 ROUNDS = 60
-"""The curves of cost against rounds end here; a search that ends earlier keeps its last cost."""
+"""Length of the curves of cost against rounds; a shorter search keeps its last cost."""
 
 
 def person_calls(bodies: int, seed: int) -> list[Call]:
@@ -74,7 +73,7 @@ def measure(seed: int, person: int, search_seed: int) -> Arrays:
         posture = reference_posture(name)
         posture[1:] += rng.normal(0.0, np.radians(POSTURE_MISS_DEG), N_JOINTS - 1)
         references[name] = renderer.silhouette(body, posture)
-    # Every random person counts, also one that the initialization would refuse.
+    # Without these limits the initialization would refuse some people.
     config = InitializationConfig(
         distance_m=DISTANCE_M, min_iou=0.0, least_iou=0.0, check_postures=False, seed=search_seed
     )
@@ -99,7 +98,7 @@ def measure(seed: int, person: int, search_seed: int) -> Arrays:
 def summarize_measuring(
     people: Sequence[Arrays], seeds: Sequence[Arrays]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the results of experiment 8, and the seconds a search took.
+    """Return the results of experiment 8, and the duration of a search, seconds.
 
     Args:
         people: results of :func:`measure`, one for each person.

@@ -1,4 +1,4 @@
-"""The cardbox against the volumetric model (experiment 6): the same code draws either.
+"""Compare the cardbox with the volumetric model (experiment 6); the same code draws both.
 
 :class:`PlaneSilhouette` draws any set of planes with OpenCV and counts the pixels of the XOR, so
 the two models differ only in their planes. Both take the same 18 sizes; the boxes are as large as
@@ -42,7 +42,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Planes(NamedTuple):
-    """A model of the body: its planes, and which of them belong to trunk and arms."""
+    """The planes of a body model, and the slices of trunk and arms."""
 
     corners_m: Callable[[BodyModel, FloatArray], FloatArray]
     n_planes: int
@@ -136,9 +136,9 @@ class PlaneObservation(SilhouetteObservation):
         return np.zeros((self.frame.rows, self.camera.width), np.uint8)
 
     def _project(self, postures: FloatArray) -> NDArray[np.int32]:
-        """Outlines (N, planes, n, 2) in pixels with ``_SHIFT`` fractional bits.
+        """Return outlines (N, planes, n, 2) in pixels with ``_SHIFT`` fractional bits.
 
-        n is 4 unless the near plane cuts any of them.
+        n is 4, or 6 if the near plane cuts any of them.
         """
         optical = self.camera.reference_to_optical(self.planes.corners_m(self.body, postures))
         if not in_front(optical).all():
@@ -159,9 +159,9 @@ class PlaneObservation(SilhouetteObservation):
 
 
 def _cut(corners_m: FloatArray) -> FloatArray:
-    """Cut planes (N, planes, 4, 3) at the near plane: (N, planes, 6, 3), the last corner repeated.
+    """Clip planes (N, planes, 4, 3) at the near plane; return (N, planes, 6, 3).
 
-    A plane behind it gets corners far outside of any image.
+    The last corner is repeated; a plane behind the near plane gets corners outside of any image.
     """
     cut = np.empty((*corners_m.shape[:-2], 6, 3))
     for index in np.ndindex(corners_m.shape[:-2]):
@@ -189,7 +189,7 @@ def make_silhouette_term(name: str, body: BodyModel, camera: Camera) -> Silhouet
 def microseconds_a_particle(
     body: BodyModel, camera: Camera, silhouette: Silhouette, particles: int, rounds: int
 ) -> dict[str, float]:
-    """Measure how long the full cost of one posture takes with each model, microseconds.
+    """Measure the time of the full cost of one posture with each model, microseconds.
 
     The models take turns, so that other load on the machine affects both; medians are compared.
     """

@@ -22,7 +22,7 @@ Progress = Callable[[str], AbstractContextManager[Callable[[float], None]]]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of a module, which other processes can import, and its arguments; hashable."""
+    """A function that other processes can import, and its arguments; hashable."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
@@ -42,7 +42,7 @@ class Runner:
         """Make the folder of results.
 
         Args:
-            folder: of the cache; results of other sources are not reused.
+            folder: folder of the cache, which holds results of the present sources only.
             jobs: number of processes; 1 stays in this one.
             progress: makes a progress bar.
 
@@ -61,15 +61,15 @@ class Runner:
         self._jobs, self._progress = jobs, progress
 
     def run(self, text: str, calls: Iterable[Call]) -> dict[Call, Done]:
-        """Return the results of all calls; equal ones are done once.
+        """Return the results of all calls; equal calls run once.
 
         Args:
-            text: names the progress bar.
+            text: name of the progress bar.
             calls: in any order.
         """
         distinct = list(dict.fromkeys(calls))
         perform = delayed(self._memory.cache(_perform))
-        # Without memory maps, arguments have the same hash in each process.
+        # Memory maps would change the hash of arguments between processes.
         parallel = Parallel(self._jobs, return_as="generator", batch_size=1, max_nbytes=None)
         done = {}
         with self._progress(text) as show:

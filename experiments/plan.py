@@ -1,4 +1,4 @@
-"""The size of an evaluation: numbers of runs, and the values that are tried."""
+"""The size of an evaluation: numbers of runs, and the values of the parameters."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ class Plan:
         side_runs: of each setting of experiments 4 and 9.
         particle_runs: of each setting of experiment 5.
         model_runs: of each model of experiment 6.
-        model_every: experiment 6 tracks only each image of this number.
-        bodies: random people of experiment 8.
-        seeds: seeds of experiment 8.
+        model_every: stride of experiment 6 through the images.
+        bodies: number of random people of experiment 8.
+        seeds: number of seeds of experiment 8.
         survival_rates: e of experiment 4.
         particles: N of each filter in experiment 5.
         speeds: name and stride of experiment 4: each image, each third, each sixth.
         fps: images a second of the synthetic sessions.
         size: their width and height, px.
         timing_rounds: repetitions of the timing of experiment 6.
+        quick: whether this is a check that all works; the report says so.
     """
 
     runs: int
@@ -38,6 +39,7 @@ class Plan:
     fps: float = 15.0
     size: tuple[int, int] = (320, 240)
     timing_rounds: int = 50
+    quick: bool = False
 
 
 def full_plan(runs: int) -> Plan:
@@ -58,4 +60,5 @@ def quick_plan(runs: int) -> Plan:
         survival_rates=(0.005, 0.2, 0.4, 1.0),
         particles=(25, 100, 400),
         timing_rounds=10,
+        quick=True,
     )

@@ -21,7 +21,7 @@ matplotlib.use("Agg")
 
 COLOURS = {"drs": "tab:blue", "srs": "tab:orange"}
 ELBOW = "left_elbow_abduction"
-"""The angle of the reproducibility plot; the waving turns it."""
+"""The angle of the reproducibility plot, which changes most in the waving motion."""
 
 _DPI = 80
 
@@ -47,7 +47,7 @@ def plot_all(
 
 
 def plot_errors(motion: str, curves: Curves, path: Path) -> None:
-    """Error of each of the six joints, per image (the paper's figures GT1 and GT2)."""
+    """Plot the error of each of the six joints, per image (the paper's figures GT1 and GT2)."""
     with _figure(path, 2, 3, (12, 5.2), sharex=True, sharey=True) as axes:
         for axis, name in zip(axes.ravel(), KEYPOINT_NAMES, strict=True):
             for strategy, colour in COLOURS.items():
@@ -63,7 +63,7 @@ def plot_errors(motion: str, curves: Curves, path: Path) -> None:
 
 
 def plot_costs(motions: list[str], curves: Curves, path: Path) -> None:
-    """Cost of the system's output, per image."""
+    """Plot the cost of the system's output, per image."""
     with _figure(path, 1, len(motions), (4.2 * len(motions), 3.2), sharey=True) as axes:
         for axis, motion in zip(axes[0], motions, strict=True):
             for strategy, colour in COLOURS.items():
@@ -78,7 +78,7 @@ def plot_costs(motions: list[str], curves: Curves, path: Path) -> None:
 def plot_elbow(
     motions: list[str], curves: Curves, true_postures: Mapping[str, FloatArray], path: Path
 ) -> None:
-    """Mean of one elbow angle and the lines one standard deviation off."""
+    """Plot the mean of one elbow angle and one standard deviation to each side."""
     with _figure(path, 1, len(motions), (4.8 * len(motions), 3.6), sharey=True) as axes:
         for axis, motion in zip(axes[0], motions, strict=True):
             for strategy, colour in COLOURS.items():
@@ -98,7 +98,7 @@ def plot_elbow(
 
 
 def plot_survival(results: Mapping[str, Any], path: Path) -> None:
-    """Error and cost against the survival rate, for each speed."""
+    """Plot error and cost against the survival rate, for each speed."""
     with _figure(path, 1, 2, (10, 3.6)) as axes:
         for speed, by_rate in results.items():
             rates = [float(rate) for rate in by_rate]
@@ -118,7 +118,7 @@ def plot_survival(results: Mapping[str, Any], path: Path) -> None:
 
 
 def plot_particles(results: Mapping[str, Any], path: Path) -> None:
-    """Error and cost against the number of particles."""
+    """Plot error and cost against the number of particles."""
     with _figure(path, 1, 2, (10, 3.6)) as axes:
         for strategy, by_count in results.items():
             counts = [int(count) for count in by_count]
@@ -138,7 +138,7 @@ def plot_particles(results: Mapping[str, Any], path: Path) -> None:
 
 
 def plot_schemes(results: Mapping[str, Any], path: Path) -> None:
-    """Error and cost of every resampling scheme, with and without the elite particle."""
+    """Plot error and cost of each resampling scheme, with and without the elite particle."""
     with _figure(path, 1, 2, (10, 3.6)) as axes:
         places = np.arange(len(results))
         for axis, name, scale, what in (
@@ -154,7 +154,7 @@ def plot_schemes(results: Mapping[str, Any], path: Path) -> None:
 
 
 def plot_initialization(results: Mapping[str, Any], path: Path) -> None:
-    """Cost against rounds, and the error of each size."""
+    """Plot the cost against rounds, and the error of each size."""
     with _figure(path, 1, 2, (12, 4.6)) as axes:
         curve, bars = axes[0]
         labels = {"O1": "O1: front", "O2": "O2: side", "O3": "O3: arms"}
@@ -187,7 +187,7 @@ def plot_initialization(results: Mapping[str, Any], path: Path) -> None:
 def _figure(
     path: Path, rows: int, columns: int, size: tuple[float, float], **options: Any
 ) -> Iterator[Any]:
-    """Yield axes (rows, columns); save the figure when all is drawn."""
+    """Yield axes (rows, columns), and save the figure in the end."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, **options)

@@ -1,4 +1,4 @@
-"""``report.md``: the results in tables and figures."""
+"""Write ``report.md`` with the results in tables and figures."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ _COMPARED = (
     ("3D error of elbows and hands, cm", "error_m", _ELBOWS_AND_HANDS, 100.0, 1),
     ("standard deviation over the runs, rad or m", "std_dof", JOINT_NAMES, 1.0, 3),
 )
-"""Figures in which the paper says that DRS is below SRS: text, key, names, factor, digits."""
+"""Figures in which DRS is below SRS in the paper: text, key, names, factor, digits."""
 
 
 def _below(

@@ -1,6 +1,6 @@
 """Image sequences in the style of the paper's figures (experiment 7).
 
-One column an image; rows: the best estimate, the matching result, the raw image.
+Each column is an image; the rows have the best estimate, the matching result and the raw image.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def write_sequence(
 
 
 def draw_estimate(body: BodyModel, camera: Camera, posture: NDArray[np.float64]) -> ImageArray:
-    """Return the model's patches on white, (H, W, 3) bgr; the nearest are drawn last."""
+    """Return the model's patches on white, (H, W, 3) bgr, the nearest on top."""
     canvas = np.full((camera.height, camera.width, 3), 255, np.uint8)
     if np.any(np.isnan(posture)):
         return canvas

@@ -1,6 +1,6 @@
-"""The input of the experiments: silhouettes of a session, with the truth of each image.
+"""The input of the experiments: silhouettes of a session, and the truth of each image.
 
-A session is a recording with ``ground_truth.json``, synthetic or real. Background and sizes of the
+A session is a synthetic or real recording with ``ground_truth.json``. Background and sizes of the
 person are learned from its own segments ``empty``, ``front``, ``side`` and ``arms``; tracking
 starts with the segment ``neutral``, in the front reference posture.
 """
@@ -47,14 +47,14 @@ class Session:
         body: the person as the initialization measured them.
         camera: working camera, pitched.
         silhouettes: (n, H, W), 0 or 255.
-        segments: what the person does in each image, (n,) of str.
+        segments: name of the motion in each image, (n,) of str.
         time_s: seconds from the first image of the recording, (n,).
         keypoints_m: true shoulders, elbows and hands, (n, 6, 3), metres in the optical frame; NaN
             in an image without truth.
-        postures: true d1..d12, (n, 12); NaN where the truth does not say.
-        torso_rad: true roll, pitch and yaw of the torso, (n, 3); NaN where it does not say.
-        shown: indices of the images kept, ``SEQUENCE_LENGTH`` a motion or fewer.
-        images: those, (len(shown), H, W), brightness.
+        postures: true d1..d12, (n, 12); NaN where the truth lacks them.
+        torso_rad: true roll, pitch and yaw of the torso, (n, 3); NaN where the truth lacks them.
+        shown: indices of the images kept, at most ``SEQUENCE_LENGTH`` of each motion.
+        images: the images kept, (len(shown), H, W), brightness.
         initialization_iou: fit of each reference, by name.
     """
 
@@ -84,7 +84,7 @@ def motions_of(segments: NDArray[np.str_]) -> list[str]:
 def synthetic_session(
     motion: str, seed: int, fps: float = 15.0, size: tuple[int, int] = (320, 240)
 ) -> Session:
-    """Record the synthetic person doing ``motion``, and read the recording as any other."""
+    """Record the synthetic person in ``motion``, and read the recording like any other."""
     with TemporaryDirectory(prefix="cardbox_evaluate_") as folder:
         bag = Path(folder) / "session"
         synthesize_session(bag, motion, seed, fps, *size)
@@ -97,7 +97,7 @@ def recorded_session(
     size: tuple[int, int] = (320, 240),
     progress: Callable[[float], None] | None = None,
 ) -> Session:
-    """Read a session: learn background and person, segment every silhouette.
+    """Read a session: learn background and person, and compute every silhouette.
 
     Args:
         folder: holds ``ground_truth.json`` and the recording, or the recording in ``bag``.
@@ -192,6 +192,6 @@ def _session(
 
 
 def _spread(indices: NDArray[np.intp]) -> NDArray[np.intp]:
-    """``SEQUENCE_LENGTH`` of ``indices``, evenly, none at the very ends."""
+    """Return at most ``SEQUENCE_LENGTH`` of ``indices``, evenly spaced, without the ends."""
     places = (np.arange(SEQUENCE_LENGTH) + 0.5) / SEQUENCE_LENGTH * len(indices)
     return indices[np.unique(places.astype(np.intp))]

@@ -1,7 +1,7 @@
 """Track a session many times, and summarize the errors (experiments 1 to 3).
 
 Every run starts anew with a generator seeded by (seed, number of the run). The state ``lost`` is
-switched off: it would leave out the very images in which a strategy is worst.
+switched off, because it would leave out the images in which a strategy is worst.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Setting:
     Attributes:
         config: settings of the tracker.
         seed: of the evaluation.
-        every: only each image of this number; 3 is the same motion three times as fast.
-        model: how costs are computed, see ``models.make_silhouette_term``.
+        every: stride through the images; 3 makes the motion three times as fast.
+        model: the term of the silhouette, see ``models.make_silhouette_term``.
     """
 
     config: TrackerConfig
@@ -65,13 +65,13 @@ class Runs(NamedTuple):
 
 
 def comparable(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` changed so that no image is left out."""
+    """Return ``config`` without the states that would leave out images."""
     never_lost = replace(config.whole_body, lost_from=1.0, largest_person=1000.0)
     return replace(config, lost_iou=0.0, whole_body=never_lost)
 
 
 def calls_of(session: Session, setting: Setting, runs: int) -> list[Call]:
-    """Return the calls that together do the runs 0 to ``runs`` - 1 of ``setting``."""
+    """Return calls for the runs 0 to ``runs`` - 1 of ``setting``."""
     return [
         Call(track_runs, (session, setting, first, min(first + RUNS_A_CALL, runs)))
         for first in range(0, runs, RUNS_A_CALL)
@@ -79,7 +79,7 @@ def calls_of(session: Session, setting: Setting, runs: int) -> list[Call]:
 
 
 def track_runs(session: Session, setting: Setting, first: int, end: int) -> Runs:
-    """Do the runs ``first`` to ``end`` - 1 of ``setting``."""
+    """Track the session in the runs ``first`` to ``end`` - 1 of ``setting``."""
     silhouettes = session.silhouettes[:: setting.every]
     shape = (end - first, len(silhouettes))
     postures = np.full((*shape, N_JOINTS), np.nan)
@@ -106,13 +106,13 @@ def stacked(runs: Sequence[Runs]) -> Runs:
 
 @dataclass(frozen=True)
 class MotionRuns:
-    """Runs and truth of the n images of one motion, all of them with a person and truth.
+    """Runs and truth of one motion, over its n images with a person and truth.
 
     Attributes:
         runs: the estimates.
         time_s: seconds from the motion's start, (n,).
-        keypoints_m: true ones, (n, 6, 3).
-        postures: true ones, (n, 12), or NaN.
+        keypoints_m: true keypoints, (n, 6, 3).
+        postures: true postures, (n, 12), or NaN.
         torso_rad: true roll, pitch, yaw, (n, 3), or NaN.
     """
 
@@ -124,7 +124,7 @@ class MotionRuns:
 
 
 def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> MotionRuns:
-    """Return what belongs to ``motion``."""
+    """Return runs and truth of the images of ``motion``."""
     chosen = (session.segments == motion) & ~np.isnan(session.keypoints_m[:, 0, 0])
     chosen = chosen[::every] & ~np.any(np.isnan(runs.costs_px), axis=0)
     time_s = session.time_s[::every][chosen]
@@ -140,8 +140,8 @@ def select_motion(runs: Runs, session: Session, motion: str, every: int = 1) -> 
 def summarize(motion: MotionRuns) -> dict[str, Any]:
     """Return the figures of experiments 1 to 3 of one motion and one strategy.
 
-    Each is a mean over runs and images, but ``std_dof``: the standard deviation over the runs,
-    averaged over the images, rad (metres for ``torso_y``).
+    ``std_dof`` is the standard deviation over the runs, averaged over the images, rad (metres for
+    ``torso_y``); all others are means over runs and images.
     """
     runs = motion.runs
     errors_m = distances_m(runs.keypoints_m, motion.keypoints_m)
@@ -163,7 +163,7 @@ def summarize(motion: MotionRuns) -> dict[str, Any]:
 
 
 def brief(motion: MotionRuns) -> dict[str, float]:
-    """Return the figures by which settings are compared."""
+    """Return the figures that compare settings."""
     errors_m = distances_m(motion.runs.keypoints_m, motion.keypoints_m)
     return {
         "mean_cost_px": float(motion.runs.costs_px.mean()),
@@ -176,7 +176,7 @@ def brief(motion: MotionRuns) -> dict[str, float]:
 
 
 def mean_brief(figures: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the means over motions of what :func:`brief` gives for each."""
+    """Return the means over motions of the figures of :func:`brief`."""
     means = {name: float(np.mean([f[name] for f in figures])) for name in figures[0]}
     for name in ("stderr_mpjpe_m", "stderr_cost_px"):
         # The motions are tracked separately, so their errors are independent.
@@ -199,7 +199,7 @@ def per_frame(motion: MotionRuns) -> dict[str, FloatArray]:
 
 
 def _angle_errors(motion: MotionRuns) -> dict[str, float]:
-    """Mean error of each angle whose truth is known: all, or those of the torso, or none."""
+    """Return the mean error of each angle with known truth: all, the torso's, or none."""
     if not np.any(np.isnan(motion.postures)):
         names, truth = JOINT_NAMES[1:], motion.postures[:, 1:]
     elif not np.any(np.isnan(motion.torso_rad)):

@@ -236,7 +236,7 @@ def test_each_common_complaint_has_an_entry_with_cause_and_remedy(complaint: str
     entry = next(e for e in entries if COMPLAINTS[complaint] in e.splitlines()[0])
     if complaint != "angles":
         assert "*Remedy*" in entry
-        assert "*Cause*" in entry or "*What the node" in entry
+        assert "*Cause*" in entry or "*Symptom*" in entry
 
 
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:

@@ -283,7 +283,8 @@ def test_what_tests_import_is_declared() -> None:
         for kind in ("exec_depend", "test_depend")
         for element in package_xml().findall(kind)
     }
-    for name in sorted(outside(ROOT / "test")):
+    # rosdep has no key for rosbags, which setup.py requires.
+    for name in sorted(outside(ROOT / "test") - {"rosbags"}):
         assert in_xml & {name, keys.get(name, f"python3-{name}")}, f"{name} is not in package.xml"
 
 

@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-CHECKED = ("cardbox_tracker", "tools", "docs", "README.md", "CONTRIBUTING.md")
+CHECKED = (
+    *("cardbox_tracker", "experiments", "benchmarks", "tools"),
+    *("docs", "README.md", "CONTRIBUTING.md"),
+)
 # Paths that are not yet written plainly; remove each as soon as it is.
 NOT_YET = (
-    "cardbox_tracker/benchmarks",
     "cardbox_tracker/demo",
     "cardbox_tracker/estimation",
     "cardbox_tracker/evaluation",
@@ -37,10 +39,6 @@ NOT_YET = (
     "cardbox_tracker/small_yaml.py",
     "cardbox_tracker/start.py",
     "cardbox_tracker/tracking_report.py",
-    "docs",
-    "tools",
-    "README.md",
-    "CONTRIBUTING.md",
 )
 OPENING = re.compile(
     r"(?:\A|\n\s*\n|[.!?]\s)\s*(What|Whatever|Who|Whoever|Whose|Of which|Of an?)\b(?![^.]*\?)"

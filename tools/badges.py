@@ -1,6 +1,6 @@
 """The badges of the README: ``python -m tools.badges`` writes them to ``docs/images/badges``.
 
-What they say is read from ``package.xml`` and ``setup.py``; no service on the network makes them.
+Their values come from ``package.xml`` and ``setup.py``; no network service is used.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Errors with and without the learned correction: ``python -m tools.check_correction SESSION...``.
 
-Recorded sessions with ground truth are tracked in one of the ways of ``tools/tracked_ways.py``.
+The tool tracks recorded sessions with ground truth in one of the ways of ``tools/tracked_ways.py``.
 It prints absolute and aligned error, cm, and the error of the acceleration, m/s^2, of the filter's
 keypoints and of the corrected ones.
 """
@@ -28,7 +28,7 @@ def main(args: list[str] | None = None) -> None:
     """Print a line for each session."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--seed", type=int, default=0, help="whose remainder by 4 is the way")
+    parser.add_argument("--seed", type=int, default=0, help="modulo 4: the way of tracking")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:

@@ -1,7 +1,7 @@
 """How ``effort`` trades time for accuracy: ``python -m tools.effort_table SESSION...``.
 
-Recorded sessions with ground truth are tracked with several efforts of the preset ``default``.
-Printed is a Markdown table with a row for each effort: the median time of an image from silhouette
+The tool tracks recorded sessions with ground truth with several efforts of the preset ``default``.
+It prints a Markdown table with a row for each effort: the median time of an image from silhouette
 to posture, ms, and for each session the mean error of the keypoints, cm.
 """
 
@@ -35,7 +35,7 @@ def error_cm(session: RecordedSession, runs: Sequence[SessionRun]) -> float:
 
 
 def table(folders: Sequence[Path], seeds: Sequence[int]) -> list[str]:
-    """Return the lines of the table; what is compared is tracked one after the other."""
+    """Return the lines of the table; the efforts are compared one after the other."""
     sessions = [load_session(folder) for folder in folders]
     columns = ["effort", "ms an image", *(f"{session.name}, cm" for session in sessions)]
     lines = [_row(columns), "|---" * len(columns) + "|"]

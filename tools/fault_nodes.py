@@ -1,4 +1,4 @@
-"""The nodes under faults: in this process without DDS, for quick tests of what the stream does."""
+"""The nodes in this process, without DDS, for quick tests of faults in the stream of images."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ LEARN_IMAGES = 5
 
 
 def header_of(stamp_ns: int) -> Header:
-    """Return a header with that stamp."""
+    """Return a header with the stamp."""
     return Header(frame_id="camera", stamp=Time(sec=stamp_ns // S, nanosec=stamp_ns % S))
 
 
 class InsideNodes:
-    """Background and tracker, which are handed images one by one; nothing is dropped by load."""
+    """Background and tracker node, which get images one by one, so that load drops none."""
 
     def __init__(self, person: Person, folder: Path) -> None:
-        """Start them and let the background be learned; files go to ``folder``."""
+        """Start them and teach the background; files go to ``folder``."""
         self.person, self.found = person, list[Found]()
         self._context = Context()
         rclpy.init(context=self._context, args=[])
@@ -92,7 +92,7 @@ class InsideNodes:
             node.diagnostics.problem(str(error))
 
     def send_all(self, images: Iterable[Sent]) -> None:
-        """Hand over images at once, whatever their pauses."""
+        """Hand over images at once, without their pauses."""
         for sent in images:
             self.send(sent)
 

@@ -25,7 +25,7 @@ BEFORE_S, FAULT_S, AFTER_S = 2.0, 3.0, 2.0
 RESUME_S = 1.0
 """After a fault the posture is that of the person within this time, by the stamps."""
 
-# An error or an overlap as after any start; what follows somebody else is far beyond.
+# Every start reaches these bounds; a tracker that follows something else is far beyond them.
 LARGEST_ERROR_M, LEAST_IOU = 0.20, 0.7
 
 PERSON, EMPTY, GARBAGE = "person", "empty", "garbage"
@@ -36,8 +36,8 @@ class Sent:
     """One image.
 
     Attributes:
-        stamp_ns: what it carries.
-        at_s: when the person was in that posture.
+        stamp_ns: stamp of the message.
+        at_s: time of the person's posture.
         shows: ``PERSON``, ``EMPTY`` or ``GARBAGE``.
         by: number of the publisher.
         wait_s: pause before it is sent.
@@ -60,7 +60,7 @@ class Found:
 
 
 class Person:
-    """The drawn room, and a person in it who waves for ever."""
+    """A drawn room with a person who waves for ever."""
 
     def __init__(self, width: int = 320) -> None:
         """Draw images ``width`` px wide."""
@@ -71,7 +71,7 @@ class Person:
         self._rng = np.random.default_rng(1)
 
     def posture(self, at_s: float) -> NDArray[np.float64]:
-        """Return the posture (12,) at a time; in the first second the person stands."""
+        """Return the posture (12,) at a time; the person stands still for the first second."""
         inner = (at_s - 1.0) % 8.0
         posture = wave(1.0 + inner) if at_s >= 1.0 else reference_posture("front")
         if 1.0 <= at_s < 2.0:
@@ -189,13 +189,13 @@ FAULTS: Mapping[str, Fault] = MappingProxyType(
         "nobody in view": lambda images, _: [replace(s, shows=EMPTY) for s in images],
     }
 )
-"""Faults of the stream of images, by what happens."""
+"""Faults of the stream of images by name."""
 
 
 def run_of(
     fault: Fault, seed: int = 0, from_s: float = 0.0
 ) -> tuple[list[Sent], list[Sent], list[Sent]]:
-    """Return the images sent before, during and after a fault; the first is of ``from_s``."""
+    """Return the images sent before, during and after a fault, beginning at ``from_s``."""
     begin = from_s + BEFORE_S
     end = begin + FAULT_S
     during = fault(even(begin, end), np.random.default_rng(seed))
@@ -215,9 +215,9 @@ class Verdict:
     """Outcome of a fault.
 
     Attributes:
-        fault: what happened.
-        resumed_s: from the first good image after it to the first of which, and of all later ones,
-            the posture is right; infinite if that did not happen.
+        fault: its name.
+        resumed_s: time from the first good image to the first one from which on all postures are
+            right; infinite if there is none.
         error_before_m: mean error of the keypoints in the second before the fault.
         error_after_m: the same in the last second.
         iou_after: mean overlap in the last second.
@@ -240,7 +240,7 @@ class Verdict:
 def judge(
     fault: str, person: Person, sent: tuple[list[Sent], ...], found: Iterable[Found]
 ) -> Verdict:
-    """Compare what was found with the truth; ``sent`` is before, during and after."""
+    """Compare the results with the truth; ``sent`` is before, during and after."""
     before, _, after = sent
     answers: dict[int, Found] = {}
     known = {image.stamp_ns for part in sent for image in part}

@@ -4,14 +4,15 @@ python -m tools.make_correction SESSION... --check SESSION... --output FILE [--j
                                 [--go-on FILE]
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
-``default`` in as many ways as seeds are asked for (``tools/tracked_ways.py``); the network
-learns where the keypoints are beside those found
-(``cardbox_tracker/estimation/filtering/correction.py``) and to be steady. Those after ``--check``
-are not learned from: absolute and aligned error, cm, and the error of the acceleration, m/s^2,
-are printed for them, without the correction and with it. ``--go-on`` begins with the networks in a
-file that it has written, that of the package for example, and learns more slowly. The package's
-network for several cameras is that for one camera, gone on with recordings of several. Needs
-PyTorch: ``pip install '.[learn]'``.
+``default`` once for each seed, each time in another way (``tools/tracked_ways.py``). The network
+learns the offsets of the true keypoints from those found
+(``cardbox_tracker/estimation/filtering/correction.py``), and steady output.
+
+The sessions after ``--check`` are no training data. The tool prints their absolute and aligned
+error, cm, and the error of the acceleration, m/s^2, without the correction and with it.
+``--go-on`` begins with the networks of a file that this tool has written, such as that of the
+package, and trains at a lower rate. The package's network for several cameras is the one for one
+camera, trained further on recordings of several. PyTorch is needed: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -45,29 +46,28 @@ from tools.tracked_ways import track
 
 FloatArray = NDArray[np.float64]
 
-# About the deviations of the answers, m: middle of the shoulders, elbow, hand; x, y, z of each.
+# Rough standard deviations of the answers, m: shoulders' middle, elbow, hand; x, y, z of each.
 UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
-# Nodes of the first layer, of the hidden state, of the last layer but one.
+# Numbers of nodes: the first layer, the hidden state, the last layer but one.
 INPUTS, NODES, LEFT = 192, 160, 96
 NETWORKS, EPOCHS = 2, 12
-# Images of a sequence, which begin half as many apart, and sequences of a batch.
+# Images of a sequence (the next one begins half a sequence later), and sequences of a batch.
 LENGTH, BATCH = 120, 16
 RATE, DECAY = 3e-3, 1e-3
-# Of networks that have learned before.
+# The same for --go-on, and the share of the way to the new weights that is kept.
 RATE_ON, EPOCHS_ON, KEPT_ON = 2e-3, 14, 0.7
-# What results are steadied by after the correction, which learns to be earlier for it.
+# The training includes the low-pass filter, so the network learns to compensate its delay.
 SMOOTHING_S = WholeBodyConfig().output_smoothing_s
-# Deviation of what is added to the features of a sequence: neighbours shall have similar answers.
+# Standard deviation of the noise on the features of a sequence, as in tools/networks.py.
 NOISE, NOISE_ON = 0.1, 0.25
-# Metres that a metre per second squared is worth, and periods below which it would be noise, s.
+# Weight of the acceleration error, m per m/s^2, and the shortest period it is computed with, s.
 STEADY, LEAST_PERIOD_S = 0.01, 0.05
-# Bones that are said to be shorter than this have hardly a direction, m.
+# A bone shorter than this has no reliable direction, m.
 LEAST_BONE_M = 0.01
-# Errors beyond these are other postures, which no correction mends, m and m/s^2.
+# Larger errors are clipped, as no correction mends a wrong posture; m and m/s^2.
 MOST_M, MOST_M_S2 = 2.0, 60.0
 
-
-# Of most images no depth is known; m.
+# Columns that most images lack, and the floor of their scale, m.
 OF_DEPTH = slice(-DEPTH_FEATURES, None), 0.08
 
 
@@ -75,7 +75,7 @@ class Samples(NamedTuple):
     """Images of a session, one after the other.
 
     Attributes:
-        features: what the network sees, (n, 2, F).
+        features: inputs of the network, (n, 2, F).
         found_m: keypoints without the correction, (n, 6, 3), metres in the optical frame.
         true_m: true ones, nan where they are not scored.
         stamps_ns: (n,).
@@ -99,7 +99,7 @@ def samples_of(folder: Path, seed: int) -> Samples:
         refine = tracker.filter.refine
         assert isinstance(refine.corrector, NetworkCorrector)
         features = refine.corrector.features
-        # It also sees a person who is lost; without a person its features stay the same array.
+        # Features of a lost person count; without a person they stay the same array.
         if refine.found is None or (rows and rows[-1][0] is features):
             return
         true_m = wanted.get(stamp_ns, unknown)
@@ -115,7 +115,7 @@ def samples_of(folder: Path, seed: int) -> Samples:
 def learn(
     samples: Sequence[Samples], seed: int = 0, begin: RecurrentNetwork | None = None
 ) -> RecurrentNetwork:
-    """Return the network that learned from these sessions, after those that ``begin`` did."""
+    """Train a network on these sessions, beginning with the weights of ``begin`` if given."""
     if begin is None:
         mean, scale = networks.mean_and_scale(networks.by_arm(samples), [OF_DEPTH])
     else:
@@ -135,10 +135,10 @@ def learn(
 
 
 def _between(begin: RecurrentNetwork, end: RecurrentNetwork) -> RecurrentNetwork:
-    """Return the network ``KEPT_ON`` of the way from ``begin`` to ``end``, weight by weight.
+    """Interpolate the weights, ``KEPT_ON`` of the way from ``begin`` to ``end``.
 
-    It is better than either in what both know (Wortsman et al., "Robust Fine-Tuning of Zero-Shot
-    Models", 2022).
+    The result keeps more of the old data than ``end`` (Wortsman et al., "Robust Fine-Tuning of
+    Zero-Shot Models", 2022).
     """
 
     def mixed(one: Layer, other: Layer) -> Layer:
@@ -157,7 +157,7 @@ def _between(begin: RecurrentNetwork, end: RecurrentNetwork) -> RecurrentNetwork
 
 
 def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) -> list[Any]:
-    """Return tensors of sequences: features, found, true, whether it is known, period."""
+    """Return tensors of sequences: features, found, true, whether the truth is known, period."""
     import torch
 
     parts: list[tuple[object, ...]] = []
@@ -174,9 +174,9 @@ def _sequences(samples: Sequence[Samples], mean: FloatArray, scale: FloatArray) 
 
 
 def _learned(sequences: list[Any], seed: int, begin: RecurrentNetwork | None, number: int) -> Any:
-    """Return the modules (input_layer, recurrent, first, last) that learned from the sequences.
+    """Train the modules (input_layer, recurrent, first, last) on the sequences.
 
-    They are those of the network ``number`` of ``begin`` first, if there is one.
+    They begin with the weights of network ``number`` of ``begin``, if that is given.
     """
     import torch
     from torch import nn
@@ -230,7 +230,7 @@ def _answers(modules: Any, features: Any) -> Any:
 
 
 def _moved(found: Any, answers: Any) -> Any:
-    """Return what :func:`moved` returns, of sequences."""
+    """Do what :func:`moved` does, for tensors of sequences."""
     import torch
 
     arms = answers.reshape(*answers.shape[:3], 3, 3)
@@ -249,7 +249,7 @@ def _moved(found: Any, answers: Any) -> Any:
 
 
 def _steadied(points: Any, period_s: Any) -> Any:
-    """Return keypoints (B, L, 6, 3) as the tracker steadies them, of images a period apart."""
+    """Return the low-pass filtered keypoints (B, L, 6, 3) of images a period apart."""
     import torch
 
     if SMOOTHING_S == 0.0:
@@ -258,7 +258,7 @@ def _steadied(points: Any, period_s: Any) -> Any:
     age = age[:, None] - age[None, :]
     kept = torch.exp(-period_s / SMOOTHING_S)[:, None, None]
     shares = torch.where(age >= 0, (1.0 - kept) * kept ** age.clamp(min=0), 0.0)
-    # The first one is taken as it is.
+    # The filter starts with the first value.
     shares[:, :, 0] = kept[:, 0] ** age[:, 0]
     return torch.einsum("bts,bskc->btkc", shares, points)
 
@@ -268,7 +268,7 @@ def _direction(vectors: Any) -> Any:
 
 
 def _loss(off: Any, known: Any, period_s: Any) -> Any:
-    """Return absolute plus aligned error, metres, and the worth of the acceleration's error."""
+    """Return the sum of absolute error, aligned error and weighted acceleration error, metres."""
     aligned = off - 0.5 * (off[:, :, :1] + off[:, :, 3:4])
     each = (_length(off, 1e-2) + _length(aligned, 1e-2)).clamp(max=MOST_M)
     second = (off[:, :-2] - 2.0 * off[:, 1:-1] + off[:, 2:]) / period_s[:, None, None, None] ** 2
@@ -293,7 +293,7 @@ def _layers(modules: Any) -> list[tuple[FloatArray, FloatArray]]:
         (first.weight, first.bias),
         (last.weight, last.bias),
     ]
-    # PyTorch's gates are reset, update, candidate, too.
+    # PyTorch has the same order of gates: reset, update, candidate.
     return [networks.numbers_of(*pair) for pair in pairs]
 
 
@@ -316,7 +316,7 @@ def _put(network: RecurrentNetwork, number: int, modules: Any) -> None:
 
 
 def corrected(network: RecurrentNetwork, samples: Samples) -> FloatArray:
-    """Return the keypoints as the network says that they are, steadied, (n, 6, 3)."""
+    """Return the corrected and low-pass filtered keypoints, (n, 6, 3)."""
     hidden, low_pass = network.initial_hidden(2), LowPass(SMOOTHING_S)
     intervals_s = np.diff(samples.stamps_ns, prepend=samples.stamps_ns[:1]) / 1e9
     result = np.empty_like(samples.found_m)
@@ -340,7 +340,7 @@ def check(network: RecurrentNetwork, samples: Samples) -> tuple[float, ...]:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Track, learn, check, write."""
+    """Track, train, check, write."""
     return networks.run(args, __doc__, samples_of, learn, check, read=read_recurrent_network)
 
 

@@ -1,16 +1,18 @@
-"""Learn from recorded sessions with ground truth how large the errors of the angles are.
+"""Learn the standard deviations of the angles from recorded sessions with ground truth.
 
 python -m tools.make_deviations SESSION... --fresh SESSION... --check SESSION... --output FILE
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
-``default`` and the deviations of the particles, in as many ways as seeds are asked for
-(``tools/tracked_ways.py``); the network learns the logarithm of the error of each angle
-(``cardbox_tracker/estimation/filtering/deviations.py``), so make the correction first
-(``tools/make_correction.py``). Its errors are smaller in sessions that it has learned from, so how
-large deviations are in the end is taken from those after ``--fresh``, which it must not have
-learned from. Those after ``--check`` are only judged: in how many images an error is within two
-deviations, mean and least over the angles, is printed for them, %, with the particles' deviations
-and with the learned ones. Needs PyTorch: ``pip install '.[learn]'``.
+``default`` once for each seed, each time in another way (``tools/tracked_ways.py``). The network
+learns the logarithm of the error of each angle
+(``cardbox_tracker/estimation/filtering/deviations.py``), so train the correction first
+(``tools/make_correction.py``).
+
+The correction has smaller errors on its training data. So a factor for each angle comes from the
+sessions after ``--fresh``, which must not be among them. For the sessions after ``--check`` the
+tool prints in how many images an error is within two deviations, %, mean and least over the
+angles, with the particles' deviations and with the learned ones. PyTorch is needed:
+``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -40,9 +42,9 @@ from tools.tracked_ways import track
 FloatArray = NDArray[np.float64]
 
 SHAPE = networks.Shape(layers=(48, 24), networks=4, epochs=30)
-# Added to an error before its logarithm is taken, rad: none is so exact.
+# Added to an error before its logarithm is taken, rad, which bounds the logarithm.
 LEAST_RAD = 0.02
-# Two deviations shall hold so many of the errors.
+# Share of the errors within two deviations.
 HELD = 0.95
 
 
@@ -82,14 +84,14 @@ def errors_of(folder: Path, seed: int) -> Errors:
 
 
 def learn(samples: Sequence[Errors], seed: int = 0) -> Network:
-    """Return the network that learned the logarithms of the errors of these sessions."""
+    """Train a network on the logarithms of the errors of these sessions."""
     errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
     unit = np.ones(errors.shape[1])
     return networks.learn(samples, np.log(errors + LEAST_RAD), unit, SHAPE, seed)
 
 
 def scaled(network: Network, samples: Sequence[Errors]) -> Network:
-    """Return the network with a factor for each angle, so that two deviations hold enough."""
+    """Scale each angle's deviations so that two of them hold ``HELD`` of the errors."""
     errors = np.concatenate([_beside_arms(one.errors_rad) for one in samples])
     ratios = errors / np.exp(network(networks.by_arm(samples)))
     factors = np.quantile(ratios, HELD, axis=0) / 2.0
@@ -98,7 +100,7 @@ def scaled(network: Network, samples: Sequence[Errors]) -> Network:
 
 
 def _beside_arms(angles: FloatArray) -> FloatArray:
-    """Return the angles (n, 11) as the network answers: torso and one arm, (2 n, 7)."""
+    """Return angles (n, 11) in the layout of the answers: torso and one arm, (2 n, 7)."""
     middle = TORSO + (angles.shape[1] - TORSO) // 2
     torso, left, right = np.split(angles, (TORSO, middle), axis=1)
     arms = np.hstack([torso, left]), np.hstack([torso, right])
@@ -115,7 +117,7 @@ def check(network: Network, errors: Errors) -> tuple[float, float, float, float]
 
 
 def main(args: list[str] | None = None) -> int:
-    """Track, learn, check, write."""
+    """Track, train, check, write."""
     return networks.run(args, __doc__, errors_of, learn, check, scaled)
 
 

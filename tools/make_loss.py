@@ -3,12 +3,14 @@
 python -m tools.make_loss SESSION... [--seeds N] [--jobs N] [--inverse-penalty C]
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. It is tracked with the preset
-``default`` in as many ways as seeds are asked for (``tools/tracked_ways.py``), and never declared
-lost, so that wrong results are seen, too. A logistic regression on the evidence of each frame
-(``cardbox_tracker/estimation/filtering/loss.py``) says whether the keypoints are wrong by more than
-30 cm on average; wrong and right frames weigh alike. Printed are the coefficients beside those of
-the package, and how well both tell wrong frames of sessions that the fit has not seen. Needs
-scikit-learn: ``pip install '.[learn]'``.
+``default`` once for each seed, each time in another way (``tools/tracked_ways.py``). The state
+``lost`` is switched off, because it would leave out wrong results.
+
+A logistic regression on the evidence of each frame
+(``cardbox_tracker/estimation/filtering/loss.py``) estimates the chance that the keypoints are wrong
+by more than 30 cm on average; wrong and right frames weigh alike. The tool prints the coefficients
+beside those of the package, and the quality of both on sessions outside the training data.
+scikit-learn is needed: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ INVERSE_PENALTY = 1e-3
 
 
 class Frames(NamedTuple):
-    """Frames of a session: features (n, F), as ``COEFFICIENTS`` names them, and which are wrong."""
+    """Frames of a session: features (n, F) in the order of ``COEFFICIENTS``, and whether wrong."""
 
     features: FloatArray
     is_wrong: BoolArray
@@ -133,7 +135,7 @@ def quality(found: FloatArray, is_wrong: BoolArray) -> tuple[float, float]:
 
 
 def report(sessions: Sequence[Frames], inverse_penalty: float = INVERSE_PENALTY) -> str:
-    """Return the coefficients beside the shipped ones, and how good both are.
+    """Return the coefficients beside the shipped ones, and the quality of both.
 
     Raises:
         ValueError: without one of the sessions, all frames are right.
@@ -161,14 +163,14 @@ def main(args: list[str] | None = None) -> int:
     """Track, fit and print; the package's coefficients stay as they are."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--seeds", type=int, default=1, help="that each session is tracked with")
+    parser.add_argument("--seeds", type=int, default=1, help="runs of each session")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument(
         "--inverse-penalty",
         type=float,
         default=INVERSE_PENALTY,
         metavar="C",
-        help="more for many sessions (default: %(default)s)",
+        help="larger for many sessions (default: %(default)s)",
     )
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:

@@ -15,13 +15,13 @@ The data used in this project was obtained from mocap.cs.cmu.edu. The database w
 funding from NSF EIA-0196217. "CMU places no restrictions on the use of the original dataset, and I
 (Bruce) place no additional restrictions on the use of this particular BVH conversion."
 
-What is learned: of each arm the unit vectors of upper arm and forearm in the frame of the torso
-(x forward out of the chest, y outwards: to the left for the left arm, to the right for the right
-one, z up along the line from the hips to the middle of the shoulders), six numbers, as a mixture of
-Gaussians. Clips of one kind count alike, however many and long they are, and kinds of motion that
-people make before a camera count more than sports; postures that everybody is in most of the time
-(hanging arms) count less, and plain postures, in which a person stands who was asked to, are added.
-Same input, same seed: same bytes.
+The prior is a mixture of Gaussians over six numbers of an arm: the unit vectors of upper arm and
+forearm in the frame of the torso (x forward out of the chest; y outwards, to the left for the left
+arm and to the right for the right one; z up from the hips to the middle of the shoulders).
+
+Kinds of motion are weighted, independently of the number and length of their clips: gestures before
+a camera count more than sports. Frequent postures, such as hanging arms, count less. Plain frontal
+postures, which people take when asked to, are added. The same input and seed give the same bytes.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Excerpts of these are in the recorded sessions, which measure the tracker; 13_18 (boxing) is
-# broken in the conversion: its elbows bend backwards.
+# The recorded sessions, which measure the tracker, contain excerpts of these clips. In 13_18
+# (boxing) the conversion bends the elbows backwards.
 USED_IN_SESSIONS = (
     "13_07", "13_08", "13_09", "14_05", "13_31", "13_15", "14_17", "14_12", "washwindow_1",
     "basketball_signal_1", "basketball_signal_2", "basketball_signal_4", "basketball_signal_5",
@@ -47,7 +47,7 @@ USED_IN_SESSIONS = (
 )  # fmt: skip
 BROKEN = ("13_18",)
 
-# Kinds of motion by clip; all further clips are "other".
+# Patterns of the clips of each kind of motion; all further clips are "other".
 KINDS = {
     "soccer": r"10_0[12356]|11_01|soccer_\d+",
     "walk": r"10_04|12_0[123]|walking_\d+",
@@ -73,7 +73,7 @@ WEIGHTS = {
 }  # fmt: skip
 SAMPLES_PER_S = 5.0
 STANDING = ("drink", "laugh", "wash windows", "direct traffic", "exercise", "signals")
-# Chosen by the depth mode that the prior picks (docstring of `flatten`, `plain_arms`).
+# Settings of `flatten` and `plain_arms`, chosen by which of the depths the prior prefers.
 NEIGHBOURS, FLATTEN = 40, 3.0
 PLAIN_SAMPLES = 3000
 VARIANCE = 0.02
@@ -92,7 +92,7 @@ JOINTS = {
     "left_wrist": ("LeftHand", "lHand"),
     "right_wrist": ("RightHand", "rHand"),
 }
-# The skeleton of the text files: names, parents and the offsets (its own units) that matter.
+# The skeleton of the text files: names, parents and the relevant offsets in its own units.
 TEXT_NAMES = (  # noqa: SIM905
     "Hips LHipJoint LeftUpLeg LeftLeg LeftFoot LeftToeBase LeftToeEnd RHipJoint RightUpLeg "
     "RightLeg RightFoot RightToeBase RightToeEnd LowerBack Spine Spine1 Neck Neck1 Head HeadEnd "
@@ -118,7 +118,7 @@ TEXT_STEP_S = 1.0 / 120.0
 
 
 def read_bvh(path: Path) -> tuple[dict[str, FloatArray], float]:
-    """Positions (frames, 3) of the joints by role, y up, and the time between frames, s."""
+    """Return positions (frames, 3) of the joints by role, y up, and the time of a frame, s."""
     names: list[str] = []
     parents: list[int] = []
     offsets: list[list[float]] = []
@@ -161,7 +161,7 @@ def read_bvh(path: Path) -> tuple[dict[str, FloatArray], float]:
 
 
 def read_text(path: Path) -> tuple[dict[str, FloatArray], float]:
-    """Read exponential maps: the same as :func:`read_bvh`."""
+    """Read exponential maps; return the same as :func:`read_bvh`."""
     rows = np.loadtxt(path, delimiter=",")
     turns = rows[:, 3 : 3 + 3 * len(TEXT_NAMES)].reshape(len(rows), -1, 3)
     rotations = [about_vector(-turns[:, joint]) for joint in range(turns.shape[1])]
@@ -176,7 +176,7 @@ def positions(
     rotations: Sequence[FloatArray],
     root: FloatArray,
 ) -> dict[str, FloatArray]:
-    """Positions (frames, 3) of the joints that matter, by role."""
+    """Return positions (frames, 3) of the joints in ``JOINTS`` by role."""
     place, turned = [root], [rotations[0]]
     for joint in range(1, len(names)):
         parent = parents[joint]
@@ -189,14 +189,14 @@ def positions(
 
 
 def about_axis(axis: int, angle_rad: FloatArray) -> FloatArray:
-    """Rotations (n, 3, 3) about a coordinate axis."""
+    """Return rotations (n, 3, 3) about a coordinate axis."""
     vectors = np.zeros((len(angle_rad), 3))
     vectors[:, axis] = angle_rad
     return about_vector(vectors)
 
 
 def about_vector(vectors_rad: FloatArray) -> FloatArray:
-    """Rotations (n, 3, 3) by rotation vectors (n, 3)."""
+    """Return rotations (n, 3, 3) by rotation vectors (n, 3)."""
     angle = np.linalg.norm(vectors_rad, axis=1)
     x, y, z = (vectors_rad / np.maximum(angle, 1e-12)[:, None]).T
     zero = np.zeros_like(x)
@@ -210,13 +210,13 @@ def about_vector(vectors_rad: FloatArray) -> FloatArray:
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """Vectors (..., 3) of length one."""
+    """Return vectors (..., 3) of length one."""
     result: FloatArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return result
 
 
 def torso_frames(joints: dict[str, FloatArray]) -> FloatArray:
-    """Rotations (frames, 3, 3): columns forward, left, up of the torso; the T-pose is upright.
+    """Return rotations (frames, 3, 3) with columns forward, left, up; the T-pose is upright.
 
     The capture's own axes are x to the left, y up and z forward in the T-pose.
     """
@@ -231,7 +231,7 @@ def torso_frames(joints: dict[str, FloatArray]) -> FloatArray:
 
 
 def arms_of(joints: dict[str, FloatArray]) -> FloatArray:
-    """Unit vectors of upper arm and forearm, (frames, 2 arms, 6), forward, outwards, up."""
+    """Return unit vectors of both limbs, (frames, 2 arms, 6): forward, outwards, up of each."""
     torso = torso_frames(joints)
     arms = []
     for side, outwards in (("left", 1.0), ("right", -1.0)):
@@ -243,16 +243,16 @@ def arms_of(joints: dict[str, FloatArray]) -> FloatArray:
 
 
 def torso_angles_rad(joints: dict[str, FloatArray]) -> FloatArray:
-    """Roll and pitch (frames, 2) of the torso as Rz(yaw) Ry(pitch) Rx(roll) has them."""
+    """Return roll and pitch (frames, 2) of the torso in Rz(yaw) Ry(pitch) Rx(roll)."""
     frames = torso_frames(joints)
-    # rows: up, of the world; forward and left turn with the yaw, which does not matter here
+    # Row 1 is the upward direction of the world, which does not depend on the yaw.
     pitch = np.arcsin(np.clip(-frames[:, 1, 0], -1, 1))
     roll = np.arctan2(frames[:, 1, 1], frames[:, 1, 2])
     return np.stack([roll, pitch], axis=1)
 
 
 def kind_of(clip: str) -> str:
-    """Kind of motion of a clip by its name."""
+    """Return the kind of motion of a clip by its name."""
     for kind, pattern in KINDS.items():
         if re.fullmatch(pattern, clip):
             return kind
@@ -265,15 +265,15 @@ def kind_of(clip: str) -> str:
 def fit_mixture(
     x: FloatArray, weights: FloatArray, components: int, seed: int, floor: float, rounds: int = 200
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted EM: shares (K,), means (K, D) and covariances (K, D, D) of a mixture.
+    """Fit a mixture by weighted EM: shares (K,), means (K, D), covariances (K, D, D).
 
     Args:
         x: samples (N, D).
         weights: of the samples, (N,), summing to one.
         components: K.
-        seed: of the start, which is that of k-means++.
+        seed: of the start by k-means++.
         floor: variance that is added to every axis.
-        rounds: of EM.
+        rounds: number of iterations.
     """
     rng = np.random.default_rng(seed)
     n, d = x.shape
@@ -299,7 +299,7 @@ def fit_mixture(
 def log_densities(
     x: FloatArray, shares: FloatArray, means: FloatArray, covariances: FloatArray
 ) -> FloatArray:
-    """Log of share times density of each component, (N, K)."""
+    """Return the log of share times density of each component, (N, K)."""
     logs = np.empty((len(x), len(shares)))
     for k, (share, mean, covariance) in enumerate(zip(shares, means, covariances, strict=True)):
         lower = np.linalg.cholesky(covariance)
@@ -313,7 +313,7 @@ def log_densities(
 
 
 def load(folders: Sequence[Path], exclude: Sequence[str]) -> dict[str, dict[str, FloatArray]]:
-    """Arms (n, 2, 6) and torso angles (n, 2) of each clip by name, ``SAMPLES_PER_S``."""
+    """Return arms (n, 2, 6) and torso angles (n, 2) of each clip, ``SAMPLES_PER_S`` a second."""
     clips: dict[str, dict[str, FloatArray]] = {}
     seen = set()
     for path in sorted(p for f in folders for p in f.rglob("*") if p.suffix in (".bvh", ".txt")):
@@ -323,7 +323,7 @@ def load(folders: Sequence[Path], exclude: Sequence[str]) -> dict[str, dict[str,
         if path.stat().st_size < 1000:
             continue
         joints, step_s = read_bvh(path) if path.suffix == ".bvh" else read_text(path)
-        # Many clips are in both sources; the same kind and number of frames is the same clip.
+        # Many clips are in both sources; equal kind and number of frames identify a clip.
         if (kind_of(name), len(joints["left_hip"])) in seen:
             continue
         seen.add((kind_of(name), len(joints["left_hip"])))
@@ -335,7 +335,7 @@ def load(folders: Sequence[Path], exclude: Sequence[str]) -> dict[str, dict[str,
 
 
 def balance(clips: dict[str, dict[str, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """Arms of both sides in one (N, 6) and their weights (N,)."""
+    """Return the arms of both sides, (N, 6), and their weights (N,)."""
     of_kind: dict[str, list[str]] = defaultdict(list)
     for name in clips:
         of_kind[kind_of(name.split("/")[-1])].append(name)
@@ -350,10 +350,10 @@ def balance(clips: dict[str, dict[str, FloatArray]]) -> tuple[FloatArray, FloatA
 
 
 def plain_arms(count: int, seed: int) -> FloatArray:
-    """Arms (count, 6) as people hold them when asked: beside the body, nearly straight or bent up.
+    """Return arms (count, 6) beside the body, nearly straight or with the forearm raised.
 
-    Motion capture hardly has them, but whoever follows the program's instructions, exercises or
-    waves does. Shoulder abduction is uniform, flexion small; half of the elbows are straight.
+    People hold them so when they follow instructions, exercise or wave, and motion capture hardly
+    contains it. Shoulder abduction is uniform, flexion small; half of the elbows are straight.
     """
     rng = np.random.default_rng(seed)
     straight = rng.random(count) < 0.5
@@ -366,12 +366,12 @@ def plain_arms(count: int, seed: int) -> FloatArray:
 
 
 def limb_rotation(abduction_rad: FloatArray, flexion_rad: FloatArray) -> FloatArray:
-    """Rx(abduction) Ry(-flexion), (n, 3, 3), axes forward, outwards, up of a left limb."""
+    """Return Rx(abduction) Ry(-flexion), (n, 3, 3), axes forward, outwards, up of a limb."""
     return about_axis(0, abduction_rad) @ about_axis(1, -flexion_rad)
 
 
 def flatten(x: FloatArray, weights: FloatArray, neighbours: int, power: float) -> FloatArray:
-    """Weights (N,) such that postures that everybody is in most of the time count less.
+    """Return weights (N,) that reduce the influence of frequent postures.
 
     Each weight grows with the distance to a near neighbour, so with a power of the inverse density.
     """
@@ -410,7 +410,7 @@ def main() -> None:
         "source": SOURCE,
         "clips": sorted(clips),
         "torso": torso_statistics(clips),
-        # so that the best posture costs about nothing
+        # The offset makes the best posture cost about nothing.
         "offset": round(float(best), 4),
         "shares": np.round(shares, 5).tolist(),
         "means": np.round(means, 4).tolist(),
@@ -427,7 +427,7 @@ def main() -> None:
 
 
 def torso_statistics(clips: dict[str, dict[str, FloatArray]]) -> dict[str, list[float]]:
-    """Percentiles 1, 5, 25, 50, 75, 95, 99 of roll and pitch, degrees, of people who stand."""
+    """Return percentiles 1, 5, 25, 50, 75, 95, 99 of standing people's roll and pitch, deg."""
     standing = [clips[n]["torso"] for n in clips if kind_of(n.split("/")[-1]) in STANDING]
     if not standing:
         return {}

@@ -1,4 +1,4 @@
-"""Parts of documents that are generated, between two marks."""
+"""Replace the generated part of a document, which stands between two marks."""
 
 from __future__ import annotations
 

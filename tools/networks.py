@@ -1,6 +1,6 @@
-"""Learn the small networks of the package, and write them.
+"""Train the small networks of the package and write them.
 
-Needs PyTorch: ``pip install '.[learn]'``.
+This needs PyTorch: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from cardbox_tracker.files import atomic_path
 
 FloatArray = NDArray[np.float64]
 
-# Scaled features farther from the mean than this count as this.
+# Scaled features are clipped at this distance from the mean.
 MOST = 2.5
-# Deviation of what is added to the features: neighbours shall have similar answers.
+# Standard deviation of the noise on the features; it makes neighbours have similar answers.
 NOISE = 0.4
 _LEAST_SCALE = 1e-3
-# Most recordings have one camera.
+# The features of further cameras are constant in most recordings, so their scale has a floor.
 _SCALE_OF_CAMERAS = 0.4
 RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
 
 class Images(Protocol):
-    """What the tools keep of the images of a session."""
+    """The images of a session, as the tools keep them."""
 
     @property
     def features(self) -> FloatArray:
-        """What the networks see, (n, 2, F)."""
+        """Inputs of the networks, (n, 2, F)."""
 
 
 OfSession = TypeVar("OfSession", bound=Images)
@@ -51,12 +51,12 @@ AnyNetwork = TypeVar("AnyNetwork", Network, RecurrentNetwork)
 
 @dataclass(frozen=True)
 class Shape:
-    """How large the networks are, and how long they learn.
+    """Size and training time of the networks.
 
     Attributes:
         layers: nodes of the hidden layers.
-        networks: how many are averaged.
-        epochs: a few are meant: more of them learn the sessions by heart.
+        networks: number of networks that are averaged.
+        epochs: passes over the data; many of them overfit.
     """
 
     layers: tuple[int, ...]
@@ -72,12 +72,12 @@ def by_arm(sessions: Sequence[Images]) -> FloatArray:
 def mean_and_scale(
     features: FloatArray, seldom: Sequence[tuple[slice, float]] = ()
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviations of features (n, F), which are at least a little.
+    """Return mean and scale, the standard deviation with a floor, of features (n, F).
 
     Args:
         features: of all images.
-        seldom: further ones, beside those of cameras, that most images lack, and what their
-            deviations are at least: in the others they shall not be all alike, beyond ``MOST``.
+        seldom: columns that most images lack, beside those of cameras, each with the floor of its
+            scale; without it, the values in the other images would all be clipped at ``MOST``.
     """
     least = np.full(features.shape[1], _LEAST_SCALE)
     for some, scale in ((OF_CAMERAS, _SCALE_OF_CAMERAS), *seldom):
@@ -92,12 +92,12 @@ def learn(
     shape: Shape,
     seed: int = 0,
 ) -> Network:
-    """Return the network that gives the answers (2 n, A) to the n images of the sessions.
+    """Train the network that gives the answers (2 n, A) to the n images of the sessions.
 
     Args:
         sessions: one after the other.
         answers: of the left arm, then of the right one, of each image, (2 n, A).
-        unit: what the answers are divided by, (A,): about their deviations.
+        unit: divisor of the answers, (A,), about their standard deviations.
         shape: of the network.
         seed: of the noise and of the first weights.
     """
@@ -141,12 +141,12 @@ def _learned(
 
 
 def numbers_of(weight: Any, bias: Any) -> tuple[FloatArray, FloatArray]:
-    """Return PyTorch's weights of a layer, (outputs, inputs), and biases as the networks do."""
+    """Return weights (inputs, outputs) and biases (1, outputs) of a layer of PyTorch."""
     return weight.detach().numpy().T, bias.detach().numpy()[None]
 
 
 def save(network: Network | RecurrentNetwork, path: Path, about: str) -> None:
-    """Write a network as the functions of :mod:`~.networks` read it."""
+    """Write a network to a file that ``cardbox_tracker.estimation.filtering.networks`` reads."""
     if isinstance(network, Network):
         layers = list(zip(network.weights, network.biases, strict=True))
     else:
@@ -187,17 +187,18 @@ def run(
     adjust: Callable[[AnyNetwork, Sequence[OfSession]], AnyNetwork] | None = None,
     read: Callable[[Path], AnyNetwork] | None = None,
 ) -> int:
-    """Run one of the tools: track all sessions, learn from some, check the others, write.
+    """Run one of the tools: track all sessions, train on some, check the others, write.
 
     Args:
         args: of the command line; None: those of the process.
         description: of the tool.
-        track: returns what is kept of a session's folder, with ``seed``; it runs in processes of
-            their own.
-        learn_from: returns the network, given sessions, the seed of the learning and, with
-            ``read``, what it begins with.
-        check: returns the figures of a session that was not learned from.
-        adjust: returns the network as it shall be, given the sessions after ``--fresh``.
+        track: takes a session's folder and ``seed`` and returns its images; it runs in worker
+            processes.
+        learn_from: takes sessions, the seed of the training and, with ``read``, the network to
+            begin with; returns the trained network.
+        check: returns the figures of a session outside the training data.
+        adjust: takes the trained network and the sessions after ``--fresh``; returns the network
+            to write.
         read: reads the file after ``--go-on``.
     """
     parser = argparse.ArgumentParser(description=description)
@@ -208,9 +209,9 @@ def run(
     if read is not None:
         parser.add_argument("--go-on", type=Path, metavar="FILE", help="networks to begin with")
     parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--about", default="", help="where the sessions come from; is kept with it")
-    parser.add_argument("--seed", type=int, default=0, help="of the learning")
-    parser.add_argument("--seeds", type=int, default=1, help="that each session is tracked with")
+    parser.add_argument("--about", default="", help="origin of the sessions, stored in the file")
+    parser.add_argument("--seed", type=int, default=0, help="of the training")
+    parser.add_argument("--seeds", type=int, default=1, help="runs of each session")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
     with ProcessPoolExecutor(given.jobs) as pool:

@@ -1,7 +1,7 @@
-"""The README's numbers, made from the committed results of evaluation and benchmarks.
+"""Write the figures of the README from the committed results of evaluation and benchmarks.
 
-``python -m tools.readme_figures`` writes them between their marks in ``README.md``;
-with ``--check`` it only says whether they differ.
+``python -m tools.readme_figures`` replaces the parts between the marks in ``README.md``; with
+``--check`` it only compares them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[st
 
     Args:
         results: ``results.json`` of the synthetic motions.
-        recorded: the same of each recorded session, by name.
+        recorded: ``results.json`` of each recorded session by name.
     """
     quick = " (a quick run)" if results["quick"] else ""
     lines = [
@@ -112,7 +112,7 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
 
 
 def current(root: Path) -> str:
-    """Return what the README in ``root`` should read."""
+    """Return the text of the README in ``root`` with current figures."""
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
     text = replaced((root / "README.md").read_text(encoding="utf-8"), section, BEGIN, END)

@@ -4,7 +4,7 @@ python -m tools.real_report --session DIR \
     --output docs/evaluation/real.md --sheet docs/images/real.jpg
 
 The session is a folder with ``bag/``, ``reference.json`` (segments, and MediaPipe's landmarks in
-pixels) and ``mediapipe_masks.npz``. There is no truth: MediaPipe is a fair reference in the image.
+pixels) and ``mediapipe_masks.npz``. There is no truth; MediaPipe serves as the reference.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Frames:
         masks: MediaPipe's, (N, H, W), 0 or 255.
         landmarks_px: MediaPipe's, (N, 6, 2), as ``LANDMARKS``; nan where there is none.
         clips: name of the clip, (N,).
-        stamps_ns: when they were taken, (N,).
+        stamps_ns: stamps of the images, (N,).
     """
 
     camera: Camera
@@ -76,12 +76,12 @@ class Variant:
     """One way to track a session.
 
     Attributes:
-        name: in the table.
+        name: its name in the table.
         silhouettes: ``ours``, ``region`` (the largest region of ours) or ``mediapipe``.
-        fits: the body is fitted to the first silhouette; else it is a guess put at its place.
-        distance: the distance is given.
-        colors: images are given, too.
-        anew: tracking starts anew with each clip.
+        fits: whether the body is fitted to the first silhouette, instead of only placed there.
+        distance: whether the distance is given.
+        colors: whether images are given.
+        anew: whether tracking starts anew with each clip.
     """
 
     name: str
@@ -164,7 +164,7 @@ def projected(keypoints_m: FloatArray, camera: Camera) -> FloatArray:
 
 
 def track(frames: Frames, variant: Variant, stature_m: float, distance_m: float, seed: int) -> Run:
-    """Track every frame in one of the ways."""
+    """Track every frame as the variant says."""
     config, camera = default_preset(), frames.camera
     count = len(frames.clips)
     errors, iou = np.full((count, len(LANDMARKS)), np.nan), np.full(count, np.nan)
@@ -202,7 +202,7 @@ def _silhouette(frames: Frames, variant: Variant, i: int) -> Image:
 
 
 def _placed(body: BodyModel, silhouette: Image, camera: Camera) -> BodyModel:
-    """A guess at the height of the head and as far aside as it."""
+    """Return the body with its head at that of the silhouette."""
     person = upper_body(silhouette)
     if person is None:
         return body
@@ -211,7 +211,7 @@ def _placed(body: BodyModel, silhouette: Image, camera: Camera) -> BodyModel:
 
 
 def _iou(cost: WholeBodyCost, estimate: Estimate, mask: Image) -> float:
-    """Overlap of the drawn model and a mask, in the rows that the tracker looks at."""
+    """Return the overlap of the drawn model and a mask in the rows that the tracker uses."""
     assert estimate.posture is not None
     assert estimate.offset_m is not None
     state = np.concatenate([estimate.posture, estimate.offset_m])
@@ -232,7 +232,7 @@ def silhouette_iou(frames: Frames, silhouettes: str) -> FloatArray:
 
 
 def cells(runs: list[Run], chosen: NDArray[np.bool_]) -> list[str]:
-    """Return the figures of some frames (N,), of all runs together."""
+    """Return the figures of the chosen frames (N,), as means over the runs."""
     errors = np.concatenate([run.errors_px[chosen] for run in runs])
     missing = np.mean([np.count_nonzero(np.isnan(run.iou[chosen])) for run in runs])
     if missing == np.count_nonzero(chosen):
@@ -249,7 +249,7 @@ _HEADER = "mean, px | shoulders | elbows | wrists | model's IoU | frames without
 def report(
     frames: Frames, results: dict[Variant, list[Run]], given: argparse.Namespace
 ) -> Iterator[str]:
-    """Yield the document's lines."""
+    """Yield the lines of the document."""
     everything = np.ones(len(frames.clips), bool)
     clips = list(dict.fromkeys(frames.clips.tolist()))
     yield (
@@ -280,7 +280,7 @@ def report(
 
 
 def sheet_of(frames: Frames, run: Run) -> Image:
-    """Return the middle of each clip with model and landmarks."""
+    """Return the middle frame of each clip with model and landmarks."""
     numbers = [np.flatnonzero(frames.clips == clip) for clip in dict.fromkeys(frames.clips)]
     middles = [int(of_clip[len(of_clip) // 2]) for of_clip in numbers]
     return contact_sheet(

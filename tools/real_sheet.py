@@ -1,4 +1,4 @@
-"""Pictures of real people for documents: nobody can be recognized, and their source is named."""
+"""Make pictures of real people for documents, blurred, with their source."""
 
 from __future__ import annotations
 
@@ -55,6 +55,6 @@ def blurred(image: Image, mask: Image, landmarks_px: FloatArray) -> Image:
     shoulders = landmarks_px[[0, 3], 1]
     if not np.isfinite(shoulders).all():
         return np.asarray(coarse, np.uint8)
-    # A hand before the face goes with it.
+    # A hand before the face is blurred, too.
     sharp[: max(0, int(shoulders.min()) - 2)] = False
     return np.where(sharp[..., None], image, coarse).astype(np.uint8)

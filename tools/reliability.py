@@ -1,8 +1,8 @@
-"""Table of the promises, their tests and the number of inputs tried: ``docs/reliability.md``.
+"""Write the table of promises, their tests and numbers of inputs in ``docs/reliability.md``.
 
 ``python -m tools.reliability`` (``make reliability``) runs every test that has the marker
 ``promise`` and writes the table between the marks of that page. A test of examples (hypothesis)
-tries as many as ``--examples`` says; any other is tried once for each of its cases.
+tries ``--examples`` inputs; any other test runs once for each of its cases.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Distance of a robot that follows the tracker from one that follows the true joints, as a table.
+"""Measure how far a robot that follows the tracker is from one that follows the true joints.
 
 python -m tools.retarget_accuracy SESSION...
 
@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"
 BEGIN, END = "<!-- retarget-accuracy:begin -->", "<!-- retarget-accuracy:end -->"
 OTHERS_RAD = (0.4, 0.55, 1.0)
-"""Further limits of the dead-man, in the last rows."""
+"""Further values of ``max_stddev_rad``, for the last rows."""
 _HEAD = (
     *("session", "standing still", "mean, moving", "half below", "nine in ten below"),
     "mean, all images",
@@ -56,7 +56,7 @@ class HandError:
         mean: distance while it moved.
         percentile_50: half of the distances are below.
         percentile_90: nine in ten are below.
-        with_frozen: mean distance over all images: the true arm moves on while the robot stands.
+        with_frozen: mean distance over all images; the true arm moves on while the robot stands.
     """
 
     images: int
@@ -74,14 +74,14 @@ def hand_errors(
     robot: Robot,
     configs: Sequence[RetargetConfig],
 ) -> list[HandError]:
-    """Track a session and let a robot follow either arm, as measured and as it truly was.
+    """Track a session and compare robots that follow the measured and the true arms.
 
     Args:
         session: the recording.
         tracker: settings of the tracker.
         seed: of initialization and filters.
         robot: the arm.
-        configs: settings, each for an error of its own; ``side`` does not count.
+        configs: settings, one for each returned error; ``side`` is ignored.
 
     Raises:
         CardboxError: the recording or the robot cannot be used.
@@ -111,7 +111,7 @@ def hand_errors(
 
 
 def _error(sides: Sequence[tuple[FloatArray, BoolArray]]) -> HandError:
-    """Return the error of both arms, each with distances and whether the robot moved."""
+    """Return the error of both arms from their distances and whether the robot moved."""
     distance_cm = np.concatenate([distance for distance, _ in sides])
     moving = np.concatenate([is_moving for _, is_moving in sides])
     while_moving = distance_cm[moving] if moving.any() else np.array([np.nan])

@@ -1,4 +1,4 @@
-"""Error of RULA scores against those of the true joints, as a table for ``docs/ergonomics.md``.
+"""Compare RULA scores with those of the true joints, as a table for ``docs/ergonomics.md``.
 
 python -m tools.rula_accuracy SESSION...
 
@@ -53,8 +53,8 @@ _HEAD = (
     f"time above {ABOVE}, true",
 )
 WAYS = ("mean posture", "normal", "particles", "always the same")
-"""Sources of a score: the mean posture; mean and deviations, as in the node; the particles; and the
-most frequent true score of the session, for comparison."""
+"""Sources of a score: the mean posture; mean and deviations, as in the node; the particles; and for
+comparison the most frequent true score of the session."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ class ScoreError:
         frames: number of images.
         difference: mean absolute difference of the expected score.
         equal: share of images whose likeliest score is the true one.
-        within_one: share of those where it is at most 1 off.
+        within_one: share of images where it is at most 1 off.
         chance_of_truth: mean chance that the distribution gives the true score.
         above: mean chance of a score above ``ABOVE``.
-        true_above: share of images whose true score is.
+        true_above: share of images whose true score is above ``ABOVE``.
     """
 
     frames: int

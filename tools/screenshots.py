@@ -1,8 +1,6 @@
-"""The images of the documents, made by the code that they show.
+"""Write the images of the documents: ``python -m tools.screenshots --output docs/images``.
 
-``python -m tools.screenshots --output docs/images`` writes them.
-
-A synthetic session is recorded, its person measured and tracked, all without ROS; the same seed
+The tool records a synthetic session, measures its person and tracks it, without ROS; the same seed
 gives the same images. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` an image, its
 silhouette and the model over it, ``guidance.jpg`` the guidance while a person is measured.
 """
@@ -37,10 +35,10 @@ from cardbox_tracker.simulation.session import synthesize_session
 _SCALE = 2
 _QUALITY = 82
 _WIDTH_PX = 1200
-# Moments that show most, as fractions of each motion.
+# The moment of each motion that is shown, as a fraction of its length.
 _MOMENTS = {"wave": 0.53, "bend": 0.63, "bow": 0.45}
-# Reference, seconds before it is held, and those left: not yet quite in the posture, and in it, so
-# that the image shows what the outline and its colours are for.
+# Reference, seconds before it is held, and seconds of the count-down. The person is on the way to
+# the posture or in it, so that the outline has several colours.
 _GUIDED = (("front", -0.3, 1), ("side", 0.9, 3), ("arms", 0.45, 2))
 _SETTLED_S = 0.3
 
@@ -114,7 +112,7 @@ def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> Imag
 
 
 def _inside(segment: Segment) -> TimeSpan:
-    """The segment without its ends, where the person still moves."""
+    """Return the segment without its ends, where the person still moves."""
     return TimeSpan(segment.start_s + _SETTLED_S, segment.end_s - _SETTLED_S)
 
 
@@ -124,7 +122,7 @@ def _large(image: ImageArray) -> ImageArray:
 
 
 def _row(images: list[ImageArray]) -> ImageArray:
-    """Images side by side with a white gap, ``_WIDTH_PX`` wide at most."""
+    """Return images side by side with a white gap, at most ``_WIDTH_PX`` wide."""
     gap = np.full((images[0].shape[0], 8, 3), 255, np.uint8)
     row = np.hstack([part for image in images for part in (gap, image)][1:])
     factor = min(1.0, _WIDTH_PX / row.shape[1])
@@ -140,7 +138,7 @@ def _write(path: Path, image: ImageArray) -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Write the images; the exit code is 1 after an error told in words."""
+    """Write the images; the exit code is 1 after an error."""
     parser = argparse.ArgumentParser(prog="python -m tools.screenshots", description=__doc__)
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder to fill")
     parser.add_argument("--seed", type=int, default=0, help="of recording and filters")

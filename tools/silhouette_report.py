@@ -25,12 +25,12 @@ from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 Image = NDArray[np.uint8]
-# Factor of an image of a time (s) and a shape (H, W[, channels]).
+# Takes a time (s) and a shape (H, W[, channels]); returns the factor on an image.
 Light = Callable[[float, tuple[int, ...]], Any]
 
-# At the ends of the empty scene, somebody may be about to come in.
+# A person may be partly in view at the ends of the empty scene.
 _MARGIN_S = 0.2
-# A smaller part of the image is no person to be compared.
+# A smaller share of the image does not count as a person.
 _LEAST = 0.004
 _LIMBS = ("left_shoulder", "left_elbow", "left_hand", "right_shoulder", "right_elbow", "right_hand")
 _STEP_S = 6.0
@@ -50,7 +50,7 @@ def _drift(time_s: float, _: tuple[int, ...]) -> float:
 
 
 def _at(column: float, row: float, reach: float) -> Light:
-    """Return a lamp at a place, as shares of the image's width and height, that is 60 % bright."""
+    """Return a lamp of 60 % at a place given as shares of the image's width and height."""
 
     def light(time_s: float, shape: tuple[int, ...]) -> Any:
         if not int(time_s / _STEP_S) % 2:
@@ -110,7 +110,7 @@ def limb_pixels(joints: dict[str, Any], scale: float) -> Image:
 
 
 def images_of(folder: Path, light: Light | None) -> Iterator[tuple[float, Image]]:
-    """Yield the images of a session, in another light if asked for, and their times."""
+    """Yield time and image of a session, in another light if that is given."""
     with BagReader(folder / "bag") as bag:
         for image in bag.images():
             time_s = (image.stamp_ns - bag.start_ns) / 1e9
@@ -182,10 +182,11 @@ def report(sessions: list[Path], lit: Path | None) -> Iterator[str]:
     yield from (
         "# Silhouettes against the true ones",
         "",
-        "Made by `python -m tools.silhouette_report`. Over all images with a person after the "
-        "empty scene. *Missing* and *extra* pixels as a share of the person; *arms found*: share "
-        "of the true pixels along forearms and hands. The scene is learned from its first "
-        f"{BackgroundConfig().learn_images} images, as the node does.",
+        "`python -m tools.silhouette_report` made this page. The figures are means over all "
+        "images with a person after the empty scene. *Missing* and *extra* are pixels as a share "
+        "of the person; *arms found* is the share of the true pixels along forearms and hands. "
+        f"The scene is learned from its first {BackgroundConfig().learn_images} images, as in the "
+        "node.",
         "",
         f"| session | {' | '.join(FIGURES)} |",
         "|---" * (1 + len(FIGURES)) + "|",
@@ -202,7 +203,7 @@ def report(sessions: list[Path], lit: Path | None) -> Iterator[str]:
         "",
         f"## `{lit.name}` in changing light",
         "",
-        "IoU over all images, and 2 to 2.5 s after each step.",
+        "The columns have the IoU over all images, and 2 to 2.5 s after each step.",
         "",
         "| light | IoU | 2 s after a step |",
         "|---|---|---|",

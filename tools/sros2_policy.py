@@ -1,4 +1,4 @@
-"""Write ``config/sros2_policy*.xml``: what each node may do, read from the graph of running nodes.
+"""Write ``config/sros2_policy*.xml``, the rights of each node, from the graph of running nodes.
 
 ``python -m tools.sros2_policy`` starts the nodes of each layout in this process, asks the graph for
 their topics and services, and allows these and nothing else. ``docs/security.md`` says how the
@@ -35,25 +35,24 @@ from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.simulation.session import session_camera
 
 _CONFIG = Path(__file__).resolve().parents[1] / "config"
-# Rights of an operator of the tracker: no parameters, no published topics.
+# An operator of the tracker sets no parameters and publishes no topics.
 OPERATOR = "operator"
 _TRIGGER = "std_srvs/srv/Trigger"
 _WAIT_S = 30.0
 _COMMENT = """
-  What each node of cardbox_tracker may do with SROS 2, and nothing else; see docs/security.md.
-  Written by 'python -m tools.sros2_policy' from the graph of the running nodes.
+  SROS 2 allows each node of cardbox_tracker these topics and services only; see docs/security.md.
+  'python -m tools.sros2_policy' writes this file from the graph of the running nodes.
 """
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which nodes run together, as a launch file starts them.
+    """Nodes that run together, as a launch file starts them.
 
     Attributes:
         file: name of its policy.
         cameras: namespaces of several cameras; empty: one, without a namespace.
-        depth: whether they are a rectified pair, whose depth is measured; drivers of the user's
-            own publish their images.
+        depth: whether they are a rectified pair with depth; other drivers publish their images.
     """
 
     file: str
@@ -62,7 +61,7 @@ class Layout:
 
     @property
     def path(self) -> Path:
-        """Where its policy is."""
+        """Path of its policy."""
         return _CONFIG / self.file
 
     @property
@@ -90,7 +89,7 @@ class Access:
 
 
 def access_of(observer: Any, name: str, place: str) -> Access:
-    """Return what the graph says of the node ``name`` in the namespace ``place``."""
+    """Return topics and services of the node ``name`` in the namespace ``place``."""
 
     def names(query: Callable[..., Any]) -> dict[str, list[str]]:
         return dict(query(name, place))
@@ -111,9 +110,9 @@ def access_of(observer: Any, name: str, place: str) -> Access:
     )
 
 
-# These are the same for all nodes, whatever their namespace.
+# These names are the same in all namespaces.
 _GLOBAL = ("/diagnostics", "/rosout", "/parameter_events", "/tf_static")
-# Nodes that learn from it where several cameras stand; only where tf2_msgs is installed.
+# With several cameras, these nodes read /tf_static if tf2_msgs is installed.
 _OF_TRANSFORMS = ("tracker", "initializer")
 
 
@@ -153,7 +152,7 @@ def policy(nodes: dict[str, Access]) -> str:
 
 
 def _place(path: str) -> str:
-    """The namespace of the node ``path``, such as cam0/background; empty if it has none."""
+    """Return the namespace of the node ``path``, such as cam0/background, or an empty text."""
     return f"/{path}".rpartition("/")[0]
 
 
@@ -161,7 +160,7 @@ def _place(path: str) -> str:
 def running(
     folder: Path, layout: Layout, domain: int | None = None
 ) -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Context of the nodes of ``layout``; gives a node that observes them, and their paths."""
+    """Run the nodes of ``layout``; yield a node that observes them, and their paths."""
     video = folder / "video.avi"
     writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (64, 48))
     writer.write(np.zeros((48, 64, 3), np.uint8))
@@ -206,7 +205,7 @@ def running(
 
 
 def read_graph(folder: Path, layout: Layout, domain: int | None = None) -> dict[str, Access]:
-    """Return what each node has, as another node sees it once nothing more comes."""
+    """Return the access of each node, once another node discovers nothing more."""
     with running(folder, layout, domain) as (observer, paths):
         found: dict[str, Access] = {}
         settled_s = end_s = time.monotonic() + _WAIT_S

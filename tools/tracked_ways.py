@@ -1,7 +1,7 @@
-"""Recorded sessions, tracked in several ways: what the package's networks learn from.
+"""Track recorded sessions in four ways, from which the package's networks learn.
 
-As it is; without images, or with one of several cameras after the other covered; with a body from
-proportions, whom nobody measured; with depth images, where the session has them.
+A session is tracked as it is; without images or with its cameras covered in turn; with a body from
+proportions instead of a measured one; or with its depth images, if it has any.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, Observe, track_session
 
-# One of so many sessions has no images, one has a person whose distance nobody tells, and one has
-# a depth image of somebody who was not measured.
+# One of three sessions is tracked without images, one of three without a given distance, and one of
+# four with depth images has a body that was not measured.
 WITHOUT_IMAGES, WITHOUT_DISTANCE, WITHOUT_MEASURING = 3, 3, 4
-# Deviations of what people say of stature and distance, as logarithms.
+# Standard deviations of the logarithms of stature and distance as people state them.
 TOLD = 0.02, 0.05
-# A camera is covered for the last seconds of each turn.
+# One camera is covered in the last COVERED_S seconds of each turn.
 TURN_S, COVERED_S = 6.0, 2.5
 
 
@@ -34,10 +34,10 @@ class Way(NamedTuple):
     """How a session is tracked.
 
     Attributes:
-        has_images: images beside silhouettes.
-        covers: of several cameras one after the other is covered for a while.
-        body: one that nobody measured; None: the one that is measured.
-        has_depth: the depth images of the session.
+        has_images: whether the tracker gets images beside silhouettes.
+        covers: whether several cameras are covered in turn.
+        body: a body that was not measured; None: the measured one.
+        has_depth: whether the tracker gets the depth images of the session.
     """
 
     has_images: bool = True
@@ -47,22 +47,22 @@ class Way(NamedTuple):
 
 
 def way_of(session: RecordedSession, seed: int) -> Way:
-    """Return how to track a session: one of four ways, in turns of the seeds."""
+    """Return how to track a session; the seed modulo 4 chooses one of four ways."""
     drawn = crc32(session.name.encode())
     if seed % 4 == 0:
         return Way()
     if seed % 4 == 1:
-        # Who sends silhouettes alone shall have a correction, too.
+        # The correction also has to serve users who send silhouettes alone.
         return Way(has_images=drawn % WITHOUT_IMAGES > 0, covers=True)
     if seed % 4 == 3:
-        # Who has a depth camera often does without measuring.
+        # Users of a depth camera often skip the measurement.
         is_guessed = drawn % WITHOUT_MEASURING == 0
         return Way(body=_guessed(session, drawn, seed) if is_guessed else None, has_depth=True)
     return Way(body=_guessed(session, drawn, seed))
 
 
 def _guessed(session: RecordedSession, drawn: int, seed: int) -> BodyModel:
-    """Return a body from what people would say of themselves."""
+    """Return a body from stature and distance as people would state them."""
     truth, rng = session.truth, np.random.default_rng((drawn, seed))
     told = np.exp(np.array(TOLD) * rng.standard_normal(2))
     stature_m = float(np.clip((truth.stature_m or STATURE_M) * told[0], *STATURE_LIMITS_M))
@@ -72,7 +72,7 @@ def _guessed(session: RecordedSession, drawn: int, seed: int) -> BodyModel:
 
 
 def covered(time_s: float) -> int | None:
-    """Return which of two cameras is covered at a time since tracking began; None: none."""
+    """Return the number of the covered camera, of two, at a time since tracking began, or None."""
     turn, part_s = divmod(time_s, TURN_S)
     return int(turn) % 2 if part_s > TURN_S - COVERED_S else None
 

@@ -1,8 +1,8 @@
-"""A picture of ``cardbox view``, also where there is no graphics card and no screen.
+"""Draw a picture of ``cardbox view`` without a graphics card or a screen.
 
 python -m tools.viewer_screenshot FILE.rrd OUT.jpg
 
-Needs rerun-sdk and, on Debian, the packages xvfb and mesa-vulkan-drivers: the viewer then draws
+The tool needs rerun-sdk and, on Debian, the packages xvfb and mesa-vulkan-drivers. The viewer draws
 with the software renderer llvmpipe on a virtual screen.
 """
 
@@ -31,7 +31,7 @@ def main(args: list[str] | None = None) -> int:
     given = parser.parse_args(args)
     with tempfile.TemporaryDirectory() as folder:
         shot = Path(folder) / "shot.png"
-        # The pointer of a screen begins in its middle, so it is larger than the window.
+        # The pointer begins in the middle of the screen, so a large screen keeps it off the window.
         screen = ["xvfb-run", "--auto-servernum", "--server-args=-screen 0 4000x3000x24"]
         viewer = [sys.executable, "-m", "rerun_cli", str(given.recording), "--port=auto"]
         subprocess.run(

@@ -93,14 +93,10 @@ def run(options: argparse.Namespace) -> None:
     if options.sessions:
         _sessions(options, jobs)
         return
-    from_checkout("experiments.evaluate", "experiments").evaluate(
-        options.output,
-        options.runs,
-        options.seed,
-        options.quick,
-        options.session,
-        jobs,
-    )
+    experiments = from_checkout("experiments.evaluate", "experiments")
+    plans = from_checkout("experiments.plan", "experiments")
+    plan = (plans.quick_plan if options.quick else plans.full_plan)(options.runs)
+    experiments.evaluate(options.output, plan, options.seed, options.session, jobs)
     print(f"wrote {options.output}/report.md, and all numbers to {options.output}/results.json")
 
 

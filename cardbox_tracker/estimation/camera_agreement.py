@@ -8,7 +8,7 @@ degree in pitch or yaw from the extrinsics is reported.
 A roll of the camera hardly changes the fit, because the model leans with it. It is estimated from
 the planes through both cameras that touch the person
 (:mod:`cardbox_tracker.estimation.silhouette_tangents`).
-``docs/two-cameras.md`` has detection rates.
+``docs/research/two-cameras.md`` has detection rates.
 """
 
 from __future__ import annotations

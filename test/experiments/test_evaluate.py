@@ -33,7 +33,7 @@ FIGURES = (
 @pytest.fixture(scope="module")
 def output(tmp_path_factory: pytest.TempPathFactory, tiny_plan: Plan, silent: Progress) -> Path:
     folder = tmp_path_factory.mktemp("tiny")
-    evaluate(folder, 3, plan=tiny_plan, progress=silent)
+    evaluate(folder, tiny_plan, progress=silent)
     return folder
 
 
@@ -133,7 +133,7 @@ def of_recording(
 ) -> Path:
     """The results of a recorded session with seed 1."""
     folder = tmp_path_factory.mktemp("recorded")
-    evaluate(folder, 3, 1, session=recording, progress=silent)
+    evaluate(folder, full_plan(3), 1, session=recording, progress=silent)
     return folder
 
 
@@ -148,9 +148,9 @@ def test_resuming_an_interrupted_evaluation_gives_the_same(
         yield show
 
     with pytest.raises(KeyboardInterrupt):
-        evaluate(tmp_path, 3, 1, session=recording, progress=interrupting)
+        evaluate(tmp_path, full_plan(3), 1, session=recording, progress=interrupting)
     assert not (tmp_path / "results.json").exists()
-    evaluate(tmp_path, 3, 1, session=recording, progress=silent)
+    evaluate(tmp_path, full_plan(3), 1, session=recording, progress=silent)
     assert without_place(results_in(tmp_path)) == without_place(results_in(of_recording))
     assert (tmp_path / "per_frame.csv").read_bytes() == (
         of_recording / "per_frame.csv"
@@ -175,15 +175,15 @@ def test_the_seed_decides_the_results(
     recording: Path, of_recording: Path, tmp_path: Path, silent: Progress
 ) -> None:
     # That the same seed gives the same is seen where an evaluation is resumed.
-    other = evaluate(tmp_path, 3, 2, session=recording, progress=silent)
+    other = evaluate(tmp_path, full_plan(3), 2, session=recording, progress=silent)
     assert results_in(of_recording)["bow"]["drs"]["error_m"] != other["bow"]["drs"]["error_m"]
 
 
 def test_recorded_sessions_below_the_output_are_in_its_report(
     recording: Path, output: Path, tiny_plan: Plan, silent: Progress
 ) -> None:
-    evaluate(output / "person", 2, session=recording, progress=silent)
-    evaluate(output, 3, plan=tiny_plan, progress=silent)
+    evaluate(output / "person", full_plan(2), session=recording, progress=silent)
+    evaluate(output, tiny_plan, progress=silent)
     report = (output / "report.md").read_text()
     assert "## Recorded sessions" in report
     assert "[person](person/report.md)" in report

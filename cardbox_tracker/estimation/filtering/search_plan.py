@@ -1,7 +1,7 @@
 """What the whole-body filter does differently with one camera and with several: all of it here.
 
 Several outlines leave less of the fit flat than one, so other steps are worth their time.
-``docs/two-cameras.md`` says what was tried.
+``docs/research/two-cameras.md`` says what was tried.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ def _steadiness(results: Results) -> list[str]:
         "Coverage: in how many images the true angle of a joint lies within two of its standard "
         "deviations; mean, least and most over the 11 angles. The acceleration error is that of "
         "the joints' places, and of their places beside the middle of the shoulders. MediaPipe's "
-        "time is that of another run; `cardbox benchmark` compares in one run.",
+        "time was measured in another run.",
         "",
         *_table(results, columns, "{:.1f}"),
     ]
