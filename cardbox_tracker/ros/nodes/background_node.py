@@ -20,7 +20,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.settings import settings_of
@@ -44,16 +44,16 @@ class BackgroundParameters(NodeParameters):
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
-        320, "working resolution, width", unit="px", limits=(32, 4096), read_only=True
+        320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START
     )
     height: int = parameter(
-        240, "working resolution, height", unit="px", limits=(32, 4096), read_only=True
+        240, "working resolution, height", unit="px", limits=(32, 4096), effect=AT_START
     )
     background_file: str = parameter(
         "",
         "file to keep the learned background in; if it exists at the start and fits the camera and "
         "what it shows, nothing has to be learned, although somebody stands there; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     within_m: float = parameter(
         0.0,
@@ -66,7 +66,7 @@ class BackgroundParameters(NodeParameters):
         "",
         "topic of these depth images (16UC1, 32FC1 or compressedDepth) from where the camera is, "
         "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     learning: str = parameter(
         next(iter(WAYS)),

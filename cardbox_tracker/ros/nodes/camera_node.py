@@ -18,7 +18,7 @@ from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 from cardbox_tracker.vision.camera_device import (
@@ -37,22 +37,22 @@ class CameraParameters(NodeParameters):
     """Publish a V4L2 device or a video file."""
 
     device: str = parameter(
-        "/dev/video0", "V4L2 device; not used when a file is given", read_only=True
+        "/dev/video0", "V4L2 device; not used when a file is given", effect=AT_START
     )
-    file: str = parameter("", "video file to play instead of a device", read_only=True)
+    file: str = parameter("", "video file to play instead of a device", effect=AT_START)
     loop: bool = parameter(False, "play the file again and again", effect="end of the file")
     width: int = parameter(
-        640, "width to ask the device for", unit="px", limits=(32, 8192), read_only=True
+        640, "width to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     height: int = parameter(
-        480, "height to ask the device for", unit="px", limits=(32, 8192), read_only=True
+        480, "height to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     rate_hz: float = parameter(
         15.0,
         "images a second; 0 takes the file's own rate",
         unit="Hz",
         limits=(0.0, 240.0),
-        read_only=True,
+        effect=AT_START,
     )
     encoding: str = parameter(
         "mono8",
@@ -60,24 +60,24 @@ class CameraParameters(NodeParameters):
         choices=("mono8", "bgr8"),
     )
     frame_id: str = parameter("camera_optical_frame", "name of the camera's optical frame")
-    calibration_file: str = parameter("", "YAML file of camera_calibration", read_only=True)
+    calibration_file: str = parameter("", "YAML file of camera_calibration", effect=AT_START)
     horizontal_fov_deg: float = parameter(
         0.0,
         "without a calibration file: assume an ideal lens of this field of view; 0: publish the "
         "camera as uncalibrated",
         unit="deg",
         limits=(0.0, 170.0),
-        read_only=True,
+        effect=AT_START,
     )
     settle_s: float = parameter(
         2.0,
         "time for the automatic exposure before it is locked; the background must not change",
         unit="s",
         limits=(0.0, 60.0),
-        read_only=True,
+        effect=AT_START,
     )
     lock_exposure: bool = parameter(
-        True, "switch exposure and white balance to manual where the device allows", read_only=True
+        True, "switch exposure and white balance to manual where the device allows", effect=AT_START
     )
 
     def check(self) -> None:

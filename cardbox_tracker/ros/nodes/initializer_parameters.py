@@ -10,7 +10,7 @@ from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
 )
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.vision.pairing import camera_names
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
@@ -68,7 +68,7 @@ class InitializerParameters(NodeParameters):
     model_file: str = parameter(
         "",
         "file to save the body model to; if it exists at the start, it is published; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     optical_frame_in_urdf: bool = parameter(
         True,
@@ -90,7 +90,7 @@ class InitializerParameters(NodeParameters):
         "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the (first) camera is, "
         "of its view or with a CameraInfo on TOPIC/camera_info, which measure how far away the "
         "person is; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     measure_distance: bool = parameter(
         True,

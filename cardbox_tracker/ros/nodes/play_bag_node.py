@@ -32,7 +32,7 @@ from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _PROGRESS_S = 5.0
@@ -47,35 +47,39 @@ _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/
 class PlayBagParameters(NodeParameters):
     """Play a recording."""
 
-    bag: str = parameter("", "rosbag2 folder or .mcap file to play", read_only=True)
+    bag: str = parameter("", "rosbag2 folder or .mcap file to play", effect=AT_START)
     rate: float = parameter(
         1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0), effect="at once"
     )
     loop: bool = parameter(
         False, "play again and again; the stamps start over too", effect="end of the bag"
     )
-    topics: list[str] = parameter([], "topics to play; all if empty", read_only=True)
+    topics: list[str] = parameter([], "topics to play; all if empty", effect=AT_START)
     start_s: float = parameter(
         0.0,
         "play from this time on, from the bag's start",
         unit="s",
         limits=(0.0, 1e6),
-        read_only=True,
+        effect=AT_START,
     )
     duration_s: float = parameter(
-        0.0, "play this long; 0: to the end of the bag", unit="s", limits=(0.0, 1e6), read_only=True
+        0.0,
+        "play this long; 0: to the end of the bag",
+        unit="s",
+        limits=(0.0, 1e6),
+        effect=AT_START,
     )
     pause_at: list[float] = parameter(
-        [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
+        [], "pause at these times from the bag's start, s, until play_bag/resume", effect=AT_START
     )
     wait_for_subscribers: bool = parameter(
-        True, "begin when somebody subscribes to a played image topic", read_only=True
+        True, "begin when somebody subscribes to a played image topic", effect=AT_START
     )
     wait_for_topics: list[str] = parameter(
         [],
         "begin when somebody publishes these topics, such as keypoints: at its very first start "
         "the tracker compiles for half a minute",
-        read_only=True,
+        effect=AT_START,
     )
     delay_s: float = parameter(
         0.5,
@@ -83,7 +87,7 @@ class PlayBagParameters(NodeParameters):
         "none misses the beginning; for 3 s while images of a further camera have none",
         unit="s",
         limits=(0.0, 600.0),
-        read_only=True,
+        effect=AT_START,
     )
 
     def check(self) -> None:

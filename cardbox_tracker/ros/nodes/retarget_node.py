@@ -25,7 +25,7 @@ from cardbox_tracker.ros.messages.results import posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import settings_of
 
@@ -35,29 +35,29 @@ _CHECK_S = 0.1
 
 def _fixed(name: str) -> Any:
     """Return a setting of the retargeting, which stays as it is while a robot moves."""
-    return shared(RetargetConfig, name, read_only=True)
+    return shared(RetargetConfig, name, effect=AT_START)
 
 
 @dataclass(frozen=True)
 class RetargetParameters(NodeParameters):
     """Move a robot arm as the tracked person moves theirs."""
 
-    robot_file: str = parameter("", "URDF of the robot; has to be given", read_only=True)
+    robot_file: str = parameter("", "URDF of the robot; has to be given", effect=AT_START)
     joint_map_file: str = parameter(
         "",
         "which joint moves which, as in config/example_joint_map.yaml; empty: the robot's hand "
         "follows the person's by inverse kinematics",
-        read_only=True,
+        effect=AT_START,
     )
     hand_link: str = parameter(
-        "", "the robot's hand; empty: the link with the most joints before it", read_only=True
+        "", "the robot's hand; empty: the link with the most joints before it", effect=AT_START
     )
     timeout_s: float = parameter(
         0.5,
         "dead-man: without a posture for so long the robot stands still",
         unit="s",
         limits=(0.05, 10.0),
-        read_only=True,
+        effect=AT_START,
     )
     side: str = _fixed("side")
     max_speed: float = _fixed("max_speed")

@@ -28,7 +28,7 @@ from cardbox_tracker.ros.messages.results import posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import settings_of
 
@@ -55,7 +55,7 @@ class RulaParameters(NodeParameters):
     side_bent_deg: float = shared(RulaConfig, "side_bent_deg")
     upright_deg: float = shared(RulaConfig, "upright_deg")
     seed: int = parameter(
-        0, "random seed of the postures that are drawn", limits=(0, 2**31 - 1), read_only=True
+        0, "random seed of the postures that are drawn", limits=(0, 2**31 - 1), effect=AT_START
     )
 
     def config(self) -> RulaConfig:

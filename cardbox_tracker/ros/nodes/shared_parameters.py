@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cardbox_tracker.ros.runtime.parameter_fields import parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, parameter
 from cardbox_tracker.vision.encodings import MOST_PIXELS
 
 
@@ -15,7 +15,7 @@ def cameras_parameter() -> Any:
         "namespaces of the cameras that see the person, such as cam0 and cam1 for "
         "cam0/silhouette and cam1/silhouette; results are in the first one's frame; empty: one "
         "camera, without a namespace of its own",
-        read_only=True,
+        effect=AT_START,
     )
 
 
@@ -25,7 +25,7 @@ def extrinsics_parameter() -> Any:
         "",
         "where the cameras stand: a camchain of Kalibr (YAML) or a camera group of aniposelib "
         "(TOML); not needed for a rectified pair or with /tf_static; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
 
 
@@ -35,7 +35,7 @@ def image_transport_parameter() -> Any:
         "raw",
         "raw subscribes to image_raw, compressed to image_raw/compressed",
         choices=("raw", "compressed"),
-        read_only=True,
+        effect=AT_START,
     )
 
 

@@ -18,7 +18,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
@@ -38,7 +38,7 @@ class StereoDepthParameters(NodeParameters):
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
-        320, "width at which depth is measured", unit="px", limits=(32, 4096), read_only=True
+        320, "width at which depth is measured", unit="px", limits=(32, 4096), effect=AT_START
     )
     nearest_m: float = parameter(
         NEAREST_M,

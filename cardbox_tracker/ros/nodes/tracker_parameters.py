@@ -14,6 +14,7 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 from cardbox_tracker.estimation.settings_file import read_settings
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
+    AT_START,
     RESTARTS,
     NodeParameters,
     parameter,
@@ -103,13 +104,13 @@ class TrackerParameters(NodeParameters):
     torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
     arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
     effort: float = shared(WholeBodyConfig, "effort")
-    corrector: str = shared(WholeBodyConfig, "corrector", read_only=True)
+    corrector: str = shared(WholeBodyConfig, "corrector", effect=AT_START)
     output_smoothing_s: float = shared(WholeBodyConfig, "output_smoothing_s")
     settings_file: str = parameter(
         "",
         "YAML file with further settings, by the names at the end of docs/parameters.md; what "
         "differs from a default here goes before; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     relocalize: str = shared(
         TrackerConfig,
@@ -127,36 +128,36 @@ class TrackerParameters(NodeParameters):
     model_file: str = parameter(
         "",
         "body model to start with; one that arrives on body_model replaces it; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     torso_place: bool = parameter(
         True,
         "joint_states also has torso_x and torso_z, where the person stands; must be the same as "
         "the initializer's torso_place_in_urdf",
-        read_only=True,
+        effect=AT_START,
     )
     use_image: bool = parameter(
         True,
         "also take silhouette/image, to see hands and forearms before the torso by the colours "
         "that the body model has of them",
-        read_only=True,
+        effect=AT_START,
     )
     publish_tf: bool = parameter(
         False,
         "also publish the links of robot_description on /tf, as robot_state_publisher would; not "
         "beside it, and not with several trackers in one TF tree; needs the package tf2_msgs",
-        read_only=True,
+        effect=AT_START,
     )
     optical_frame_in_tf: bool = parameter(
         True,
         "publish_tf also says where the camera's optical frame is; false if another node does",
-        read_only=True,
+        effect=AT_START,
     )
     rep155_id: str = parameter(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
         "this ID of letters, digits and underscores; empty: do not",
-        read_only=True,
+        effect=AT_START,
     )
 
     cameras: list[str] = cameras_parameter()
@@ -165,7 +166,7 @@ class TrackerParameters(NodeParameters):
         "",
         "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the first camera is, "
         "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
 
     def config(self) -> TrackerConfig:

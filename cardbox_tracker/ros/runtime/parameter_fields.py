@@ -17,6 +17,8 @@ from cardbox_tracker.settings import Setting, settings_of
 
 NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
 """Effects of a live change: it holds from the next image on, or tracking starts again."""
+AT_START = "only at the start"
+"""Effect of a parameter that cannot be changed while the node runs."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +26,17 @@ class ParameterSpec(Setting):
     """Description, range and behaviour of one parameter.
 
     Attributes:
-        read_only: True if it can only be given at the start.
-        effect: when a live change takes effect.
+        effect: when a change takes effect.
         was: former name, which still works; empty if it was not renamed.
     """
 
-    read_only: bool = False
     effect: str = NEXT_IMAGE
     was: str = ""
+
+    @property
+    def read_only(self) -> bool:
+        """True if the parameter can only be given at the start."""
+        return self.effect == AT_START
 
 
 def parameter(
@@ -41,15 +46,13 @@ def parameter(
     unit: str = "",
     limits: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
-    read_only: bool = False,
     effect: str = NEXT_IMAGE,
     was: str = "",
 ) -> Any:
     """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
     lowest, highest = limits or (None, None)
     spec = ParameterSpec(
-        *(description, unit, lowest, highest, choices, effect == RESTARTS),
-        *(read_only, effect, was),
+        *(description, unit, lowest, highest, choices, effect == RESTARTS), effect=effect, was=was
     )
     if isinstance(default, list):
         return field(default_factory=list, metadata={"setting": spec})

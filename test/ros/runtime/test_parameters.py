@@ -21,6 +21,7 @@ from cardbox_tracker.ros.nodes.node_parameters import NODES
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
+    AT_START,
     NEXT_IMAGE,
     RESTARTS,
     NodeParameters,
@@ -44,7 +45,7 @@ class Sample(NodeParameters):
     high: float = parameter(2.0, "upper end", unit="m", limits=(0.0, 10.0))
     count: int = parameter(3, "a count", limits=(1, 5))
     kind: str = parameter("a", "a kind", choices=("a", "b"))
-    fixed: bool = parameter(False, "only at the start", read_only=True)
+    fixed: bool = parameter(False, "only at the start", effect=AT_START)
     names: list[str] = parameter([], "some names")
     times: list[float] = parameter([], "some times")
     fresh: float = parameter(0.5, "a renamed one", limits=(0.0, 1.0), was="stale")
