@@ -123,7 +123,7 @@ def track_inputs(
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.recording import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
-    from cardbox_tracker.recordings.track import track_recording
+    from cardbox_tracker.recordings.track import TrackFiles, track_recording
 
     body = load_body_model(options.model)
     if body.doubt:
@@ -150,8 +150,7 @@ def track_inputs(
                 config,
                 options.seed,
                 options.start,
-                csv,
-                video,
+                TrackFiles(csv, video),
                 observers=(
                     results.add,
                     *observers,

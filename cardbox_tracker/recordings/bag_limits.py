@@ -40,7 +40,7 @@ def check_recording(path: Path) -> None:
     """Check that a recording consists of regular files and states sensible unpacked sizes.
 
     Raises:
-        BagError: it does not.
+        BagError: a file is not regular, or the stated sizes are too large.
     """
     if path.is_dir():
         for name in sorted(os.listdir(path)):
