@@ -1,4 +1,4 @@
-"""Parameters that more than one node has."""
+"""Parameters of several nodes."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def cameras_parameter() -> Any:
 
 
 def extrinsics_parameter() -> Any:
-    """Return the field of the file that says where the cameras stand."""
+    """Return the field of the file with the cameras' poses."""
     return parameter(
         "",
-        "where the cameras stand: a camchain of Kalibr (YAML) or a camera group of aniposelib "
+        "file with the cameras' poses: a camchain of Kalibr (YAML) or a camera group of aniposelib "
         "(TOML); not needed for a rectified pair or with /tf_static; empty: none",
         effect=AT_START,
     )
 
 
 def image_transport_parameter() -> Any:
-    """Return the field of the topic images come on."""
+    """Return the field of the image topic's transport."""
     return parameter(
         "raw",
         "raw subscribes to image_raw, compressed to image_raw/compressed",
@@ -43,7 +43,7 @@ def max_megapixels_parameter() -> Any:
     """Return the field of the largest image that is decoded."""
     return parameter(
         round(MOST_PIXELS / 1e6, 1),
-        "images with more million pixels are refused before they are decoded, as are those with "
-        "sixteen times the pixels of their CameraInfo; a few bytes can stand for gigabytes",
+        "larger images, in millions of pixels, are refused before they are decoded, as are images "
+        "with sixteen times the pixels of their CameraInfo; a few bytes can expand to gigabytes",
         limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
     )

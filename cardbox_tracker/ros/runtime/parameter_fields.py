@@ -1,7 +1,7 @@
 """Dataclass fields that become parameters of a node, and how ROS describes them.
 
-A field made by :func:`parameter` carries its description, unit, range or choices, and what a change
-does while the node runs; one made by :func:`shared` takes most of that from a setting of the core.
+A field of :func:`parameter` has a description, a unit, a range or choices, and the effect of a
+change while the node runs. A field of :func:`shared` takes most of these from a core setting.
 """
 
 from __future__ import annotations
@@ -82,13 +82,13 @@ class NodeParameters:
     """Base of the parameter dataclasses; every field is made by :func:`parameter`.
 
     Attributes:
-        retired: names of former versions, and what to do instead of giving each.
+        retired: removed names, and the instruction for each.
     """
 
     retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together; ranges are checked before."""
+        """Raise ValueError if values contradict each other; ranges are checked before."""
 
     @classmethod
     def specs(cls) -> dict[str, ParameterSpec]:
