@@ -51,7 +51,7 @@ class Sample(NodeParameters):
     fresh: float = parameter(0.5, "a renamed one", limits=(0.0, 1.0), was="stale")
 
     def check(self) -> None:
-        """The ends have an order."""
+        """Check that ``low`` is at most ``high``."""
         if self.low > self.high:
             raise ValueError(f"low is {self.low:g}, above high {self.high:g}; lower it")
 
@@ -201,11 +201,8 @@ def test_the_old_name_works_at_the_start_and_live_with_a_hint(
     assert set_values(node, stale=0.25, low=0.5) == (True, "")
     assert live.value == Sample(low=0.5, fresh=0.25)
     assert node.get_parameter("fresh").value == 0.25
-    assert (
-        hints
-        == ["the parameter 'stale' is now called 'fresh'; the old name works in this version only"]
-        * 2
-    )
+    assert len(hints) == 2
+    assert all("'stale'" in hint and "'fresh'" in hint for hint in hints)
     assert set_values(node, fresh=0.75) == (True, "")
     assert len(hints) == 2
 
@@ -375,7 +372,7 @@ INSTEAD = {"effort": "particles", "output_smoothing_s": "particles", "corrector"
 def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
     preset: str, name: str
 ) -> None:
-    """What settings of the core do is tested in test/estimation/test_settings_act.py."""
+    """The effect of the core's settings is tested in test/estimation/test_settings_act.py."""
     values = {**OTHERS["paper"], **OTHERS["default"]}
     if name in OTHERS[preset]:
         changed = TrackerParameters(preset=preset, **{name: OTHERS[preset][name]})
