@@ -70,7 +70,7 @@ def test_a_name_that_is_no_parameter_is_said_with_the_nearest(
     said: list[str] = []
     monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=said.append))
     assert LiveParameters(node, Sample).value == Sample(fresh=0.7)
-    said = [line for line in said if "no parameter" in line]
+    said = [line for line in said if "not a parameter" in line]
     assert len(said) == 2
     assert all(name in said[0] for name in ("'lo'", "'tested'", "'low'"))
     assert "'nothing_like_it'" in said[1] and "did you mean" not in said[1]
