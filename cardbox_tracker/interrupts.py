@@ -84,11 +84,20 @@ def only_noted() -> Iterator[None]:
         yield
 
 
+def ignore() -> None:
+    """Ignore SIGINT and SIGTERM from now on: for a node that ends, while DDS leaves the network.
+
+    Python has no handlers of its own while it ends, so that a signal would kill the process.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
 def leave(code: int) -> NoReturn:
     """End the process with ``code`` once its output is written, skipping Python's own end.
 
-    Python has no handlers while it ends, so that a second signal would kill the process. It also
-    ends ``python -m`` by SIGINT where Ctrl-C came within exec(), even if that was caught.
+    Python ends ``python -m`` by SIGINT where Ctrl-C came within exec(), even if that was caught.
+    A node needs Python's own end, which takes its participant off the network.
     """
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

@@ -59,7 +59,9 @@ def _run(name: str) -> int:
     # A node that is asked to end has done what it should: 0. A command has not.
     interrupts.end_at_once(0 if name in NODES else None)
     code = start(name, lambda: import_module(NODES.get(name, COMMAND)).main())
-    if interrupts.received():
+    if name in NODES:
+        interrupts.ignore()
+    elif interrupts.received():
         interrupts.leave(code)
     return code
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,3 +79,14 @@ def test_a_command_that_is_starting_ends(number: int, stage: str, tmp_path: Path
     # Before the command has begun, SIGTERM ends it like any process.
     assert code in ((130,) if number == signal.SIGINT else (143, -15))
     assert not (tmp_path / "bag").exists()
+
+
+def test_a_node_that_has_ended_has_left_the_graph(own_graph: Any) -> None:
+    def listed() -> bool:
+        return "stereo_depth" in own_graph.node.get_node_names()
+
+    process = own_graph.start("stereo_depth")
+    own_graph.wait(listed, "the node")
+    assert process.stop() == 0
+    # A participant that is not taken off the network stays for its lease of 20 s.
+    own_graph.wait(lambda: not listed(), "leaving the graph", timeout_s=8.0)

@@ -109,7 +109,7 @@ class Hands:
     def __init__(self) -> None:
         self.takers: dict[str, Any] = {}
 
-    def take(self, topic: str, taker: Any) -> bool:
+    def subscribe(self, topic: str, taker: Any) -> bool:
         self.takers[topic] = taker
         return True
 
