@@ -1,6 +1,6 @@
 """Limits to the memory and the disk space that a recording can take when it is unpacked.
 
-rosbags decompresses each chunk, message or file whole, whatever its size. `check_recording` adds
+rosbags decompresses each chunk, message or file whole, without a limit. `check_recording` adds
 up the sizes that a recording states; `limit_decompression` replaces the functions that rosbags
 calls by ones that stop at a limit, because the stated sizes may be false.
 """

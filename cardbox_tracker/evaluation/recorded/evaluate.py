@@ -49,7 +49,7 @@ def evaluate_sessions(
         The contents of ``sessions.json``.
 
     Raises:
-        CardboxError: a folder is no session, or the results cannot be written.
+        CardboxError: a folder is not a session, or the results cannot be written.
     """
     for folder in folders:
         load_session(folder)  # report errors before the work begins

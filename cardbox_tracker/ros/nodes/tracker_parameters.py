@@ -81,7 +81,7 @@ class TrackerParameters(NodeParameters):
 
     preset: str = parameter(
         "default",
-        "paper: its Table I; default: what tracks best",
+        "paper: the settings of its Table I; default: the most accurate tracking",
         choices=tuple(PRESETS),
         effect=RESTARTS,
     )
