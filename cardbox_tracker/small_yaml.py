@@ -28,8 +28,7 @@ def parse_small_yaml(text: str) -> Any:
     Aliases, tags, repeated keys, more than 64 kB, and more than 8 levels are refused.
 
     Raises:
-        SmallYamlError: the text has one of these, or is not valid YAML. The message does not name
-            the source.
+        SmallYamlError: the text is refused or not valid YAML. The message does not name the source.
     """
     # The first comparison avoids encoding a long text, because a character has at least one byte.
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:

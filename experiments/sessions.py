@@ -23,7 +23,7 @@ from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.vision.background import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
 
@@ -87,7 +87,7 @@ def synthetic_session(
     """Record the synthetic person in ``motion``, and read the recording like any other."""
     with TemporaryDirectory(prefix="cardbox_evaluate_") as folder:
         bag = Path(folder) / "session"
-        synthesize_session(bag, motion, seed, fps, *size)
+        synthesize_session(bag, motion, seed, SessionFormat(fps, *size))
         return recorded_session(bag, seed, size)
 
 

@@ -4,7 +4,7 @@
         calibration_file:=$HOME/camera.yaml person_distance_m:=2.0 camera_pitch_deg:=5.0
 
 Keep the scene empty at the start, then call initializer/initialize and follow initializer/status.
-Several cameras: start it once per camera, each with a namespace and a device of its own.
+For several cameras, start it once per camera, each with its own namespace and device.
 """
 
 import runpy
@@ -28,7 +28,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
-# The node's parameters of the same names.
+# Arguments that are parameters of the node camera.
 ARGUMENTS = {
     "device": Argument("/dev/video0", "V4L2 device"),
     "file": Argument("", "video file to play instead of a device", Path),
@@ -43,7 +43,7 @@ ARGUMENTS = {
     "loop": Argument("false", "play the file again and again", bool),
     "frame_id": Argument("camera_optical_frame", "name of the camera's optical frame"),
 }
-# Arguments of the launch file that is included, and thus of this one.
+# Arguments of the included launch file are also arguments of this one.
 NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
@@ -54,10 +54,10 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
                 for name, a in ARGUMENTS.items()
             ),
-            # What is wrong has to be found before the first node runs.
+            # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
             OpaqueFunction(function=_in_one_process),
-            # First, since it sets the environment and declares what the camera uses as well.
+            # It comes first, because it sets the environment and declares shared arguments.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
             ),
@@ -69,7 +69,7 @@ def generate_launch_description() -> LaunchDescription:
 def _check(context: LaunchContext) -> list[object]:
     check_names(__file__, {*ARGUMENTS, *NODES}, sys.argv)
     values(ARGUMENTS, context.launch_configurations)
-    # Of nodes.launch.py, which would wait for cameras that nobody starts.
+    # With the argument cameras, nodes.launch.py would wait for cameras that are not started here.
     cameras = context.launch_configurations.get("cameras", "")
     if cameras.strip(" []"):
         raise ValueError(
@@ -99,7 +99,7 @@ def _in_one_process(context: LaunchContext) -> list[object]:
 def _camera(context: LaunchContext) -> list[object]:
     if _is_single(context):
         return []
-    # Keeps launch from reading a text as a number or as nothing.
+    # Without a type, launch would read a text as a number or as nothing.
     parameters = {
         name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for name, value in _parameters(context).items()

@@ -1,6 +1,6 @@
-"""The nodes behind a source of images: background, initializer, tracker, and TF and RViz.
+"""The nodes that process images: background, initializer, tracker, and TF and RViz.
 
-Included by live.launch.py and replay.launch.py; start it alone beside a camera driver of your own:
+The other launch files include it; start it alone together with your own camera driver:
 
     ros2 launch cardbox_tracker nodes.launch.py image:=/camera/image_raw \
         camera_info:=/camera/camera_info person_distance_m:=2.0
@@ -52,7 +52,7 @@ ARGUMENTS = {
         "0.0", "how far the camera looks down", float, limits=(-80.0, 80.0)
     ),
     "side_turn": Argument(
-        *("left", "which way the person turns for the side reference: left or right"),
+        *("left", "direction in which the person turns for the side reference: left or right"),
         choices=("left", "right"),
     ),
     "background_file": Argument(
@@ -66,15 +66,15 @@ ARGUMENTS = {
         "", "also publish /humans/bodies/ID/... after REP-155, for this ID", name=True
     ),
     "cameras": Argument(
-        *("", "several cameras of one person by namespace, the first one first: [left, right]"),
+        *("", "namespaces of several cameras of one person, such as [left, right]"),
         kind=list,
         name=True,
     ),
-    "extrinsics_file": Argument("", "where the cameras stand, of Kalibr or aniposelib", Path),
+    "extrinsics_file": Argument("", "poses of the cameras, a file of Kalibr or aniposelib", Path),
     "measure_distance": Argument("true", "two cameras or depth measure person_distance_m", bool),
     "depth": Argument("", "topic of depth images of the (first) camera"),
     "within_m": Argument(
-        *("0.0", "with depth: whoever is nearer is the person; 0: learn a background", float),
+        *("0.0", "with depth: nearer pixels are the person; 0: learn a background", float),
         limits=(0.0, 20.0),
     ),
     "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
@@ -83,7 +83,7 @@ ARGUMENTS = {
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),
 }
-# Parameters that are launch arguments too, by node.
+# Launch arguments that are parameters, by node.
 GIVEN = {
     "background": ("image_transport", "background_file", "within_m", "depth"),
     "initializer": (
@@ -93,7 +93,7 @@ GIVEN = {
     "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth"),
 }
 LAYOUT_TOPICS = ("robot_description", "markers", "keypoints", "overlay", "silhouette")
-# Nobody until somebody is measured: robot_state_publisher does not start without a description.
+# robot_state_publisher does not start without a description, so it gets this one at first.
 NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
 
 
@@ -108,9 +108,9 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *declared,
-            # What is wrong has to be found before the first node runs.
+            # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
-            # Without it Fast DDS loses most large images; a profile of the user's own stays.
+            # Without this profile Fast DDS loses most large images; the user's profile is kept.
             SetEnvironmentVariable(PROFILES, profiles),
             OpaqueFunction(function=_nodes),
             OpaqueFunction(function=_users),
@@ -126,8 +126,8 @@ def _check(context: LaunchContext) -> list[object]:
     typed = values(ARGUMENTS, given)
     if typed["cameras"] and typed["single_process"]:
         raise ValueError(
-            "launch argument single_process is true, but cameras are given; expected one of them: "
-            "several cameras need more than the one core of a process; leave single_process out"
+            "launch argument single_process is true, but cameras are given; expected only one of "
+            "the two, because several cameras need more than one core; leave single_process out"
         )
     if typed["within_m"] and (typed["cameras"] or not typed["depth"]):
         raise ValueError(
@@ -171,7 +171,7 @@ def _nodes(context: LaunchContext) -> list[object]:
 
 
 def _users(context: LaunchContext) -> list[object]:
-    """The nodes that use the posture, as far as they are wanted."""
+    """Return the requested nodes that use the posture."""
     typed = values(ARGUMENTS, context.launch_configurations)
     wanted: dict[str, dict[str, object]] = {}
     if typed["rula"]:
@@ -192,7 +192,7 @@ def _users(context: LaunchContext) -> list[object]:
 
 
 def _exact(parameters: dict[str, object]) -> dict[str, object]:
-    """Keep launch from reading a text as a number or as nothing."""
+    """Give texts a type, without which launch would read them as a number or as nothing."""
     return {
         name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for name, value in parameters.items()
@@ -200,22 +200,22 @@ def _exact(parameters: dict[str, object]) -> dict[str, object]:
 
 
 def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, object]:
-    """The launch arguments that are parameters of ``node``, as its types."""
+    """Return the launch arguments that are parameters of ``node``, in the parameters' types."""
     typed = values(ARGUMENTS, given)
     if node == "background" and not typed["within_m"]:
-        # Only who cuts out the person by depth needs to hear it.
+        # The background node needs depth only to cut out the person by it.
         typed["depth"] = ""
     kept = typed["background_file"]
     if camera and isinstance(kept, str) and kept:
-        # Each camera has a background of its own.
+        # Each camera has its own background.
         path = Path(kept)
         typed["background_file"] = str(path.with_name(f"{path.stem}_{camera}{path.suffix}"))
-    # ROS has no empty list of a known type.
+    # An empty list has no type in ROS, so it is left out.
     return {name: typed[name] for name in GIVEN[node] if typed[name] != []}
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
-    """All nodes, and the source that live.launch.py or replay.launch.py chose, in one process."""
+    """Return one process with all nodes and the source of images that the launch file chose."""
     given = context.launch_configurations
     parameters = {name: _typed(given, name) for name in GIVEN}
     source = given.get("source", "")
@@ -224,7 +224,7 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
     sections = {}
     for name, own in parameters.items():
         path = Path(given["config_dir"]) / f"{name}.yaml"
-        # In one process, a file for any node would be for every node.
+        # In one process, a file for all nodes would apply to each of them.
         (section,) = yaml.safe_load(path.read_text(encoding="utf-8")).values()
         sections[f"/**/{name}"] = {"ros__parameters": {**section["ros__parameters"], **own}}
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
@@ -256,19 +256,19 @@ def _robot_state_publisher(context: LaunchContext) -> list[object]:
 
 
 def _described(context: LaunchContext, name: str, place: str) -> Node:
-    """A robot_state_publisher of the joint states and the description below ``place``."""
+    """Return a robot_state_publisher for the joint states and the description below ``place``."""
     _pass_on_description(context, name, f"{place}robot_description")
     return Node(
         package="robot_state_publisher",
         executable="robot_state_publisher",
         name=name,
         namespace=LaunchConfiguration("namespace"),
-        # A recording's stamps go back when it starts over.
+        # When a recording starts over, its stamps go back.
         parameters=[
             {
                 "robot_description": ParameterValue(NOBODY, value_type=str),
                 "ignore_timestamp": True,
-                # It thins out joint states to this rate.
+                # robot_state_publisher drops joint states above this rate.
                 "publish_frequency": 200.0,
             }
         ],
@@ -282,9 +282,9 @@ def _described(context: LaunchContext, name: str, place: str) -> Node:
 
 
 def _pass_on_description(context: LaunchContext, name: str, topic: str) -> None:
-    """Set what is published on ``topic`` as a parameter of the robot_state_publisher ``name``.
+    """Set each description on ``topic`` as a parameter of the robot_state_publisher ``name``.
 
-    It takes a new description as a parameter at any time, but does not listen to the topic.
+    robot_state_publisher accepts a new description as a parameter but does not subscribe to it.
     """
     node = get_ros_node(context)
     namespace = LaunchConfiguration("namespace").perform(context).strip("/")
@@ -293,7 +293,7 @@ def _pass_on_description(context: LaunchContext, name: str, topic: str) -> None:
     waiting: list[str] = []
 
     def send() -> None:
-        # The description may come before robot_state_publisher is up: tried again by the timer.
+        # The timer tries again if robot_state_publisher is not running yet.
         if waiting and client.services_are_ready():
             client.set_parameters([Parameter("robot_description", value=waiting.pop())])
 
@@ -320,7 +320,7 @@ def _rviz(context: LaunchContext) -> list[object]:
             name="rviz",
             namespace=LaunchConfiguration("namespace"),
             arguments=["-d", str(layout)] if layout.exists() else ["-f", "camera_level"],
-            # The layout has full names; in a namespace they are those of this camera.
+            # The layout has absolute names, which are remapped into the namespace.
             remappings=[(f"/{topic}", topic) for topic in LAYOUT_TOPICS],
             output="log",
         )

@@ -1,11 +1,11 @@
-"""A recording: played with its original stamps, through the same nodes as live.
+"""A recording, played with its original stamps through the same nodes as live images.
 
     ros2 launch cardbox_tracker replay.launch.py bag:=BAG person_distance_m:=2.0
 
-The bag's image and CameraInfo topics are found by themselves where it has one of each, and with
-cameras:="[left, right]" they are those below the namespaces. With
-pause_at:="[6.5, 9.5, 12.5]" the recording stands still at those times, so that a reference posture
-can be captured (initializer/capture_front) before play_bag/resume.
+The image and CameraInfo topics are found automatically if the bag has one of each. With
+cameras:="[left, right]" they are looked up in these namespaces. With
+pause_at:="[6.5, 9.5, 12.5]" the player pauses at those times, so that a reference posture can be
+captured (initializer/capture_front) before play_bag/resume.
 """
 
 import runpy
@@ -30,7 +30,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
-# All but 'bag' are parameters of the node, by the same names.
+# All but 'bag' are parameters of the node play_bag with the same names.
 ARGUMENTS = {
     "bag": Argument(None, "rosbag2 folder or .mcap file"),
     "pause_at": Argument("[]", "times to pause at, s from the bag's start", list),
@@ -41,7 +41,7 @@ ARGUMENTS = {
         "0.0", "play this long; 0: to the end of the bag", float, limits=(0.0, 1e6)
     ),
 }
-# Arguments of the launch file that is included, and thus of this one.
+# Arguments of the included launch file are also arguments of this one.
 NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
@@ -52,11 +52,11 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
                 for name, a in ARGUMENTS.items()
             ),
-            # What is wrong has to be found before the first node runs.
+            # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
             OpaqueFunction(function=_find_topics),
             OpaqueFunction(function=_in_one_process),
-            # Before play_bag, since it sets the environment and declares what play_bag uses too.
+            # It comes before play_bag, because it sets the environment and declares arguments.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
             ),
@@ -74,13 +74,13 @@ def _check(context: LaunchContext) -> list[object]:
 def _find_topics(context: LaunchContext) -> list[object]:
     """Take the topics from the bag, unless they are given.
 
-    A process of play_bag looks for them: this one does not see the packages that read bags.
+    A process of play_bag finds them, because launch cannot import the packages that read bags.
     """
     given = context.launch_configurations
     wanted = [name for name in ("image", "camera_info") if name not in given]
     if not wanted:
         return []
-    # Of several cameras the topics are below their namespaces, and there are the nodes that listen.
+    # With several cameras, the topics and the nodes are in the cameras' namespaces.
     cameras = [name.strip(" /") for name in given.get("cameras", "").strip(" []").split(",")]
     place = given.get("namespace", "").strip("/")
     below = [f"--below={place}/{name}".replace("=/", "=") for name in cameras if name]
@@ -104,10 +104,10 @@ def _is_single(context: LaunchContext) -> bool:
 
 def _parameters(context: LaunchContext) -> dict[str, object]:
     parameters: dict[str, object] = dict(values(ARGUMENTS, context.launch_configurations))
-    # The tracker compiles at its first start; the recording is not to be over by then.
+    # The tracker compiles at its first start, and the recording must not end before.
     parameters["wait_for_topics"] = ["keypoints"]
     if not parameters["pause_at"]:
-        # ROS has no empty list of a known type.
+        # An empty list has no type in ROS, so it is left out.
         del parameters["pause_at"]
     return parameters
 
@@ -124,7 +124,7 @@ def _in_one_process(context: LaunchContext) -> list[object]:
 def _play_bag(context: LaunchContext) -> list[object]:
     if _is_single(context):
         return []
-    # Keeps launch from reading a text as a number or as nothing.
+    # Without a type, launch would read a text as a number or as nothing.
     parameters = {
         name: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for name, value in _parameters(context).items()

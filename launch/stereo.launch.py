@@ -1,9 +1,9 @@
-"""A rectified stereo pair: from both images, and the depth between them, to joint states.
+"""A rectified stereo pair: from both images and stereo depth to joint states.
 
     ros2 launch cardbox_tracker stereo.launch.py
 
-A driver, or play_bag with a recording, publishes the images and CameraInfo of both cameras below
-left and right; P of the right CameraInfo says how far apart they are.
+A driver, or play_bag with a recording, publishes the images and CameraInfo of both cameras in the
+namespaces left and right; P of the right CameraInfo has their distance.
 """
 
 import runpy
@@ -28,11 +28,11 @@ SHARE = Path(get_package_share_directory("cardbox_tracker"))
 ARGUMENTS = {
     "left": Argument("left", "namespace of the left camera", name=True),
     "right": Argument("right", "namespace of the right camera", name=True),
-    "stereo_depth": Argument("true", "measure depth in the pair; false: outlines alone", bool),
+    "stereo_depth": Argument("true", "measure depth in the pair; false: silhouettes only", bool),
 }
-# Topics of the pair as the node stereo_depth has them, below the namespace of each camera.
+# Topics of the node stereo_depth below the namespace of each camera.
 TOPICS = ("image_raw", "image_raw/compressed", "camera_info")
-# Arguments of the launch file that is included, and thus of this one.
+# Arguments of the included launch file are also arguments of this one.
 NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
@@ -43,9 +43,9 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
                 for name, a in ARGUMENTS.items()
             ),
-            # What is wrong has to be found before the first node runs.
+            # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
-            # First, since it sets the environment and declares what the others use as well.
+            # It comes first, because it sets the environment and declares shared arguments.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
             ),
@@ -86,7 +86,7 @@ def _stereo_depth(context: LaunchContext) -> list[object]:
             ],
             parameters=[
                 [LaunchConfiguration("config_dir"), "/stereo_depth.yaml"],
-                # Of nodes.launch.py: the backgrounds and this node take the same images.
+                # The background nodes and this node subscribe to the same images.
                 {"image_transport": LaunchConfiguration("image_transport")},
             ],
             output="screen",

@@ -5,9 +5,9 @@
         second_device:=/dev/video2 second_calibration_file:=$HOME/second.yaml \
         extrinsics_file:=$HOME/camchain.yaml
 
-The person faces the first one for the reference postures. Without devices the cameras are drivers
-of your own, which publish cam0/image_raw, cam0/camera_info and the same of cam1. A recording of
-both is played with replay.launch.py and cameras:="[cam0, cam1]".
+The person faces the first camera in the reference postures. Without devices, start your own
+drivers, which publish cam0/image_raw, cam0/camera_info and the same topics for cam1. Play a
+recording of both with replay.launch.py and cameras:="[cam0, cam1]".
 """
 
 import runpy
@@ -33,18 +33,18 @@ SHARE = Path(get_package_share_directory("cardbox_tracker"))
 ORDER = ("first", "second")
 ARGUMENTS = {
     "first": Argument("cam0", "namespace of the camera that the person faces", name=True),
-    "second": Argument("cam1", "namespace of the other one", name=True),
-    "first_device": Argument("", "its V4L2 device; empty: a driver of your own"),
-    "second_device": Argument("", "the same of the second camera"),
-    "first_calibration_file": Argument("", "its YAML file of camera_calibration", Path),
-    "second_calibration_file": Argument("", "the same of the second camera", Path),
+    "second": Argument("cam1", "namespace of the other camera", name=True),
+    "first_device": Argument("", "V4L2 device of the first camera; empty: your own driver"),
+    "second_device": Argument("", "V4L2 device of the second camera; empty: your own driver"),
+    "first_calibration_file": Argument("", "camera_calibration YAML of the first camera", Path),
+    "second_calibration_file": Argument("", "camera_calibration YAML of the second camera", Path),
     "width": Argument("640", "width to ask the devices for, px", int, limits=(32, 8192)),
     "height": Argument("480", "height to ask the devices for, px", int, limits=(32, 8192)),
     "rate_hz": Argument("15.0", "images a second", float, limits=(0.0, 240.0)),
 }
-# The camera node's parameters of the same names.
+# Arguments that are parameters of the node camera.
 OF_BOTH = ("width", "height", "rate_hz")
-# Arguments of the launch file that is included, and thus of this one.
+# Arguments of the included launch file are also arguments of this one.
 NODES = runpy.run_path(str(SHARE / "launch" / "nodes.launch.py"))["ARGUMENTS"]
 
 
@@ -55,9 +55,9 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(name, default_value=a.default, description=a.meaning)
                 for name, a in ARGUMENTS.items()
             ),
-            # What is wrong has to be found before the first node runs.
+            # Wrong arguments must be found before the first node starts.
             OpaqueFunction(function=_check),
-            # First, since it sets the environment and declares what the others use as well.
+            # It comes first, because it sets the environment and declares shared arguments.
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(str(SHARE / "launch" / "nodes.launch.py"))
             ),
@@ -97,7 +97,7 @@ def _cameras(context: LaunchContext) -> list[object]:
                 [LaunchConfiguration("config_dir"), "/camera.yaml"],
                 {name: typed[name] for name in OF_BOTH}
                 | {
-                    # Keeps launch from reading a text as a number or as nothing.
+                    # Without a type, launch would read a text as a number or as nothing.
                     name: ParameterValue(text, value_type=str)
                     for name, text in (
                         ("device", typed[f"{one}_device"]),

@@ -50,7 +50,7 @@ def _details(spec: ParameterSpec) -> str:
     parts = [
         spec.unit,
         spec.range_text,
-        "only at the start" if spec.read_only else f"live: {spec.effect}",
+        spec.effect if spec.read_only else f"live: {spec.effect}",
     ]
     return "; ".join(part for part in parts if part)
 

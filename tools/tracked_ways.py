@@ -19,7 +19,12 @@ from cardbox_tracker.body.proportions import (
 )
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
-from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, Observe, track_session
+from cardbox_tracker.evaluation.recorded.tracking import (
+    WITH_DEPTH,
+    InputSelection,
+    Observe,
+    track_session,
+)
 
 # One of three sessions is tracked without images, one of three without a given distance, and one of
 # four with depth images has a body that was not measured.
@@ -80,13 +85,9 @@ def covered(time_s: float) -> int | None:
 def track(session: RecordedSession, config: TrackerConfig, seed: int, observe: Observe) -> None:
     """Track a session in the way of the seed."""
     way = way_of(session, seed)
-    track_session(
-        session,
-        config,
-        (seed,),
+    inputs = InputSelection(
         only=WITH_DEPTH if way.has_depth and session.truth.depth_topic else None,
-        observe=observe,
         has_images=way.has_images,
-        body=way.body,
         covered=covered if way.covers and len(session.truth.cameras) > 1 else None,
     )
+    track_session(session, config, (seed,), inputs, observe, way.body)

@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> None:
     """Measure, write the results and print a short table.
 
     Raises:
-        CardboxError: this is no checkout, or the results cannot be written.
+        CardboxError: there is no checkout, or the results cannot be written.
     """
     benchmark = from_checkout("benchmarks.run", "benchmark")
     print(benchmark.short_table(benchmark.run_benchmark(options.json, options.report)))

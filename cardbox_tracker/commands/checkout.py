@@ -18,7 +18,7 @@ def from_checkout(module: str, target: str) -> Any:
     The checkout is the current directory, one above it, or the parent of this package.
 
     Args:
-        module: its full name, such as ``benchmarks.run``.
+        module: full name of the module, such as ``benchmarks.run``.
         target: the ``make`` target that runs it.
 
     Raises:
@@ -27,7 +27,7 @@ def from_checkout(module: str, target: str) -> Any:
     folder = module.partition(".")[0]
     for root in (Path.cwd(), *Path.cwd().parents, _PACKAGE.parent):
         if (root / folder / "__init__.py").is_file() and (root / _PACKAGE.name).is_dir():
-            # At the end: the package that is running stays the one that is imported.
+            # At the end of the path, it does not replace the package that is running.
             sys.path.append(str(root))
             break
     else:

@@ -51,20 +51,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=None,
         metavar="DIR",
-        help="recorded sessions (bag/, ground_truth.json) to initialize, track and compare instead "
-        "of the paper's experiments",
+        help="recorded sessions (bag/, ground_truth.json) to initialize, track and compare, "
+        "instead of the paper's experiments",
     )
     parser.add_argument(
         "--seeds",
         type=seed_count,
         default=3,
         metavar="N",
-        help="with --sessions: seeds, each a run of its own, from --seed on",
+        help="with --sessions: number of runs, with consecutive seeds from --seed on",
     )
     parser.add_argument(
         "--recovery",
         action="store_true",
-        help="with --sessions: also measure how soon tracking is right again after disturbances",
+        help="with --sessions: also count the recoveries from disturbances",
     )
     add_preset(parser, "default")
     parser.add_argument(
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=process_count,
         default=None,
         metavar="N",
-        help="processes; without it, one per core",
+        help="number of processes; one per core by default",
     )
     add_seed(parser, "recordings and filters")
     add_force(parser)
@@ -82,8 +82,8 @@ def run(options: argparse.Namespace) -> None:
     """Run the experiments and write report, plots and numbers.
 
     Raises:
-        CardboxError: a session cannot be read, the results cannot be written, or the experiments
-            are not there.
+        CardboxError: a session cannot be read, the results cannot be written, or there are no
+            experiments because this is not a checkout.
     """
     name = "sessions.md" if options.sessions else "report.md"
     inputs = options.sessions or ([options.session] if options.session else [])

@@ -1,4 +1,4 @@
-"""Settings of the core as options of a subcommand: name, range and text are those of the core."""
+"""Settings of the core as options of a subcommand, with the core's names, ranges and texts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# Settings of the tracker that are options of their own, with the option of each.
+# Settings of the tracker that have an option, and the option of each.
 _OPTIONS = MappingProxyType(
     {
         "strategy": "--strategy",
@@ -40,14 +40,14 @@ def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
         "--strategy",
         choices=STRATEGIES,
         default=None,
-        help="resampling of the preset paper; without it drs, the paper's deterministic one",
+        help="resampling of the preset paper; drs, the paper's deterministic one, by default",
     )
     parser.add_argument(
         "--particles",
         type=particle_count,
         default=None,
         metavar="N",
-        help="particles of each of the three filters of the preset paper; without it 200",
+        help="particles of each of the three filters of the preset paper; 200 by default",
     )
     for name, kind, metavar in (
         ("effort", float, "X"),
@@ -69,12 +69,12 @@ def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
         default=None,
         metavar="FILE.yaml",
         help="further settings of the tracker by name, as docs/parameters.md lists them; options "
-        "of their own go before",
+        "take precedence over the file",
     )
 
 
 def with_tracker_settings(config: TrackerConfig, options: argparse.Namespace) -> TrackerConfig:
-    """Return ``config`` with what the options of :func:`add_tracker_settings` change in it.
+    """Return ``config`` changed by the options of :func:`add_tracker_settings`.
 
     Raises:
         CardboxError: the file cannot be read, or a value is wrong or has no effect.
@@ -122,7 +122,7 @@ def add_settings(parser: argparse.ArgumentParser, kind: Any, title: str) -> None
 
 
 def settings_from(options: argparse.Namespace, kind: type[T]) -> T:
-    """Return the settings of the dataclass ``kind`` that options give.
+    """Return the settings of the dataclass ``kind`` from the options.
 
     Raises:
         CardboxError: a value is out of its range.

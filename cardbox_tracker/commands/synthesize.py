@@ -46,17 +46,15 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the motion is unknown, or the recording cannot be written.
     """
     from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.simulation.session import synthesize_session
+    from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
     check_outputs((), options.force, results=(options.output,))
+    form = SessionFormat(
+        cameras=options.cameras, compressed=options.compressed, storage=options.storage
+    )
     with progress_bar("synthesize") as show:
         synthesize_session(
-            options.output,
-            motion=options.motion,
-            seed=options.seed,
-            storage=options.storage,
-            compressed=options.compressed,
-            cameras=options.cameras,
+            *(options.output, options.motion, options.seed, form),
             overwrite=options.force,
             progress=show,
         )

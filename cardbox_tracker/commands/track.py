@@ -52,9 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """Add what every subcommand asks that tracks a recording: it, the person, the settings.
+    """Add the arguments for the recording, the person and the settings.
 
-    Without ``required`` the recording may be missing, or one of results that needs no more.
+    Without ``required``, the recording may be missing, or be a bag of results without further
+    arguments.
     """
     add_recording(parser, required, needs_background=False)
     add_cameras(parser)
@@ -71,8 +72,8 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
         type=time,
         required=required,
         metavar="T",
-        help="second at which the person stands as for --front; tracking starts there. A body of "
-        "'cardbox body' is fitted to the first silhouette from then on, in any posture",
+        help="second at which the person stands as for --front; tracking starts there. With a "
+        "body of 'cardbox body', any posture will do: it is fitted to the first silhouette",
     )
     add_preset(parser, "default")
     add_tracker_settings(parser)
@@ -81,7 +82,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person and write what was asked for.
+    """Track the person and write the requested files.
 
     Raises:
         CardboxError: the recording or the body model cannot be read, a setting is out of range, or
@@ -112,9 +113,9 @@ def track_inputs(
     force: bool = False,
     observers: tuple[Observer, ...] = (),
 ) -> None:
-    """Track what the arguments of :func:`add_inputs` name, and say how well it went.
+    """Track the recording of :func:`add_inputs` and print a summary.
 
-    ``observers`` are called after each image; with ``force`` a ``bag`` that exists is replaced.
+    ``observers`` are called after each image. With ``force``, an existing ``bag`` is replaced.
 
     Raises:
         CardboxError: see :func:`run`.
@@ -123,7 +124,7 @@ def track_inputs(
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.recording import open_recording
     from cardbox_tracker.recordings.result_bag import ResultBag
-    from cardbox_tracker.recordings.track import track_recording
+    from cardbox_tracker.recordings.track import TrackFiles, track_recording
 
     body = load_body_model(options.model)
     if body.doubt:
@@ -131,7 +132,10 @@ def track_inputs(
     config = _config(options)
     is_more = len(options.cameras) > 1 or options.depth is not None
     if is_more and not config.has_several_views:
-        raise CardboxError("several cameras and depth need --preset default; paper has one outline")
+        raise CardboxError(
+            "--preset paper uses the silhouette of one camera; give --preset default with several "
+            "cameras or with --depth"
+        )
     with open_recording(
         options.recording,
         background_of(options),
@@ -150,8 +154,7 @@ def track_inputs(
                 config,
                 options.seed,
                 options.start,
-                csv,
-                video,
+                TrackFiles(csv, video),
                 observers=(
                     results.add,
                     *observers,
@@ -167,7 +170,7 @@ def track_inputs(
 
 
 def _config(options: argparse.Namespace) -> TrackerConfig:
-    """Return the preset with what the options change in it."""
+    """Return the preset changed by the options."""
     from cardbox_tracker.estimation.config import PRESETS
 
     config = PRESETS[options.preset]()

@@ -29,7 +29,7 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-# The same topics as in the bag of 'cardbox track --bag'; /tf is derived from two of them.
+# The bag of 'cardbox track --bag' has the same topics; /tf is derived from two of them.
 _OF_PERSON = {
     "body_model": (String, qos.LATCHED),
     "robot_description": (String, qos.LATCHED),
@@ -143,7 +143,7 @@ class Client:
         """Spin until ``condition`` holds.
 
         Raises:
-            CardboxError: it does not hold in time, or a node died.
+            CardboxError: ``condition`` does not hold in time, or a node died.
         """
         end = time.monotonic() + timeout_s
         while not condition():

@@ -13,7 +13,7 @@ from cardbox_tracker.evaluation.truth import GroundTruth
 
 @dataclass(frozen=True)
 class DemoResult:
-    """The published data and the ground truth.
+    """Published data and ground truth.
 
     Attributes:
         body: the measured person.

@@ -16,7 +16,7 @@ from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.result_bag import result_writer
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 _RATE = 2.0
 _NEUTRAL_S = 0.1
@@ -36,7 +36,8 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
         raise CardboxError(f"cannot make the folder {output}: {error.strerror}") from None
     session = output / "session"
     with progress_bar("synthesize") as show:
-        synthesize_session(session, "all", seed, cameras=cameras, overwrite=True, progress=show)
+        form = SessionFormat(cameras=cameras)
+        synthesize_session(session, "all", seed, form, overwrite=True, progress=show)
     result = track_through_nodes(session, output, preset, seed)
     write_report(result, session, output, preset, seed)
 

@@ -24,6 +24,9 @@ from cardbox_tracker.body.posture import PLACE_LIMITS, TURNING_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
+    AT_PARENT,
+    Movement,
+    Origin,
     add_joint,
     add_link,
     add_patches,
@@ -32,8 +35,6 @@ from cardbox_tracker.description.urdf_elements import (
 )
 
 _FULL = (-2 * math.pi, 2 * math.pi)
-
-_Movable = tuple[str, str, tuple[int, int, int], FloatArray]
 
 
 def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: bool = True) -> str:
@@ -50,35 +51,29 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
     add_link(robot, optical_frame)
     parts = body_parts(body.sizes)
     shoulders_m = parts.shoulder_height_m
-    origin, rpy = _seen_from_camera(body)
+    origin = _seen_from_camera(body)
     parent = optical_frame
-    place: tuple[_Movable, ...] = (
-        ("x_body", "prismatic", (1, 0, 0), PLACE_LIMITS[0]),
-        ("z_body", "prismatic", (0, 0, 1), PLACE_LIMITS[1]),
-    )
-    trunk: tuple[_Movable, ...] = (
-        ("body", "prismatic", (0, 1, 0), TURNING_LIMITS[0]),
-        ("y_waist", "revolute", (0, 0, 1), TURNING_LIMITS[3]),
-        ("waist", "revolute", (0, 1, 0), TURNING_LIMITS[2]),
-        ("r_waist", "revolute", (1, 0, 0), TURNING_LIMITS[1]),
-    )
-    for name, kind, axis, limits in (*(place if torso_place else ()), *trunk):
+    place = {
+        "x_body": Movement("prismatic", (1, 0, 0), PLACE_LIMITS[0].tolist()),
+        "z_body": Movement("prismatic", (0, 0, 1), PLACE_LIMITS[1].tolist()),
+    }
+    trunk = {
+        "body": Movement("prismatic", (0, 1, 0), TURNING_LIMITS[0].tolist()),
+        "y_waist": Movement("revolute", (0, 0, 1), TURNING_LIMITS[3].tolist()),
+        "waist": Movement("revolute", (0, 1, 0), TURNING_LIMITS[2].tolist()),
+        "r_waist": Movement("revolute", (1, 0, 0), TURNING_LIMITS[1].tolist()),
+    }
+    for name, movement in {**(place if torso_place else {}), **trunk}.items():
         link = add_link(robot, name + end)
-        add_joint(
-            *(robot, name + end, kind, parent, name + end, origin, rpy),
-            axis=axis,
-            limits=limits.tolist(),
-        )
-        parent, origin, rpy = name + end, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        add_joint(robot, name + end, parent, name + end, origin, movement)
+        parent, origin = name + end, AT_PARENT
     add_patches(link, "torso", parts.waist, _up(parts.waist.middle_m))
     torso = add_link(robot, "torso" + end)
-    add_joint(robot, "torso" + end, "fixed", parent, "torso" + end, _up(shoulders_m))
+    add_joint(robot, "torso" + end, parent, "torso" + end, Origin(_up(shoulders_m)))
     add_patches(torso, "torso", parts.torso, _up(parts.torso.middle_m - shoulders_m))
     head = add_link(robot, "head" + end)
-    add_joint(
-        *(robot, "head" + end, "fixed", "torso" + end, "head" + end),
-        (parts.head.forward_m, 0.0, parts.head.middle_m - shoulders_m),
-    )
+    head_m = (parts.head.forward_m, 0.0, parts.head.middle_m - shoulders_m)
+    add_joint(robot, "head" + end, "torso" + end, "head" + end, Origin(head_m))
     add_patches(head, "torso", parts.head, _up(0.0))
     _arm(robot, parts, "l", "left", 1.0, end)
     _arm(robot, parts, "r", "right", -1.0, end)
@@ -89,7 +84,7 @@ def _arm(
     robot: Xml.Element, parts: BodyParts[float], prefix: str, material: str, side: float, end: str
 ) -> None:
     """Add an arm; ``side`` is +1 for the left arm, -1 for the right."""
-    parent, origin = "torso" + end, (0.0, side * parts.shoulder_aside_m, 0.0)
+    parent, origin = "torso" + end, Origin((0.0, side * parts.shoulder_aside_m, 0.0))
     for joint, child, axis, limits in (
         ("y_shoulder", "y_shoulder", (0, 0, -side), _FULL),
         ("p_shoulder", "p_shoulder", (side, 0, 0), (LOWEST_RAISE_RAD, math.pi)),
@@ -98,32 +93,25 @@ def _arm(
     ):
         name = f"{prefix}_{child}{end}"
         if joint == "elbow":
-            origin = _up(parts.upper_arm.bottom_m)
+            origin = Origin(_up(parts.upper_arm.bottom_m))
         link = add_link(robot, name)
-        add_joint(
-            *(robot, f"{prefix}_{joint}{end}", "revolute", parent, name, origin),
-            axis=axis,
-            limits=limits,
-        )
-        parent, origin = name, (0.0, 0.0, 0.0)
+        movement = Movement("revolute", axis, limits)
+        add_joint(robot, f"{prefix}_{joint}{end}", parent, name, origin, movement)
+        parent, origin = name, AT_PARENT
         part = {"shoulder": parts.upper_arm, "elbow": parts.forearm}.get(child)
         if part:
             add_patches(link, material, part, _up(part.middle_m))
-    add_link(robot, f"{prefix}_wrist{end}")
-    add_joint(
-        *(robot, f"{prefix}_wrist{end}", "fixed", parent, f"{prefix}_wrist{end}"),
-        _up(parts.forearm.bottom_m),
-    )
+    wrist = f"{prefix}_wrist{end}"
+    add_link(robot, wrist)
+    add_joint(robot, wrist, parent, wrist, Origin(_up(parts.forearm.bottom_m)))
 
 
 def _up(height_m: float) -> tuple[float, float, float]:
     return (0.0, 0.0, height_m)
 
 
-def _seen_from_camera(
-    body: BodyModel,
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the URDF origin of the middle of the hips in the optical frame while d1 is 0."""
+def _seen_from_camera(body: BodyModel) -> Origin:
+    """Return the origin of the middle of the hips in the optical frame while d1 is 0."""
     down = body.camera_pose.pitch_rad
     # Columns: the body's X (to the camera), Y (to the right of the image) and Z (up).
     rotation = np.array(
@@ -134,7 +122,7 @@ def _seen_from_camera(
         ]
     )
     x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
-    return (x, y, z), _rpy(rotation)
+    return Origin((x, y, z), _rpy(rotation))
 
 
 def _rpy(rotation: FloatArray) -> tuple[float, float, float]:

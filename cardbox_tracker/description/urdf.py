@@ -23,6 +23,8 @@ from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
 from cardbox_tracker.description.urdf_elements import (
     PATCH_THICKNESS_M,
+    Movement,
+    Origin,
     add_box,
     add_joint,
     add_link,
@@ -63,11 +65,11 @@ def urdf_from_body(
     if optical_frame:
         add_link(robot, optical_frame)
         # Optical axes in the axes of REP-103, then rotated down by the pitch about X.
-        rpy = (-math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2)
-        add_joint(robot, f"{ROOT_LINK}_to_optical", "fixed", ROOT_LINK, optical_frame, rpy=rpy)
+        tilted = Origin(rpy=(-math.pi / 2 - body.camera_pose.pitch_rad, 0.0, -math.pi / 2))
+        add_joint(robot, f"{ROOT_LINK}_to_optical", ROOT_LINK, optical_frame, tilted)
     add_link(robot, "hips")
-    origin = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
-    add_joint(robot, "camera_to_hips", "fixed", ROOT_LINK, "hips", origin, (0.0, 0.0, math.pi))
+    place_m = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
+    add_joint(robot, "camera_to_hips", ROOT_LINK, "hips", Origin(place_m, (0.0, 0.0, math.pi)))
     parts = body_parts(body.sizes)
     _trunk(robot, parts, _place(robot) if torso_place else "hips")
     _arm(robot, parts, "left", 1.0)
@@ -81,7 +83,8 @@ def _place(robot: Xml.Element) -> str:
     for joint, axis in zip(PLACE_NAMES, ((1, 0, 0), (0, 0, 1)), strict=True):
         child = f"{joint}_link"
         add_link(robot, child)
-        add_joint(robot, joint, "prismatic", parent, child, axis=axis, limits=_LIMITS[joint])
+        movement = Movement("prismatic", axis, _LIMITS[joint])
+        add_joint(robot, joint, parent, child, movement=movement)
         parent = child
     return parent
 
@@ -96,7 +99,7 @@ def _trunk(robot: Xml.Element, parts: BodyParts[float], parent: str) -> None:
         child = "torso" if joint == "torso_roll" else f"{joint}_link"
         kind = "prismatic" if joint == "torso_y" else "revolute"
         link = add_link(robot, child)
-        add_joint(robot, joint, kind, parent, child, axis=axis, limits=_LIMITS[joint])
+        add_joint(robot, joint, parent, child, movement=Movement(kind, axis, _LIMITS[joint]))
         parent = child
     torso, waist = parts.torso, parts.waist
     add_patches(link, "torso", torso, (0.0, 0.0, torso.middle_m))
@@ -104,14 +107,14 @@ def _trunk(robot: Xml.Element, parts: BodyParts[float], parent: str) -> None:
     add_box(link, "torso", lid, (0.0, 0.0, torso.top_m))
     add_patches(link, "torso", waist, (0.0, 0.0, waist.middle_m))
     head = add_link(robot, "head")
-    origin = (parts.head.forward_m, 0.0, parts.head.middle_m)
-    add_joint(robot, "neck", "fixed", "torso", "head", origin)
+    origin = Origin((parts.head.forward_m, 0.0, parts.head.middle_m))
+    add_joint(robot, "neck", "torso", "head", origin)
     add_patches(head, "torso", parts.head, (0.0, 0.0, 0.0))
 
 
 def _arm(robot: Xml.Element, parts: BodyParts[float], name: str, side: float) -> None:
     """Add an arm; ``side``, +1 left and -1 right, mirrors the abduction but not the flexion."""
-    shoulder = (0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m)
+    shoulder = Origin((0.0, side * parts.shoulder_aside_m, parts.shoulder_height_m))
     parent, origin = "torso", shoulder
     for joint, limb, part in (
         ("shoulder", f"{name}_upper_arm", parts.upper_arm),
@@ -120,18 +123,12 @@ def _arm(robot: Xml.Element, parts: BodyParts[float], name: str, side: float) ->
         turned = f"{name}_{joint}_link"
         add_link(robot, turned)
         abduction, flexion = f"{name}_{joint}_abduction", f"{name}_{joint}_flexion"
-        add_joint(
-            *(robot, abduction, "revolute", parent, turned, origin),
-            axis=(side, 0, 0),
-            limits=_LIMITS[abduction],
-        )
+        sideways = Movement("revolute", (side, 0, 0), _LIMITS[abduction])
+        add_joint(robot, abduction, parent, turned, origin, sideways)
         link = add_link(robot, limb)
-        add_joint(
-            *(robot, flexion, "revolute", turned, limb),
-            axis=(0, -1, 0),
-            limits=_LIMITS[flexion],
-        )
+        forwards = Movement("revolute", (0, -1, 0), _LIMITS[flexion])
+        add_joint(robot, flexion, turned, limb, movement=forwards)
         add_patches(link, name, part, (0.0, 0.0, part.middle_m))
-        parent, origin = limb, (0.0, 0.0, part.bottom_m)
+        parent, origin = limb, Origin((0.0, 0.0, part.bottom_m))
     add_link(robot, f"{name}_hand")
-    add_joint(robot, f"{name}_wrist", "fixed", parent, f"{name}_hand", origin)
+    add_joint(robot, f"{name}_wrist", parent, f"{name}_hand", origin)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.parts import Part
@@ -16,6 +17,25 @@ COLORS = {"torso": "0.25 0.45 0.75 0.9", "left": "0.2 0.7 0.4 0.9", "right": "0.
 """Colour of each material."""
 # URDF requires both values, but nothing uses them.
 _FORMAL_LIMITS: dict[str, str] = {"effort": "100", "velocity": "20"}
+
+
+class Origin(NamedTuple):
+    """Pose of a joint in the frame of its parent link: metres, and roll, pitch, yaw in rad."""
+
+    xyz_m: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+
+
+AT_PARENT = Origin()
+"""The origin of the parent link itself."""
+
+
+class Movement(NamedTuple):
+    """Movement of a joint: its type, its axis, and its lower and upper limit in rad or metres."""
+
+    kind: str
+    axis: Vector
+    limits: Vector
 
 
 def add_robot(name: str) -> Xml.Element:
@@ -52,22 +72,20 @@ def add_patches(link: Xml.Element, material: str, part: Part[float], centre_m: V
 def add_joint(
     robot: Xml.Element,
     name: str,
-    kind: str,
     parent: str,
     child: str,
-    origin_m: Vector = (0.0, 0.0, 0.0),
-    rpy: Vector = (0.0, 0.0, 0.0),
-    axis: Vector | None = None,
-    limits: Vector = (0.0, 0.0),
+    origin: Origin = AT_PARENT,
+    movement: Movement | None = None,
 ) -> None:
-    """Add a joint of type ``kind``; a movable one has an axis, and limits in rad or metres."""
+    """Add a joint, which is fixed without a ``movement``."""
+    kind = "fixed" if movement is None else movement.kind
     joint = Xml.SubElement(robot, "joint", name=name, type=kind)
     Xml.SubElement(joint, "parent", link=parent)
     Xml.SubElement(joint, "child", link=child)
-    Xml.SubElement(joint, "origin", xyz=_text(origin_m), rpy=_text(rpy))
-    if axis is not None:
-        Xml.SubElement(joint, "axis", xyz=_text(axis))
-        lower, upper = limits
+    Xml.SubElement(joint, "origin", xyz=_text(origin.xyz_m), rpy=_text(origin.rpy))
+    if movement is not None:
+        Xml.SubElement(joint, "axis", xyz=_text(movement.axis))
+        lower, upper = movement.limits
         given = {"lower": f"{lower:.9g}", "upper": f"{upper:.9g}"} if kind != "continuous" else {}
         Xml.SubElement(joint, "limit", {**given, **_FORMAL_LIMITS})
 

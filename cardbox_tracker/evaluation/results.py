@@ -1,4 +1,4 @@
-"""JSON files of results, and the versions, commit and processor that they were measured with."""
+"""JSON files of results with the versions, commit and processor of the measurement."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def commit() -> str | None:
 
 
 def processor() -> str:
-    """Return the processor's name as far as the system tells it."""
+    """Return the processor's name, or its architecture if the system does not give a name."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
@@ -75,16 +75,16 @@ def read_json(path: Path) -> dict[str, Any]:
     """Read a file of results.
 
     Raises:
-        CardboxError: it cannot be read or holds no results.
+        CardboxError: the file cannot be read or does not have results.
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CardboxError(f"cannot read {path}: {error.strerror}") from None
     except ValueError as error:
-        raise CardboxError(f"{path} is no JSON: {error}") from None
+        raise CardboxError(f"{path} is not JSON: {error}") from None
     if not isinstance(data, dict):
-        raise CardboxError(f"{path} holds no results; expected what 'cardbox evaluate' writes")
+        raise CardboxError(f"{path} has no results; expected a file of 'cardbox evaluate'")
     return data
 
 

@@ -1,4 +1,4 @@
-"""The ground truth of a recorded session, and the error of estimates against it."""
+"""Ground truth of a recorded session, and the error of estimates."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class TrueFrame:
     Attributes:
         segment: name of the person's action.
         keypoints_m: shape (6, 3), metres in the optical frame, ordered as ``KEYPOINT_NAMES``.
-        posture: d1..d12 (12,), if the person has the model's joints.
-        torso_rad: roll, pitch and yaw of the torso (3,), where they are known.
-        is_in_sight: the neck is in the image, so that the person can be tracked.
+        posture: d1..d12 (12,); None if the person does not have the model's joints.
+        torso_rad: roll, pitch and yaw of the torso (3,); None if unknown.
+        is_in_sight: True if the neck is in the image, so that the person can be tracked.
     """
 
     segment: str
@@ -41,19 +41,19 @@ class TrueFrame:
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """A session's truth.
+    """Ground truth of a session.
 
     Attributes:
-        frames: by stamp in nanoseconds, those with a person in the scene.
+        frames: images with a person, by stamp in nanoseconds.
         spans: start and end of the first segment of each name, seconds from the first image.
         start_ns: stamp of the first image.
-        distance_m: level distance to the person.
-        pitch_deg: how far the camera looks down.
+        distance_m: horizontal distance to the person.
+        pitch_deg: downward pitch of the camera.
         side_turn: direction in which the person turned for the side reference.
         cameras: namespaces of several cameras, the first camera's first; empty with one.
-        is_rectified: the first two of them are a rectified pair.
-        stature_m: height of the person; None where it is not known.
-        depth_topic: of depth images of the first camera's view; None without them.
+        is_rectified: True if the first two cameras are a rectified pair.
+        stature_m: height of the person; None if unknown.
+        depth_topic: topic of depth images with the first camera's field of view; None without.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -72,7 +72,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
     """Read the ``ground_truth.json`` of a session.
 
     Raises:
-        CardboxError: the file cannot be read or is no ground truth.
+        CardboxError: the file cannot be read or is not a ground truth.
     """
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -110,7 +110,7 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
         raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None
     except (ValueError, KeyError, IndexError, TypeError) as error:
         raise CardboxError(
-            f"{path} is no ground truth: {error!r}; expected the ground_truth.json of a session"
+            f"{path} is not a ground truth: {error!r}; expected the ground_truth.json of a session"
         ) from None
 
 
@@ -127,12 +127,12 @@ class TrackingError:
 
     Attributes:
         mean_m: mean 3D error over shoulders, elbows and hands (MPJPE).
-        by_keypoint_m: the same for each keypoint.
-        by_segment_m: the same for each segment of the session.
+        by_keypoint_m: mean 3D error of each keypoint.
+        by_segment_m: mean 3D error in each segment of the session.
         lateral_m: mean error along x of the optical frame.
         vertical_m: mean error along y.
         depth_m: mean error along z.
-        frames: images compared.
+        frames: number of compared images.
     """
 
     mean_m: float
@@ -148,11 +148,13 @@ def tracking_error(estimates: Mapping[int, FloatArray], truth: GroundTruth) -> T
     """Compare keypoints (6, 3), metres in the optical frame, by stamp, with the truth.
 
     Raises:
-        CardboxError: no stamp is in both.
+        CardboxError: no estimate has the stamp of a true frame.
     """
     stamps = [stamp for stamp in estimates if stamp in truth.frames]
     if not stamps:
-        raise CardboxError("no estimate has the stamp of a true frame; is it another session's?")
+        raise CardboxError(
+            "no estimate has the stamp of a true frame; give the ground truth of this recording"
+        )
     differences = np.array([estimates[s] - truth.frames[s].keypoints_m for s in stamps])
     distances = np.linalg.norm(differences, axis=2)
     segments: dict[str, list[float]] = defaultdict(list)

@@ -1,6 +1,6 @@
 """Limits to the memory and the disk space that a recording can take when it is unpacked.
 
-rosbags decompresses each chunk, message or file whole, whatever its size. `check_recording` adds
+rosbags decompresses each chunk, message or file whole, without a limit. `check_recording` adds
 up the sizes that a recording states; `limit_decompression` replaces the functions that rosbags
 calls by ones that stop at a limit, because the stated sizes may be false.
 """
@@ -40,7 +40,7 @@ def check_recording(path: Path) -> None:
     """Check that a recording consists of regular files and states sensible unpacked sizes.
 
     Raises:
-        BagError: it does not.
+        BagError: a file is not regular, or the stated sizes are too large.
     """
     if path.is_dir():
         for name in sorted(os.listdir(path)):

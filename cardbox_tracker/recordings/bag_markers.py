@@ -12,7 +12,7 @@ from cardbox_tracker.recordings.bag_writer import BagWriter
 
 _NO_BYTES = np.zeros(0, np.uint8)
 _NO_POINTS = np.zeros((0, 3))
-# As visualization_msgs/Marker numbers them.
+# Values of the constants of visualization_msgs/Marker.
 _ADD, _DELETE_ALL = 0, 3
 _NOTHING = MarkerShape("", 0, 0.0, _NO_POINTS, (0.0, 0.0, 0.0, 0.0))
 

@@ -11,15 +11,16 @@ _COMPRESSED = "/compressed"
 
 
 def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) -> dict[str, str]:
-    """Return what the launch arguments of the same names are for a bag.
+    """Return the topics of a bag as values of the launch arguments of the same names.
 
     Args:
         bag: rosbag2 folder or file.
-        wanted: ``image``, which comes with ``image_transport``, and ``camera_info``.
-        cameras: namespaces of several cameras; the names are then those below each of them.
+        wanted: ``image``, which includes ``image_transport``, and ``camera_info``.
+        cameras: namespaces of several cameras; the names are then relative to each namespace.
 
     Raises:
-        CardboxError: it cannot be read, does not have exactly one of each, or the cameras differ.
+        CardboxError: the bag cannot be read, does not have exactly one topic of each kind, or the
+            cameras differ.
     """
     with BagReader(bag) as reader:
         images = sorted(name for name, kind in reader.topics.items() if kind in IMAGE_TYPES)
@@ -36,7 +37,7 @@ def find_topics(bag: str, wanted: Iterable[str], cameras: Sequence[str] = ()) ->
 
 
 def _topics_of(reader: BagReader, wanted: Iterable[str], camera: str) -> dict[str, str]:
-    """Return the topics of one camera; of the only one if ``camera`` is empty."""
+    """Return the topics of one camera; if ``camera`` is empty, those of the only camera."""
     folder = f"/{camera}/" if camera else ""
     found = {}
     if "image" in wanted:

@@ -23,7 +23,7 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSour
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.pairing import MOST_CAMERAS, side_by_side
 
-# Images whose stamps differ by more are not paired.
+# Images are paired if their stamps differ by at most this.
 _TOLERANCE_NS = 50_000_000
 
 
@@ -62,7 +62,7 @@ def calibrate_recording(
         progress: called with the finished fraction.
 
     Raises:
-        CardboxError: the recording or a span cannot be used, or no camera pose fits.
+        CardboxError: the recording or a span is unusable, or no camera pose fits.
     """
     names = [camera.strip("/") for camera in cameras]
     if not 2 <= len(set(names)) == len(names) <= MOST_CAMERAS:

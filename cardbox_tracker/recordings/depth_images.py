@@ -17,8 +17,8 @@ def depth_images(
     """Yield stamp, ns, and depth (H, W), metres, of each depth image, at the size of ``camera``.
 
     Raises:
-        BagError: the recording cannot be read, lacks the topic, or has other messages there.
-        EncodingError: an image shows no depth.
+        BagError: the recording cannot be read, lacks the topic, or has other messages on it.
+        EncodingError: the encoding of an image is not one of depth.
     """
     with BagReader(path) as bag:
         kind = bag.topics.get(topic, IMAGE_TYPES[0])

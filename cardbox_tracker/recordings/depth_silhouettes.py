@@ -1,4 +1,4 @@
-"""Silhouettes of a recording with depth images: nothing has to be learned."""
+"""Silhouettes of a recording, cut out by depth images without a background model."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
 
 
 class Within(NamedTuple):
-    """In place of a background: whoever is nearer than a limit.
+    """Segmentation by depth: pixels nearer than a limit belong to the person.
 
     Attributes:
-        topic: of depth images that show what the camera shows.
-        metres: the limit, along the optical axis.
+        topic: topic of depth images with the camera's field of view.
+        metres: the limit along the optical axis.
     """
 
     topic: str
@@ -27,7 +27,7 @@ class Within(NamedTuple):
 
 
 class DepthSilhouetteSource(SilhouetteSource):
-    """The images of one bag that have a depth image, and whoever is near in it."""
+    """One camera of a recording whose silhouettes are cut out by depth images."""
 
     def __init__(
         self,
@@ -40,14 +40,14 @@ class DepthSilhouetteSource(SilhouetteSource):
 
         Args:
             bag: an open recording.
-            within: what is cut out.
+            within: depth topic and limit.
             size: working resolution (width, height), px.
             camera: namespace of the camera; without it, the recording has only one.
 
         Raises:
             BagError: the recording has no images.
             CameraError: the recording's camera is not calibrated.
-            CardboxError: the limit is impossible.
+            CardboxError: the limit is out of range.
         """
         least_m, most_m = WITHIN_LIMITS_M
         if not least_m <= within.metres <= most_m:
@@ -82,11 +82,11 @@ class DepthSilhouetteSource(SilhouetteSource):
 
     @property
     def remarks(self) -> list[str]:
-        """What is odd about the images read so far."""
+        """Warnings about the images read so far."""
         if not self._without:
             return super().remarks
         without = (
-            f"{self._without} images have no depth image on {self._within.topic} of their time, "
-            "and are left out"
+            f"{self._without} images have no depth image of the same time on "
+            f"{self._within.topic} and are skipped"
         )
         return [*super().remarks, without]

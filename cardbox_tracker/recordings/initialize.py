@@ -36,7 +36,7 @@ def initialize_from_recording(
 
     Raises:
         CardboxError: a span has no image.
-        InitializationError: the references are unusable, show other postures, or the model does
+        InitializationError: the references are unusable or show other postures, or the model does
             not fit them.
     """
     references, images = {}, {}
@@ -56,7 +56,7 @@ def initialize_from_cameras(
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with the second one.
 
-    The search begins at the distance of ``config``.
+    The search for the distance begins at that of ``config``.
 
     Raises:
         CardboxError: a span has no image.
@@ -83,12 +83,12 @@ def initialize_with_depth(
 ) -> InitializationResult:
     """Measure the person with the first camera, and the distance with its depth images.
 
-    The distance of ``config`` is only where the search begins.
+    The search for the distance begins at that of ``config``.
 
     Raises:
         CardboxError: a span has no image, or no depth image.
-        InitializationError: as :func:`initialize_from_recording`, or the depth images do not show
-            that person.
+        InitializationError: see :func:`initialize_from_recording`; or the depth images do not fit
+            the person.
     """
     references = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
 

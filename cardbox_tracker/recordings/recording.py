@@ -1,4 +1,4 @@
-"""A recording of one camera or several: their extrinsics, and their images side by side."""
+"""A recording of one or several cameras: extrinsics and synchronized images."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ from cardbox_tracker.vision.pairing import camera_names, side_by_side
 from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
 
 STEREO = "stereo"
-"""In place of a topic: the depth is measured in the rectified pair of the first two cameras."""
+"""Given in place of a depth topic: stereo depth of the first two cameras, a rectified pair."""
 _STATIC_TOPIC = "/tf_static"
 
 
 class FrameSet(NamedTuple):
-    """What all cameras saw at one time.
+    """Frames of all cameras at one time.
 
     Attributes:
-        stamp_ns: of the first camera's image; of the earliest one if that is missing.
-        time_s: the same in seconds from the bag's start.
-        frames: of each camera, the first camera's first; None of one that has none for this time.
-        first: of the first camera, black where it has none.
-        depth_m: (H, W) of the first camera, metres; None without one for this time.
+        stamp_ns: stamp of the first camera's image, or of the earliest image without it.
+        time_s: the same time in seconds from the bag's start.
+        frames: one frame for each camera, the first camera's first; None if it has no image.
+        first: frame of the first camera, black without an image.
+        depth_m: depth (H, W) in the first camera, metres; None without a depth image.
     """
 
     stamp_ns: int
@@ -60,7 +60,7 @@ class FrameSet(NamedTuple):
 
     @property
     def observations(self) -> list[Observation]:
-        """What a tracker takes of them, an empty observation of a camera without an image."""
+        """Observations for a tracker; that of a camera without an image is empty."""
         seen = [
             Observation()
             if frame is None
@@ -72,13 +72,13 @@ class FrameSet(NamedTuple):
 
 
 class Recording:
-    """The cameras of an open recording, after learning each one's background.
+    """The cameras of an open recording, each with a learned background.
 
     Attributes:
-        names: namespaces of the cameras, the first camera's first; empty of the only one.
+        names: namespaces of the cameras, the first camera's first; a single camera has "".
         sources: silhouettes of each camera.
-        others: the further cameras, as a tracker takes them.
-        measures_depth: whether there are depth images, or stereo, beside the silhouettes.
+        others: the further cameras with their poses.
+        measures_depth: True if there is depth from depth images or stereo.
     """
 
     def __init__(
@@ -88,19 +88,19 @@ class Recording:
         extrinsics: Sequence[Extrinsics] = (),
         depth: str | None = None,
     ) -> None:
-        """Take the cameras together; :func:`open_recording` opens them.
+        """Combine the cameras that :func:`open_recording` opens.
 
         Args:
             names: namespaces of the cameras, the first camera's first.
-            sources: of each camera.
-            extrinsics: where each further camera stands.
-            depth: topic of depth images of the first camera's optical frame and proportions, or
-                ``stereo``: from the first two cameras, a rectified pair.
+            sources: silhouettes of each camera.
+            extrinsics: pose of each further camera.
+            depth: topic of depth images with the optical frame and the aspect ratio of the first
+                camera, or ``stereo`` for depth from the first two cameras, a rectified pair.
 
         Raises:
-            BagError: several streams are to be read side by side, and the first camera has fewer
-                than two images.
-            CameraError: the first two cameras are no rectified pair, but are to measure depth.
+            BagError: there are several streams, but fewer than two images of the first camera.
+            CameraError: ``depth`` is ``stereo``, but the first two cameras are not a rectified
+                pair.
         """
         self.names, self.sources = tuple(names), tuple(sources)
         self.others = [
@@ -108,7 +108,7 @@ class Recording:
             for source, there in zip(self.sources[1:], extrinsics, strict=True)
         ]
         self.measures_depth = depth is not None
-        # Then the depth images that are asked for are read already.
+        # The silhouettes' source already reads these depth images.
         self._cuts_by_depth = depth is not None and depth == self.first.depth_topic
         self._depth = None if self._cuts_by_depth else depth
         self._stereo = stereo_of(self.first.camera, self.others) if depth == STEREO else None
@@ -117,12 +117,12 @@ class Recording:
 
     @property
     def first(self) -> SilhouetteSource:
-        """The first camera: results are in its frame."""
+        """The first camera, in whose frame the results are."""
         return self.sources[0]
 
     def frames(self, start_s: float = 0.0) -> Iterator[FrameSet]:
-        """Yield what the cameras saw from ``start_s`` on, every image of every camera once."""
-        # A set at the start is not to lose an image that is a little earlier.
+        """Yield synchronized frames from ``start_s`` on; each image is in exactly one set."""
+        # Images slightly before the start can belong to the first set.
         early_s = max(0.0, start_s - self._tolerance_ns / 1e9)
         streams = [source.frames(early_s) for source in self.sources]
         depths = self._depths()
@@ -166,10 +166,10 @@ def open_recording(
 
     Args:
         path: a recording as :class:`BagReader` takes it.
-        background: when nobody is in any image; with one camera also what cuts out the person in
-            depth images instead.
-        cameras: namespaces, the first camera's first; without any, the recording has only one.
-        extrinsics: a file, see :func:`load_extrinsics`.
+        background: span without a person in any image; with one camera alternatively the depth
+            limit that cuts out the person.
+        cameras: namespaces, the first camera's first; empty if the recording has one camera.
+        extrinsics: file of the poses, see :func:`load_extrinsics`.
         depth: see :class:`Recording`.
         config: settings of the background models.
         size: working resolution (width, height), px.
@@ -177,17 +177,18 @@ def open_recording(
     Raises:
         BagError: the recording cannot be read, or lacks a camera.
         CameraError: extrinsics are missing or disagree, or a camera is not calibrated.
-        CardboxError: there are too many cameras, or one twice.
+        CardboxError: there are too many cameras, or a camera is given twice.
     """
     names = camera_names(cameras)
     if depth is not None and not cameras:
         raise CardboxError("--depth needs --cameras: the camera whose depth it is, first")
     if isinstance(background, Within) and len(names) > 1:
         raise CardboxError(
-            "depth images cut out the person for one camera only; several need a background"
+            "depth images can cut out the person for one camera only; several cameras need "
+            "--background"
         )
     with ExitStack() as stack:
-        # One reader for each camera: they are read side by side.
+        # A reader has one position, and the cameras are read in parallel.
         bags = [stack.enter_context(BagReader(path)) for _ in names or ("",)]
         found = extrinsics_of(bags[0], names, extrinsics)
         sources = [
@@ -200,10 +201,10 @@ def open_recording(
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
-    """Return what measures depth in the rectified pair of ``left`` and the first of ``others``.
+    """Return stereo depth for the rectified pair of ``left`` and the first of ``others``.
 
     Raises:
-        CameraError: they are no rectified pair with the left camera first.
+        CameraError: the cameras are not a rectified pair with the left camera first.
     """
     if not others:
         raise CameraError("depth from stereo needs two cameras: give both to --cameras, left first")
@@ -211,13 +212,14 @@ def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:
 
 
 def extrinsics_of(bag: BagReader, cameras: Sequence[str], file: Path | None) -> list[Extrinsics]:
-    """Return where each further camera stands against the first one.
+    """Return the pose of each further camera relative to the first one.
 
-    From the projection matrices of a rectified pair, ``/tf_static``, and ``file``.
+    The sources are the projection matrices of a rectified pair, ``/tf_static``, and ``file``.
 
     Raises:
         BagError: a camera has no CameraInfo.
-        CameraError: nothing says it, sources disagree, or the file is none.
+        CameraError: no source has the pose, sources disagree, or ``file`` is not a file of
+            extrinsics.
     """
     if len(cameras) < 2:
         return []

@@ -1,4 +1,4 @@
-"""The bag of ``cardbox track --bag``, with the topics that the tracker node publishes.
+"""Writer of the bag of ``cardbox track --bag``, with the topics of the tracker node.
 
 ``cardbox demo`` records the same topics from the nodes with :func:`result_writer`.
 """

@@ -43,7 +43,7 @@ def has_results(bag: BagReader) -> bool:
 
 
 def namespace_of(bag: BagReader) -> str:
-    """Return the namespace of the tracker's topics, such as "" or "/left"; the first of several.
+    """Return the first namespace with the tracker's topics, such as "" or "/left".
 
     Raises:
         BagError: the bag has no results of the tracker.
@@ -84,7 +84,7 @@ def read_results(bag: BagReader) -> Iterator[Result]:
 
 
 class _Results:
-    """Joins the messages of one image: its joint states and the deviations with their stamp."""
+    """Joins the joint states and the deviations of one image, which have the same stamp."""
 
     def __init__(self, space: str) -> None:
         self._space = space

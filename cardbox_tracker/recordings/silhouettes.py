@@ -1,4 +1,4 @@
-"""Silhouettes of a recording: its images, cut out before its own empty scene."""
+"""Silhouettes of a recording, cut out against its own empty scene."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)
 
-# Images of which the period is taken.
 _PERIOD_IMAGES = 60
-# Longer than any image is on its way.
+# A stamp that differs from the recording time by more comes from another clock.
 _OTHER_CLOCK_NS = 10_000_000_000
 
 
@@ -35,7 +34,7 @@ class TimeSpan(NamedTuple):
         """Read ``T0:T1``.
 
         Raises:
-            ValueError: the text is not of that form.
+            ValueError: the text does not have this form.
         """
         start, colon, end = text.partition(":")
         try:
@@ -53,7 +52,7 @@ class TimeSpan(NamedTuple):
         return self.start_s <= time_s <= self.end_s
 
     def __str__(self) -> str:
-        """Return it as it is written."""
+        """Return the span as ``T0:T1``."""
         return f"{self.start_s:g}:{self.end_s:g}"
 
 
@@ -61,13 +60,13 @@ class RecordedFrame(NamedTuple):
     """One image of a recording and the silhouette in it.
 
     Attributes:
-        stamp_ns: the image's stamp.
+        stamp_ns: stamp of the image.
         time_s: seconds from the bag's start.
         brightness: (H, W) uint8, undistorted, at the working resolution.
         silhouette: (H, W) uint8, 0 or 255.
-        image: (H, W, 3) bgr, or (H, W) of a camera without colour, as ``brightness`` otherwise;
-            None if it was not asked for.
-        depth_m: (H, W), metres, what the silhouette was cut out of; None of one that was not.
+        image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it
+            was not requested.
+        depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
     """
 
     stamp_ns: int
@@ -79,7 +78,7 @@ class RecordedFrame(NamedTuple):
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """What to show a person: the image, or its brightness if that is all there is."""
+        """Picture to display: the image, or its brightness without one."""
         return self.brightness if self.image is None else self.image
 
 
@@ -88,8 +87,9 @@ class SilhouetteSource:
 
     Attributes:
         frame_id: name of the camera's optical frame.
-        camera: the camera of what :meth:`frames` yields.
-        depth_topic: of the depth images that cut out the silhouettes; None if a background does.
+        camera: camera of the frames at the working resolution.
+        depth_topic: topic of the depth images that cut out the silhouettes; None if a background
+            model does.
     """
 
     depth_topic: str | None = None
@@ -104,12 +104,11 @@ class SilhouetteSource:
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
-        They are as many as a live node learns from, ``config.learn_images``, or fewer if the span
-        ends before.
+        It learns from at most ``config.learn_images`` images, like the background node.
 
         Args:
             bag: an open recording.
-            background: when nobody is in the image.
+            background: span without a person in the image.
             config: settings of the background model.
             size: working resolution (width, height), px.
             camera: namespace of the camera; without it, the recording has only one.
@@ -156,7 +155,7 @@ class SilhouetteSource:
 
     @property
     def start_ns(self) -> int:
-        """When the recording begins."""
+        """Start time of the recording."""
         return self._bag.start_ns
 
     @property
@@ -165,8 +164,8 @@ class SilhouetteSource:
         return self._bag.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
-        """Yield every image from ``start_s`` to ``end_s``, in order, none left out."""
-        # From the first image on, so that a frame does not depend on where the span begins.
+        """Yield every image from ``start_s`` to ``end_s`` in order."""
+        # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
         for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
@@ -179,7 +178,7 @@ class SilhouetteSource:
         """Return the frames of a span in which a posture is held.
 
         Raises:
-            CardboxError: no image lies in it; the text names ``what``.
+            CardboxError: no image lies in the span; the text names ``what``.
         """
         found = list(self.frames(*span))
         if not found:
@@ -203,18 +202,18 @@ class SilhouetteSource:
 
     @property
     def remarks(self) -> list[str]:
-        """What is odd about the images read so far."""
+        """Warnings about the images read so far."""
         remarks = []
         if self._clock_ns:
             remarks.append(
                 f"the images' stamps are {abs(self._clock_ns) / 1e9:.0f} s "
-                f"{'behind' if self._clock_ns > 0 else 'ahead of'} the recording's clock; seconds "
-                "count from its start all the same"
+                f"{'behind' if self._clock_ns > 0 else 'ahead of'} the recording's clock; times "
+                "in seconds count from the recording's start nevertheless"
             )
         if self._broken:
             number, reason = next(iter(self._broken.items()))
             remarks.append(
-                f"{len(self._broken)} images cannot be decoded and are left out, the first of them "
+                f"{len(self._broken)} images cannot be decoded and are skipped; the first one is "
                 f"number {number}: {reason}"
             )
         return remarks

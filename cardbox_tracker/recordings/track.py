@@ -1,4 +1,4 @@
-"""``cardbox track``: follow the posture through a recording; no image is dropped."""
+"""``cardbox track``: track the posture in every image of a recording."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from cardbox_tracker.outputs import JOINT_STATE_NAMES, METRICS, joint_values
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
-# Scripts read the columns by their place: further joints follow the last of them.
+# New columns are appended, because scripts read these by their position.
 CSV_HEADER = (
     "stamp",
     "state",
@@ -35,17 +36,39 @@ CSV_HEADER = (
 )
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
-"""Is told of each image and what was found in it."""
+"""Callback that receives each image with its estimate and the tracker."""
 
 _VIDEO_SCALE = 2
 
 
+class TrackFiles(NamedTuple):
+    """Files to write; None for one that is not wanted.
+
+    Attributes:
+        csv: table with one row for each image.
+        video: overlay video.
+        fps: frames per second of the video.
+    """
+
+    csv: Path | None = None
+    video: Path | None = None
+    fps: float = 15.0
+
+
+_NO_FILES = TrackFiles()
+
+
 @dataclass(frozen=True)
 class TrackSummary:
-    """What a run did: images seen and tracked, and means over the tracked ones.
+    """Summary of a run.
 
-    ``frames_uncertain`` of the tracked ones have a posture that may be wrong; ``remarks`` are about
-    extrinsics that seem to be wrong.
+    Attributes:
+        frames: number of images.
+        frames_tracked: number of images with a posture.
+        mean_cost_px: mean cost over the tracked images; nan without any.
+        mean_iou: mean overlap (IoU) over the tracked images; nan without any.
+        frames_uncertain: number of tracked images whose posture may be wrong.
+        remarks: warnings about extrinsics that seem to be wrong.
     """
 
     frames: int
@@ -62,22 +85,19 @@ def track_recording(
     config: TrackerConfig,
     seed: int,
     start_s: float,
-    csv_path: Path | None,
-    video_path: Path | None = None,
-    fps: float = 15.0,
+    files: TrackFiles = _NO_FILES,
     observers: tuple[Observer, ...] = (),
 ) -> TrackSummary:
-    """Track every image from ``start_s`` on; write one CSV row for each.
+    """Track every image from ``start_s`` on.
 
     Args:
-        recording: with its cameras.
+        recording: an open recording.
         body: the measured person.
         config: settings of the tracker.
-        seed: the same recording and seed give the same bytes.
-        start_s: when the person stands in the front reference posture, from the bag's start.
-        csv_path: written atomically, if at all.
-        video_path: where to write the overlay, if at all.
-        fps: frames a second of the video.
+        seed: random seed; the same recording and seed give the same bytes.
+        start_s: seconds from the bag's start at which the person stands in the front reference
+            posture.
+        files: files to write; the table is written atomically.
         observers: called after each image, such as a progress bar or a bag writer.
 
     Raises:
@@ -90,16 +110,15 @@ def track_recording(
     frames = frames_uncertain = 0
     with ExitStack() as stack:
         rows = None
-        if csv_path is not None:
-            table = stack.enter_context(
-                stack.enter_context(atomic_path(csv_path)).open("w", newline="", encoding="utf-8")
-            )
+        if files.csv is not None:
+            path = stack.enter_context(atomic_path(files.csv))
+            table = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
             rows = csv.writer(table, lineterminator="\n")
             rows.writerow(CSV_HEADER)
         draw = None
-        if video_path is not None:
+        if files.video is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
-            draw = stack.enter_context(video_file(video_path, size, fps))
+            draw = stack.enter_context(video_file(files.video, size, files.fps))
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
@@ -132,7 +151,7 @@ def track_recording(
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
-    """Return the row of one image; what is not known is left empty."""
+    """Return the row of one image; unknown values are empty."""
     stamp = stamp_text(stamp_ns)
     joints = joint_values(estimate)
     if joints is None or estimate.keypoints_m is None:

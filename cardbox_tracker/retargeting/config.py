@@ -9,7 +9,7 @@ from cardbox_tracker.settings import check, setting
 
 @dataclass(frozen=True)
 class RetargetConfig:
-    """Settings of how a robot follows a person, and of when it stands still.
+    """Settings of how a robot follows a person and when it stands still.
 
     Raises:
         ValueError: a value is out of its range; the text names it.

@@ -44,7 +44,7 @@ class SafeMotion:
     def move(self, target: FloatArray, duration_s: float) -> FloatArray:
         """Move towards ``target`` (n,) for ``duration_s`` and return the new positions (n,).
 
-        Nothing moves if the target or the duration is not finite, or the duration not positive.
+        The robot stands still unless the target is finite and the duration finite and positive.
         """
         if not (np.isfinite(target).all() and np.isfinite(duration_s) and duration_s > 0.0):
             return self.positions

@@ -40,7 +40,7 @@ class Command(NamedTuple):
     """Command for the robot at one image.
 
     Attributes:
-        positions: of ``Retargeter.joints``, (n,), rad or m.
+        positions: positions (n,) of ``Retargeter.joints``, rad or m.
         status: ``moving``, or ``frozen:`` with the reason.
         duration_s: time in which the robot reaches the positions.
     """
@@ -51,7 +51,7 @@ class Command(NamedTuple):
 
     @property
     def is_moving(self) -> bool:
-        """False while the robot must stand still."""
+        """True unless the robot must stand still."""
         return self.status == MOVING
 
 

@@ -33,7 +33,7 @@ class Robot:
     """A robot.
 
     Attributes:
-        urdf: description, in which continuous joints are limited to half a turn either way.
+        urdf: description, in which continuous joints have limits of half a turn in each direction.
         joints: movable joints by name, in the order of the description.
         parents: for each link but the root, the names of its joint and its parent link.
     """

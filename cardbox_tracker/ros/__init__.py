@@ -1,5 +1,5 @@
 """The ROS 2 nodes and the conversions between messages and the core.
 
-A node converts, calls the core and publishes; the nodes are in :mod:`.nodes`, what they share
-in :mod:`.runtime`, and messages become arrays, and arrays messages, in :mod:`.messages`.
+A node converts messages, calls the core and publishes the results. :mod:`.nodes` has the nodes,
+:mod:`.runtime` their common infrastructure, and :mod:`.messages` the conversions.
 """

@@ -16,7 +16,7 @@ _ROBOT = "retarget"
 
 
 class LiveView(CardboxNode):
-    """Hands the tracker's results to the viewer; a robot's too, of the node ``retarget``."""
+    """Passes the results of the tracker and of the node ``retarget`` to the viewer."""
 
     def __init__(self, scene: Scene) -> None:
         """Subscribe."""
@@ -67,7 +67,7 @@ class LiveView(CardboxNode):
             self._feed.robot_joints(stamp_ns, _ROBOT, results.joint_values_of(message))
 
     def _on_state(self, message: String, _: int) -> None:
-        # It has no stamp; it is sent before the other results of its image.
+        # The state has no stamp; it is sent before the other results of its image.
         if self._latest_ns is not None:
             self._feed.state(self._latest_ns, message.data)
 
@@ -77,5 +77,5 @@ def _stamp_ns(message: Image | JointState | PoseArray) -> int:
 
 
 def show_nodes(scene: Scene) -> int:
-    """Show what the nodes publish until Ctrl-C; the exit code is 0 unless it could not start."""
+    """Show the nodes' results until Ctrl-C; return 0, or another exit code if it cannot start."""
     return run_node(lambda: LiveView(scene), ["cardbox_view"])

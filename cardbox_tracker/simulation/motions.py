@@ -34,9 +34,9 @@ class Segment:
     """Part of the timeline.
 
     Attributes:
-        name: of the motion or reference posture.
-        start_s: from the session's start.
-        end_s: from the session's start.
+        name: name of the motion or reference posture.
+        start_s: start, seconds from the session's start.
+        end_s: end, seconds from the session's start.
         pose: posture (12,) at a time in seconds from ``start_s``; None in the empty scene.
     """
 

@@ -3,7 +3,7 @@
 Each part is a stack of elliptical rings; the part is the convex hull of each two neighbouring
 rings. The rings roughly follow the sizes of a :class:`BodyModel`: limbs taper, the torso narrows at
 waist and shoulders, and there are a neck, open hands and legs. The shoulder joints rise with the
-arms. So the cardbox model never matches exactly, while :func:`person_frames` gives the true
+arms. Therefore the cardbox model never matches exactly. :func:`person_frames` gives the true
 skeleton.
 """
 

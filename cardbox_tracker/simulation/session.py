@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -40,6 +41,33 @@ _SWAY_M = 0.003
 _FOCAL_OF_WIDTH = 330.0 / 320.0
 
 
+@dataclass(frozen=True)
+class SessionFormat:
+    """Format of a synthetic recording.
+
+    Attributes:
+        fps: images per second.
+        width: image width, px.
+        height: image height, px.
+        cameras: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
+            ``extrinsics.yaml`` in the folder has their poses.
+        compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
+        encoding: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``.
+        storage: ``mcap`` or ``sqlite3``.
+    """
+
+    fps: float = 15.0
+    width: int = 320
+    height: int = 240
+    cameras: int = 1
+    compressed: bool = False
+    encoding: str = "mono8"
+    storage: str = "mcap"
+
+
+DEFAULT_FORMAT = SessionFormat()
+
+
 def session_camera(width: int = 320, height: int = 240) -> Camera:
     """Return the level camera of a session, f = 330 px at a width of 320."""
     focal = _FOCAL_OF_WIDTH * width
@@ -50,15 +78,8 @@ def synthesize_session(
     output: str | os.PathLike[str],
     motion: str = "all",
     seed: int = 0,
-    fps: float = 15.0,
-    width: int = 320,
-    height: int = 240,
+    form: SessionFormat = DEFAULT_FORMAT,
     body: BodyModel | None = None,
-    storage: str = "mcap",
-    compressed: bool = False,
-    encoding: str = "mono8",
-    scene: Scene | None = None,
-    cameras: int = 1,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
@@ -68,40 +89,33 @@ def synthesize_session(
         output: folder of the recording; it appears when it is complete.
         motion: ``wave``, ``bend``, ``bow`` or ``all``.
         seed: seed of noise and sway.
-        fps: images per second.
-        width: image width, px.
-        height: image height, px.
+        form: format of the recording.
         body: the person, and the pitch of the camera; None for the default person.
-        storage: ``mcap`` or ``sqlite3``.
-        compressed: JPEG images on ``/camera/image_raw/compressed`` instead of raw ones.
-        encoding: encoding of raw images: ``mono8``, ``rgb8`` or ``bgr8``.
-        scene: wall and sensor.
-        cameras: number of cameras, 1 to 4. Several have the namespaces ``cam0``, ``cam1``, ...;
-            ``extrinsics.yaml`` in the folder has their poses.
         overwrite: replace an existing recording of that name.
         progress: called with the finished fraction.
 
     Raises:
         CardboxError: the motion or the encoding is unknown, or the folder cannot be written.
     """
-    if encoding not in _ENCODINGS:
+    if form.encoding not in _ENCODINGS:
         raise EncodingError(
-            f"encoding '{encoding}' cannot be synthesized; expected {', '.join(_ENCODINGS)}"
+            f"encoding '{form.encoding}' cannot be synthesized; expected {', '.join(_ENCODINGS)}"
         )
     body = body or BodyModel.of(hip_height_m=-0.51)
     segments = timeline(motion, body.side_turn)
+    fps, width, height, cameras = form.fps, form.width, form.height, form.cameras
     camera = session_camera(width, height).with_pitch(body.camera_pose.pitch_rad)
     rng = np.random.default_rng(seed)
     views = synthetic_cameras(body, camera, cameras)
     renderers = [
-        Renderer(view.camera, scene or Scene(), own)
+        Renderer(view.camera, Scene(), own)
         for view, own in zip(views, rng.spawn(cameras), strict=True)
     ]
     count = round(segments[-1].end_s * fps)
     truth: list[dict[str, Any]] = []
     masks = np.zeros((cameras, count, height * width), np.uint8)
     sway = 0.0
-    with BagWriter(output, storage, overwrite) as bag:
+    with BagWriter(output, form.storage, overwrite) as bag:
         for number in range(count):
             time_s = number / fps
             stamp_ns = START_NS + round(number * 1e9 / fps)
@@ -130,7 +144,7 @@ def synthesize_session(
             for view, (image, mask), of_view in zip(views, seen, masks, strict=True):
                 of_view[number] = (mask > 0).ravel()
                 bag.write_camera_info(view.info_topic, stamp_ns, view.frame_id, view.camera)
-                _write_image(bag, view, stamp_ns, image, compressed, encoding)
+                _write_image(bag, view, stamp_ns, image, form)
             if progress is not None:
                 progress((number + 1) / count)
         session = _session(body, camera, fps, segments, truth, seed)
@@ -157,16 +171,15 @@ def _write_image(
     view: SyntheticCamera,
     stamp_ns: int,
     image: NDArray[np.uint8],
-    compressed: bool,
-    encoding: str,
+    form: SessionFormat,
 ) -> None:
-    if compressed:
+    if form.compressed:
         jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
         bag.write_compressed(f"{view.image_topic}/compressed", stamp_ns, view.frame_id, jpeg)
         return
-    if encoding != "mono8":
+    if form.encoding != "mono8":
         image = np.repeat(image[..., None], 3, axis=2)
-    bag.write_image(view.image_topic, stamp_ns, view.frame_id, image, encoding)
+    bag.write_image(view.image_topic, stamp_ns, view.frame_id, image, form.encoding)
 
 
 def _truth(

@@ -7,7 +7,7 @@ relative brightness changes slowly. The flood covers a shadow and stops at the o
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -27,7 +27,14 @@ _REACH_PX = 2
 
 # Eight pixels are processed at a time where the width is a multiple of eight.
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-_NOTHING = np.zeros((1, 1), np.uint8)
+_NO_COLOR = np.zeros((0, 0), np.uint8)
+
+
+class _Darkness(NamedTuple):
+    """Difference (H, W) in grey levels, and one grey level (H, W) as a fraction."""
+
+    difference: Any
+    per_level: Any
 
 
 def decide_shadows(
@@ -55,22 +62,23 @@ def decide_shadows(
     """
     window = window or Window(0, foreground.shape[0], 0, foreground.shape[1])
     part = foreground[window.slices]
-    by_color = _NOTHING
+    by_color = _NO_COLOR
     if colored is not None:
         by_color = np.asarray(cv2.inRange(colored, 0.0, np.inf), np.uint8)
     # Row and column of the candidates, and of the pixels that were flooded.
     queues = np.empty((4, part.size), np.int32)
     limits = np.float32(-darkest), np.float32(softest)
     words = foreground.view(np.uint64) if foreground.shape[1] % 8 == 0 else _NO_WORDS
-    has_color = colored is not None
-    if has_color:
+    if colored is not None:
         cv2.bitwise_or(part, by_color, dst=part)
-    _decide(foreground, words, difference, per_level, by_color, has_color, limits, window, queues)
+    darkness = _Darkness(difference, per_level)
+    _decide(foreground, words, darkness, by_color, limits, window, queues)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> Any:
+def _is_soft(darkness: Any, v: Any, u: Any, softest: Any) -> Any:
     """Return whether the darkness varies by less than ``softest`` in the square around a pixel."""
+    difference, per_level = darkness
     height, width = difference.shape
     low = high = difference[v, u] * per_level[v, u]
     for y in range(max(v - _REACH_PX, 0), min(v + _REACH_PX + 1, height)):
@@ -87,17 +95,17 @@ def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> A
 def _decide(
     foreground: Any,
     words: Any,
-    difference: Any,
-    per_level: Any,
+    darkness: Any,
     by_color: Any,
-    has_color: Any,
     limits: Any,
     window: Any,
     queues: Any,
 ) -> None:
     height, width = foreground.shape
     top, bottom, left, right = window
+    difference, per_level = darkness
     darkest, softest = limits
+    has_color = by_color.shape[0] > 0
     rows, columns = queues[0], queues[1]
     queued_rows, queued_columns = queues[2], queues[3]
     dark = np.uint8(_DARK)
@@ -130,7 +138,7 @@ def _decide(
             or (u > 0 and foreground[v, u - 1] == 0)
             or (u + 1 < width and foreground[v, u + 1] == 0)
         )
-        if outside and _is_soft(difference, per_level, v, u, softest):
+        if outside and _is_soft(darkness, v, u, softest):
             foreground[v, u] = 0
             queued_rows[count], queued_columns[count] = v, u
             count += 1
@@ -143,7 +151,7 @@ def _decide(
             x = u + (k == 2) - (k == 3)
             if y < 0 or y >= height or x < 0 or x >= width or foreground[y, x] != dark:
                 continue
-            if _is_soft(difference, per_level, y, x, softest):
+            if _is_soft(darkness, y, x, softest):
                 foreground[y, x] = 0
                 queued_rows[count], queued_columns[count] = y, x
                 count += 1

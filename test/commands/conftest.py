@@ -13,7 +13,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def cardbox(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of good files and bad ones."""
     folder = tmp_path_factory.mktemp("cardbox")
-    synthesize_session(folder / "session", "bow", fps=4.0, width=160, height=120)
+    synthesize_session(folder / "session", "bow", form=SessionFormat(4.0, 160, 120))
     save_body_model(BodyModel.of(hip_height_m=-0.51), folder / "person.yaml")
     text = (folder / "person.yaml").read_text()
     (folder / "text.txt").write_text("no recording, no model\n")

@@ -14,7 +14,7 @@ from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.evaluation.truth import load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 SPANS = {
     "--background": "0:3.9",
@@ -27,7 +27,7 @@ SPANS = {
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cameras") / "session"
-    synthesize_session(folder, "bow", fps=5.0, width=320, height=240, cameras=2)
+    synthesize_session(folder, "bow", form=SessionFormat(5.0, cameras=2))
     return folder
 
 

@@ -15,7 +15,7 @@ from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.demo.report import write_report
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.evaluation.truth import load_ground_truth
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 BODY = BodyModel.of(hip_height_m=-0.51)
 LAST = 24
@@ -26,8 +26,7 @@ LAST = 24
 def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of one camera, and of two."""
     folder = tmp_path_factory.mktemp("demo") / "session"
-    size = {"width": 160, "height": 120}
-    synthesize_session(folder, "bow", fps=4.0, body=BODY, cameras=request.param, **size)
+    synthesize_session(folder, "bow", form=SessionFormat(4.0, 160, 120, request.param), body=BODY)
     return folder
 
 

@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.initialization.measure import initialize_body
 from cardbox_tracker.estimation.initialization.references import average_silhouette
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth, tracking_error
-from cardbox_tracker.simulation.session import session_camera, synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, session_camera, synthesize_session
 
 SEEDS = (0, 1, 2)
 FPS = 15.0
@@ -65,7 +65,7 @@ class Session:
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     folder: Path = tmp_path_factory.mktemp("accuracy") / "session"
-    synthesize_session(folder, "all", seed=0, fps=FPS)
+    synthesize_session(folder, "all", form=SessionFormat(FPS))
     truth = load_ground_truth(folder / "ground_truth.json")
     archive = np.load(folder / "masks.npz")
     count, height, width = archive["shape"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 from experiments.parallel import Progress
 from experiments.plan import Plan
 from experiments.sessions import Session, synthetic_session
@@ -53,7 +53,7 @@ def silent() -> Progress:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded session with ground truth."""
     folder = tmp_path_factory.mktemp("evaluation") / "person"
-    synthesize_session(folder, "bow", 3, FPS, *SIZE)
+    synthesize_session(folder, "bow", 3, SessionFormat(FPS, *SIZE))
     return folder
 
 

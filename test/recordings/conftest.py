@@ -17,7 +17,7 @@ from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 FPS = 5.0
 
@@ -45,7 +45,7 @@ def background(truth: GroundTruth) -> TimeSpan:
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     folder = tmp_path_factory.mktemp("offline") / "session"
-    synthesize_session(folder, "bow", seed=3, fps=FPS)
+    synthesize_session(folder, "bow", 3, SessionFormat(FPS))
     truth = load_ground_truth(folder / "ground_truth.json")
     with BagReader(folder) as bag:
         source = SilhouetteSource(bag, background(truth))

@@ -14,7 +14,7 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
-from cardbox_tracker.recordings.track import TrackSummary, track_recording
+from cardbox_tracker.recordings.track import TrackFiles, TrackSummary, track_recording
 
 # As ROS 2 Jazzy's own message packages have them.
 TYPES = {
@@ -45,7 +45,7 @@ def results(
                 default_preset(),
                 0,
                 0.0,
-                folder / "person.csv",
+                TrackFiles(folder / "person.csv"),
             ),
             observers=(bag.add,),
         )

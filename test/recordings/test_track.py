@@ -26,7 +26,13 @@ from cardbox_tracker.recordings.initialize import describe, initialize_from_reco
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.recordings.track import CSV_HEADER, TrackSummary, csv_row, track_recording
+from cardbox_tracker.recordings.track import (
+    CSV_HEADER,
+    TrackFiles,
+    TrackSummary,
+    csv_row,
+    track_recording,
+)
 
 CONFIG = default_preset()
 
@@ -45,8 +51,9 @@ def track(
     recording: Any, source: SilhouetteSource, path: Path, seed: int = 0, **rest: Any
 ) -> TrackSummary:
     start_s = rest.pop("start_s", recording.start_s())
+    files = TrackFiles(path, rest.pop("video", None))
     return track_recording(
-        Recording([""], [source]), recording.body, CONFIG, seed, start_s, path, **rest
+        Recording([""], [source]), recording.body, CONFIG, seed, start_s, files, **rest
     )
 
 
@@ -73,7 +80,6 @@ def test_the_persons_looks_are_learned(recording: Any) -> None:
 def test_the_tracker_gets_the_images(
     recording: Any,
     source: SilhouetteSource,
-    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen = []
@@ -85,10 +91,7 @@ def test_the_tracker_gets_the_images(
 
     monkeypatch.setattr(Tracker, "track", spy)
     config = default_preset().changed({"whole_body": {"effort": 0.25}})
-    with_cue = tmp_path / "cue.csv"
-    track_recording(
-        Recording([""], [source]), recording.body, config, 0, recording.start_s(), with_cue
-    )
+    track_recording(Recording([""], [source]), recording.body, config, 0, recording.start_s())
     assert seen
     assert all(image.shape == (240, 320) for image in seen)
 
@@ -261,7 +264,7 @@ def test_observers_see_every_image(
 def test_the_video_has_every_image(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    summary = track(recording, source, tmp_path / "person.csv", video_path=tmp_path / "person.mp4")
+    summary = track(recording, source, tmp_path / "person.csv", video=tmp_path / "person.mp4")
     video = cv2.VideoCapture(str(tmp_path / "person.mp4"))
     count = 0
     while (image := video.read()[1]) is not None:
@@ -278,7 +281,7 @@ def test_a_video_that_cannot_be_written_is_refused_and_leaves_nothing(
     recording: Any, source: SilhouetteSource, tmp_path: Path, name: str
 ) -> None:
     with pytest.raises(CardboxError, match="cannot write"):
-        track(recording, source, tmp_path / "person.csv", video_path=tmp_path / name)
+        track(recording, source, tmp_path / "person.csv", video=tmp_path / name)
     assert os.listdir(tmp_path) == []
 
 

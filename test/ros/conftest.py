@@ -1,4 +1,4 @@
-"""One ROS context a test."""
+"""A separate ROS context for each test."""
 
 from __future__ import annotations
 

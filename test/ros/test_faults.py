@@ -1,4 +1,4 @@
-"""After each fault the posture is right again within a second, and none was made up meanwhile."""
+"""After each fault the posture is right within a second, and no wrong one was published."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def nodes(tmp_path: Path) -> Iterator[InsideNodes]:
     made.close()
 
 
-# 600 images take their time, and here nothing has to keep up with them.
+# The fault with 600 images takes long, and nothing has to keep up with it here.
 QUICK = [name for name in FAULTS if name != "200 images a second"]
 
 

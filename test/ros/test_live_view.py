@@ -1,4 +1,4 @@
-"""'cardbox view --live' hands what nodes publish to the viewer."""
+"""'cardbox view --live' passes the nodes' results to the viewer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TOPICS = {
 
 
 class Feed:
-    """Notes what it is told."""
+    """Viewer that records its calls."""
 
     def __init__(self, _: Any) -> None:
         self.told: list[tuple[Any, ...]] = []
@@ -56,7 +56,7 @@ def test_every_result_is_shown_under_its_stamp(node: Any) -> None:
     own = {s.topic_name.lstrip("/") for s in node.subscriptions}
     assert own >= TOPICS
     joints = JointState(name=["elbow"], position=[0.5])
-    hand(node, "tracking_state", String(data="tracking"))  # of no image yet
+    hand(node, "tracking_state", String(data="tracking"))  # before the first image
     hand(node, "joint_states", stamped(joints, 2))
     hand(node, "tracking_state", String(data="lost"))
     hand(node, "joint_states_stddev", stamped(JointState(), 2))
@@ -76,5 +76,5 @@ def test_every_result_is_shown_under_its_stamp(node: Any) -> None:
     np.testing.assert_array_equal(told["keypoints"][1], [(1.0, 0.0, 0.0)])
     assert told["image"][1].shape == (1, 2, 3)
     assert told["robot"] == ["retarget", "<robot/>"]
-    # The robot stands still without an image of its own.
+    # The robot holds its position without a new image.
     assert told["robot_joints"][0] == 2 * 10**9

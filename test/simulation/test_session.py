@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,16 +14,21 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.simulation.person import person_frames
-from cardbox_tracker.simulation.session import START_NS, TRUTH_TOPIC, synthesize_session
+from cardbox_tracker.simulation.session import (
+    START_NS,
+    TRUTH_TOPIC,
+    SessionFormat,
+    synthesize_session,
+)
 from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 
-SMALL: dict[str, Any] = {"fps": 2.0, "width": 160, "height": 120, "motion": "bow"}
+SMALL = SessionFormat(2.0, 160, 120)
 
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("session") / "bag"
-    synthesize_session(folder, **SMALL)
+    synthesize_session(folder, "bow", form=SMALL)
     return folder
 
 
@@ -83,7 +88,7 @@ def test_masks_and_segments_fit_the_frames(session: Path) -> None:
 
 def test_the_camera_of_the_bag_is_that_of_the_truth(tmp_path: Path) -> None:
     body = BodyModel.of(hip_height_m=-0.4, camera_pitch_rad=0.1, lateral_m=0.2, side_turn="right")
-    truth = synthesize_session(tmp_path / "bag", **SMALL, body=body)
+    truth = synthesize_session(tmp_path / "bag", "bow", form=SMALL, body=body)
     with BagReader(tmp_path / "bag") as bag:
         camera = bag.calibration().camera(160, 120)
     expected = truth["camera"]
@@ -100,31 +105,29 @@ def test_the_camera_of_the_bag_is_that_of_the_truth(tmp_path: Path) -> None:
 
 
 def test_hips_stand_where_those_of_a_person_at_two_metres_do(tmp_path: Path) -> None:
-    truth = synthesize_session(tmp_path / "bag", motion="bow", fps=1.0)
+    truth = synthesize_session(tmp_path / "bag", "bow", form=SessionFormat(1.0))
     front = next(f for f in truth["frames"] if f["segment"] == "front")
     assert front["joints_px"]["hips"][1] == pytest.approx(204, abs=2)
     assert front["joints_m"]["hips"][2] == pytest.approx(2.0)
 
 
 def test_the_seed_alone_decides_the_images(session: Path, tmp_path: Path) -> None:
-    synthesize_session(tmp_path / "same", **SMALL, storage="sqlite3")
-    synthesize_session(tmp_path / "other", **SMALL, seed=1)
+    synthesize_session(tmp_path / "same", "bow", form=replace(SMALL, storage="sqlite3"))
+    synthesize_session(tmp_path / "other", "bow", 1, SMALL)
     assert pixels(tmp_path / "same") == pixels(session)
     assert pixels(tmp_path / "other") != pixels(session)
 
 
-@pytest.mark.parametrize("options", [{"encoding": "bgr8"}, {"encoding": "rgb8"}])
-def test_colour_recordings_show_the_same(
-    session: Path, tmp_path: Path, options: dict[str, Any]
-) -> None:
-    synthesize_session(tmp_path / "bag", **SMALL, **options)
+@pytest.mark.parametrize("encoding", ["bgr8", "rgb8"])
+def test_colour_recordings_show_the_same(session: Path, tmp_path: Path, encoding: str) -> None:
+    synthesize_session(tmp_path / "bag", "bow", form=replace(SMALL, encoding=encoding))
     with BagReader(tmp_path / "bag") as bag, BagReader(session) as grey:
         for got, expected in zip(bag.images(), grey.images(), strict=True):
             np.testing.assert_allclose(got.grey, expected.grey, atol=1)
 
 
 def test_compressed_recordings_show_nearly_the_same(session: Path, tmp_path: Path) -> None:
-    synthesize_session(tmp_path / "bag", **SMALL, compressed=True)
+    synthesize_session(tmp_path / "bag", "bow", form=replace(SMALL, compressed=True))
     with BagReader(tmp_path / "bag") as bag, BagReader(session) as grey:
         assert bag.image_topic() == "/camera/image_raw/compressed"
         for got, expected in zip(bag.images(), grey.images(), strict=True):
@@ -133,22 +136,22 @@ def test_compressed_recordings_show_nearly_the_same(session: Path, tmp_path: Pat
 
 def test_progress_rises_to_one(tmp_path: Path) -> None:
     told: list[float] = []
-    synthesize_session(tmp_path / "bag", **SMALL, progress=told.append)
+    synthesize_session(tmp_path / "bag", "bow", form=SMALL, progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
 
 
-@pytest.mark.parametrize("options", [{"motion": "dance"}, {"encoding": "mono16"}])
+@pytest.mark.parametrize(("motion", "encoding"), [("dance", "mono8"), ("bow", "mono16")])
 def test_what_cannot_be_synthesized_is_refused_and_nothing_written(
-    tmp_path: Path, options: dict[str, Any]
+    tmp_path: Path, motion: str, encoding: str
 ) -> None:
     with pytest.raises(CardboxError, match="expected"):
-        synthesize_session(tmp_path / "bag", **(SMALL | options))
+        synthesize_session(tmp_path / "bag", motion, form=replace(SMALL, encoding=encoding))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_several_cameras_see_the_same_person(tmp_path: Path) -> None:
-    truth = synthesize_session(tmp_path / "bag", **SMALL, cameras=3)
+    truth = synthesize_session(tmp_path / "bag", "bow", form=replace(SMALL, cameras=3))
     names = [camera["name"] for camera in truth["cameras"]]
     assert names == ["cam0", "cam1", "cam2"]
     found = load_extrinsics(tmp_path / "bag" / "extrinsics.yaml", names)
@@ -171,4 +174,4 @@ def test_several_cameras_see_the_same_person(tmp_path: Path) -> None:
                     u, v = np.rint(seen_by.project(point)).astype(int)
                     assert mask.reshape(height, width)[v, u], (name, joint)
     with pytest.raises(CardboxError, match=r"5 cameras .* expected 1 to 4"):
-        synthesize_session(tmp_path / "more", **SMALL, cameras=5)
+        synthesize_session(tmp_path / "more", "bow", form=replace(SMALL, cameras=5))

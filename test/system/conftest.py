@@ -1,4 +1,4 @@
-"""Real nodes in processes of their own, over real DDS, each graph on a domain of its own."""
+"""Real nodes in separate processes over DDS, with a separate domain for each graph."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
-# A limit for what hangs, not for what is slow.
+# The limit must only end tests that hang, not slow ones.
 WAIT_S = 90.0
 STOP_S = 30.0
 
@@ -41,7 +41,7 @@ class Scene:
         self._rng = np.random.default_rng(1)
 
     def silhouette(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
-        """Return the exact silhouette (H, W) of a posture (12,) or of a reference; None: nobody."""
+        """Return the silhouette (H, W) of a posture (12,) or a reference; None for nobody."""
         if posture is None:
             return np.zeros((self.camera.height, self.camera.width), np.uint8)
         if isinstance(posture, str):
@@ -50,13 +50,13 @@ class Scene:
         return render(cardbox_patches(self.body, posture), self.camera)
 
     def image(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
-        """Return the noisy image (H, W) of the same."""
+        """Return the noisy image (H, W) of a posture (12,) or a reference; None for nobody."""
         clean = np.where(self.silhouette(posture) > 0, 190.0, 90.0)
         return np.clip(clean + self._rng.normal(0, 2, clean.shape), 0, 255).astype(np.uint8)
 
 
 class Process:
-    """A node in a process of its own; its output goes to a file."""
+    """A node in a separate process with a log file."""
 
     def __init__(self, name: str, arguments: tuple[str, ...], log: Path, domain: int) -> None:
         self.log = log
@@ -70,13 +70,13 @@ class Process:
             )
 
     def text(self) -> str:
-        """Return what it printed so far."""
+        """Return the output so far."""
         return self.log.read_text()
 
     def stop(self) -> int:
-        """Ask it to end as a user's Ctrl-C or a launch file would; return its exit code.
+        """Stop the process as with Ctrl-C, and return its exit code.
 
-        It is negative if the process did not end and had to be killed.
+        The code is negative if the process did not end and had to be killed.
         """
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
@@ -88,7 +88,7 @@ class Process:
 
 
 class Graph:
-    """The nodes under test and one node of ours that talks to them."""
+    """The nodes under test, and a node that communicates with them."""
 
     def __init__(self, folder: Path, domain: int) -> None:
         import rclpy
@@ -109,7 +109,7 @@ class Graph:
     def start(self, name: str, *arguments: str, **parameters: Any) -> Process:
         """Start the node ``name`` with ROS parameters; ``arguments`` come before them.
 
-        ``cardbox_nodes`` is all nodes in one process.
+        ``cardbox_nodes`` runs all nodes in one process.
         """
         ros = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
         log = self.folder / f"{name}_{next(self._numbers)}.log"
@@ -119,7 +119,7 @@ class Graph:
         return process
 
     def close(self) -> None:
-        """Stop everything; a node that did not end cleanly fails the test."""
+        """Stop all nodes; fail the test if one did not end cleanly."""
         codes = {process.log.name: process.stop() for process in self.processes}
         self.executor.shutdown()
         self.node.destroy_node()
@@ -148,7 +148,7 @@ class Graph:
             self.executor.spin_once(timeout_sec=left)
 
     def collect(self, kind: Any, topic: str, profile: Any = None) -> list[Any]:
-        """Return a list that every message on ``topic`` is added to, from now on."""
+        """Return a list to which every message on ``topic`` is added from now on."""
         from cardbox_tracker.ros.runtime import qos
 
         messages: list[Any] = []
@@ -167,7 +167,7 @@ class Graph:
         return future.result()
 
     def diagnosis(self, node: str, words: str = "") -> Any:
-        """Wait for a diagnostic status of ``node`` whose message has ``words`` in it; return it."""
+        """Wait for a diagnostic status of ``node`` with ``words`` in its message; return it."""
         from diagnostic_msgs.msg import DiagnosticArray
 
         arrays = self.collect(DiagnosticArray, "/diagnostics")
@@ -199,7 +199,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory, ros_domains: Iterator[int]) 
 def own_graph(
     tmp_path_factory: pytest.TempPathFactory, ros_domains: Iterator[int]
 ) -> Iterator[Graph]:
-    """A graph of one test; what the test started is gone before the next one begins."""
+    """A graph of one test, whose nodes end before the next test."""
     yield from _graph(tmp_path_factory, ros_domains)
 
 
@@ -218,5 +218,5 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="session")
 def make_scene() -> type[Scene]:
-    """What makes another room with a person who stands elsewhere."""
+    """Return the class of scenes, to make one with a person at another place."""
     return Scene

@@ -1,4 +1,4 @@
-"""What must not cost the silhouette: a restart, a wrong CameraInfo, a second camera, a person."""
+"""Silhouettes survive a restart, a wrong CameraInfo, a second camera, and a person in view."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RESTARTS = 2
 
 
 class Camera:
-    """A camera whose person sways by some millimetres, and the background node behind it."""
+    """A camera with a person who sways by some millimetres, and its background node."""
 
     def __init__(self, graph: Any, scene: Any) -> None:
         self.graph, self.scene = graph, scene
@@ -35,7 +35,7 @@ class Camera:
 
     def start(self, **parameters: Any) -> None:
         graph = self.graph
-        # DDS lists a killed node for a while; topics of its own tell the new one from it.
+        # DDS lists a killed node for a while, so the new node gets its own topics.
         self.topic = f"/camera_{next(self._starts)}/image_raw"
         info = self.topic.replace("image_raw", "camera_info")
         self.images = graph.node.create_publisher(Image, self.topic, qos.CAMERA)
@@ -53,7 +53,7 @@ class Camera:
         self.silhouettes.clear()
 
     def kill(self) -> None:
-        """End the node as a crash does; it is not asked how it ended."""
+        """Kill the node like a crash; its exit code is not checked."""
         self.graph.processes.remove(self.process)
         self.process.process.send_signal(signal.SIGKILL)
         self.process.process.wait()
@@ -85,7 +85,7 @@ class Camera:
         return float(np.count_nonzero(found & truth) / np.count_nonzero(found | truth))
 
     def until_silhouettes(self, posture: str | None, count: int = 1) -> tuple[int, list[Any]]:
-        """Show images until ``count`` more silhouettes came; return images shown, silhouettes."""
+        """Show images until ``count`` more silhouettes; return their number and silhouettes."""
         first, shown = len(self.silhouettes), 0
 
         def came() -> bool:
@@ -106,7 +106,7 @@ def camera(own_graph: Any, scene: Any) -> Camera:
 
 def test_with_depth_images_nothing_has_to_be_learned(camera: Camera) -> None:
     camera.start(depth="/range/image_raw", within_m=3.0)
-    # They stand there from the first image on.
+    # The person is in view from the first image on.
     shown, silhouettes = camera.until_silhouettes("front", 3)
     assert shown < LEARN_IMAGES
     assert min(camera.iou(message) for message in silhouettes) > 0.95
@@ -117,7 +117,7 @@ def test_with_depth_images_nothing_has_to_be_learned(camera: Camera) -> None:
     for _ in range(20):
         camera.show("front")
         camera.graph.spin(0.05)
-    # What is in flight may still come.
+    # Messages in flight may still arrive.
     assert len(camera.silhouettes) <= count + 1
     assert camera.graph.diagnosis("background", "waiting for depth images on /range/image_raw")
 
@@ -131,14 +131,14 @@ def test_a_good_background_is_kept(camera: Camera, tmp_path: Path) -> None:
     before = np.mean([camera.iou(message) for message in silhouettes[1:]])
     assert before > 0.95
 
-    # One wrong CameraInfo.
+    # The first fault is one wrong CameraInfo.
     camera.show("front", focal_px=301.0)
     _, silhouettes = camera.until_silhouettes("front", 5)
     assert min(camera.iou(message) for message in silhouettes) > before - 0.02
     status = graph.diagnosis("background", "that differs from those before")
     assert {value.key: value.value for value in status.values}["ignored CameraInfo"] == "1"
 
-    # A second camera on the topic.
+    # The second fault is another camera on the topic.
     second = rclpy.create_node("second_camera", context=graph.context, enable_rosout=False)
     second.create_publisher(Image, camera.topic, qos.CAMERA)
     values = {
@@ -158,12 +158,12 @@ def test_a_good_background_is_kept(camera: Camera, tmp_path: Path) -> None:
     assert any("/probe, /second_camera" in value for value in values.values())
     second.destroy_node()
 
-    # Killed and restarted with somebody in view.
+    # The third fault is a crash and a restart with a person in view.
     for _ in range(RESTARTS):
         camera.kill()
         camera.start(background_file=file)
         _, silhouettes = camera.until_silhouettes("front", 3)
-        # Not counted in images: DDS may take a second to find a node again that was killed.
+        # DDS may take a second to find the restarted node, so images are not counted.
         said = camera.process.text()
         assert "background read from" in said and "learned from" not in said, said
         assert min(camera.iou(message) for message in silhouettes) > before - 0.02

@@ -1,4 +1,4 @@
-"""The benchmark of the nodes runs, each in its own process and all in one; no time is asserted."""
+"""The benchmark of the nodes runs with separate processes and with one process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks import nodes as benchmark_nodes
 def test_the_nodes_are_measured(monkeypatch: pytest.MonkeyPatch, ros_domain: int) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "")
-    # The nodes of the tree, whose kernels the tests compile, not of the installed copy.
+    # The nodes run from the source tree, whose kernels the tests have compiled.
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
     monkeypatch.setattr(benchmark_nodes, "_START_S", 120.0)
     monkeypatch.setattr(benchmark_nodes, "RATES_HZ", (15,))

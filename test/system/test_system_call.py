@@ -1,4 +1,4 @@
-"""``cardbox call`` is to the nodes what ``ros2 service call`` is."""
+"""``cardbox call`` calls services like ``ros2 service call``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
 def called(graph: Any, service: str) -> subprocess.CompletedProcess[str]:
-    """Run ``cardbox call`` while the graph's node serves; return what it printed."""
+    """Run ``cardbox call`` while the graph's node spins, and return its output."""
     process = subprocess.Popen(
         [sys.executable, "-m", "cardbox_tracker.commands.main", "call", service],
         stdout=subprocess.PIPE,
@@ -35,7 +35,7 @@ def called(graph: Any, service: str) -> subprocess.CompletedProcess[str]:
 
 
 def offer(graph: Any, place: str, success: bool, text: str) -> None:
-    """Offer the service ``place``/do, which says a line on ``place``/status before its answer."""
+    """Offer the service ``place``/do, which publishes a line on ``place``/status first."""
     status = graph.node.create_publisher(String, f"{place}/status", qos.LATCHED)
     status.publish(String(data="of an earlier call"))
 
@@ -67,7 +67,7 @@ def test_a_refusal_is_told_in_the_nodes_own_words(graph: Any) -> None:
 def test_what_is_no_name_of_a_service_is_told(graph: Any, name: str) -> None:
     result = called(graph, name)
     assert result.returncode == 1
-    assert f"{name!r} is no name of a service" in result.stderr
+    assert f"{name!r} is not a valid name" in result.stderr
     assert "Traceback" not in result.stderr
 
 
@@ -76,7 +76,7 @@ def test_a_service_that_is_not_there_is_answered_with_those_that_are(graph: Any)
     offer(graph, "/eye/other", True, "")
     result = called(graph, "/eye/missing/do")
     assert result.returncode == 1
-    assert "for somebody to offer /eye/missing/do" in result.stdout
+    assert "for the service /eye/missing/do" in result.stdout
     assert "nobody offers the service /eye/missing/do" in result.stderr
     assert "/eye/other/do" in result.stderr
     assert result.stderr.count("missing") == 1

@@ -1,4 +1,4 @@
-"""``camera`` plays a video file as a camera would, and says what is wrong with its sources."""
+"""The node ``camera`` plays a video file like a camera, and reports faulty sources."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def test_video_and_calibration_come_out_at_the_rate(
     assert (images[0].width, images[0].height, images[0].encoding) == (64, 48, "mono8")
     assert images[0].header.frame_id == infos[0].header.frame_id == "eye"
     assert (infos[0].k[0], infos[0].d[0]) == (60.0, 0.1)
-    # Whichever topic was found first has images that the other lacks.
+    # The topic that DDS matched first has more messages.
     stamps = [[stamp_ns(m.header.stamp) for m in messages] for messages in (images, infos)]
     first, last = max(s[0] for s in stamps), min(s[-1] for s in stamps)
     shared = [[at for at in each if first <= at <= last] for each in stamps]
     assert shared[0] == shared[1] and len(shared[0]) > 1
-    # Never faster than asked for, however slow the machine.
+    # Even a slow machine must not exceed the requested rate.
     span_s = (stamps[0][24] - stamps[0][0]) / 1e9
     assert span_s > 0.8 * 24 * 0.05
     assert process.stop() == 0

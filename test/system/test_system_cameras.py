@@ -1,6 +1,6 @@
-"""Two cameras at once, each in a namespace of its own: nothing of one gets into the other.
+"""Two independent cameras in separate namespaces do not influence each other.
 
-The nodes of the left camera are a process each, those of the right one share one process.
+Each node of the left camera has its own process; those of the right camera share one process.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LATERAL_M = {"left": -0.35, "right": 0.3}
 
 
 class Eye:
-    """One camera and what comes out of its nodes."""
+    """One camera and the outputs of its nodes."""
 
     def __init__(self, graph: Any, scene: Any, name: str) -> None:
         self.graph, self.scene, self.name = graph, scene, name
@@ -46,7 +46,7 @@ class Eye:
 
     def start(self, *, single_process: bool) -> None:
         space = ("--ros-args", "-r", f"__ns:=/{self.name}")
-        # In one process silhouettes are handed over; only the test subscribes to them.
+        # In one process silhouettes bypass DDS, so only the test subscribes to them.
         self.takers = 1 if single_process else 3
         if single_process:
             given = {

@@ -21,14 +21,14 @@ from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 
 class Person:
-    """Somebody who reads the status and does what it says."""
+    """A simulated person who follows the instructions of the status."""
 
     def __init__(self, graph: Any, scene: Any) -> None:
         self.graph, self.scene = graph, scene
         self.posture: str | None = None
         self.obeys = True
         self.mistakes: dict[str, str] = {}
-        # Every line, also where this process is slow to read them.
+        # The queue holds every line even if this process reads slowly.
         lines = qos.copy_of(qos.LATCHED)
         lines.depth = 1000
         self.statuses = graph.collect(String, "initializer/status", lines)
@@ -116,7 +116,7 @@ def test_one_call_guides_captures_and_measures(person: Person) -> None:
     assert any(line.startswith("measuring") for line in lines)
     assert overlays, "nothing was drawn for the person"
     guides = [np.array(o.data).reshape(o.height, o.width, 3) for o in overlays if o.width == 640]
-    # The outline to stand in is green once the person stands in it.
+    # The target outline is green when the person stands in it.
     assert any((guide == FIT_BGR["fits"]).all(axis=2).sum() > 500 for guide in guides)
     spoken = [message.data for message in person.said]
     for words in ("Now turn left, arms as before", "Hold still", "Good."):

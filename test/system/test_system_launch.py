@@ -1,4 +1,4 @@
-"""The launch files, started as a user does: from a bag and from a video to joint states.
+"""The launch files lead from a bag and from a video to joint states.
 
 They need a workspace: the package built with colcon and sourced, and ros2launch.
 """
@@ -51,7 +51,7 @@ def _workspace() -> None:
 
 @pytest.fixture(scope="module")
 def recorded(scene: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """An empty room, then the person in front of it: a bag, a video, and the body model."""
+    """Write a bag and a video of an empty room and then a person, and the body model."""
     folder = tmp_path_factory.mktemp("recorded")
     size = (scene.camera.width, scene.camera.height)
     video = cv2.VideoWriter(str(folder / "video.avi"), cv2.VideoWriter.fourcc(*"MJPG"), FPS, size)

@@ -92,7 +92,7 @@ def session(graph: Any, scene: Any) -> Iterator[Session]:
 
 @pytest.fixture(scope="module")
 def learned(session: Session) -> Session:
-    """The background is learned."""
+    """Return the session after the background is learned."""
     graph = session.graph
     for _ in range(LEARN_IMAGES - 1):
         header = session.header()
@@ -112,7 +112,7 @@ def learned(session: Session) -> Session:
 
 @pytest.fixture(scope="module")
 def measured(learned: Session) -> tuple[Session, str, str]:
-    """The body is measured; with the answer of the service and the text on body_model."""
+    """Return the session after the measurement, the service's answer and the body model's text."""
     models = learned.graph.collect(String, "body_model", qos.LATCHED)
     for name in ("front", "side", "arms"):
         learned.show(name, 5)
@@ -241,7 +241,7 @@ def test_body_model_message_is_the_saved_file(measured: tuple[Session, str, str]
     assert session.model_file.read_text() == text
     body = loads_body_model(text)
     assert body.placement.distance_m == pytest.approx(2.3)
-    # The images behind the silhouettes were there, and the camera is grey.
+    # The images of the silhouettes were received, and the camera is grey.
     assert body.appearance is not None
     assert body.appearance.is_grey
     assert body.size("upper_arm_length") == pytest.approx(
@@ -293,7 +293,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     graph.spin(0.5)
 
     def shown() -> Any:
-        # Subscribers are found one by one, and an overlay may be lost: it is best effort.
+        # DDS matches topics one by one, and best effort may lose an overlay.
         state = session.track("front", 1)[-1]
         graph.spin(0.2)
         latest = [m[-1].header.stamp for m in (keypoints, overlays, deviations) if m]
@@ -408,7 +408,7 @@ def test_wrong_parameter_is_refused_and_a_right_one_is_live(
 
 
 def publish_as_it_is(session: Session, image: np.ndarray) -> None:
-    """Publish an image of the camera a few times."""
+    """Publish the same image a few times."""
     for _ in range(3):
         header = session.header()
         session.infos.publish(camera_info_message(header, session.scene.camera))
@@ -417,7 +417,7 @@ def publish_as_it_is(session: Session, image: np.ndarray) -> None:
 
 
 def test_a_brighter_scene_is_followed(learned: Session) -> None:
-    """As automatic exposure does it: everything becomes brighter at once."""
+    """Automatic exposure makes the whole image brighter at once."""
     graph = learned.graph
     brighter = np.clip(learned.scene.image(None).astype(int) + 40, 0, 255).astype(np.uint8)
     publish_as_it_is(learned, brighter)

@@ -1,4 +1,4 @@
-"""``play_bag`` plays what was recorded, with its stamps, and stands still where it is told."""
+"""``play_bag`` plays a recording with its stamps, and pauses at the requested times."""
 
 from __future__ import annotations
 

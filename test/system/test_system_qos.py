@@ -1,4 +1,4 @@
-"""Publishers and subscribers that cannot talk are told so, in the log and in the diagnostics."""
+"""Incompatible publishers and subscribers are reported in the log and the diagnostics."""
 
 from __future__ import annotations
 

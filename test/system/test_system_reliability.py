@@ -1,7 +1,7 @@
-"""Running nodes under faults, contradicting requests and load, in processes of their own.
+"""Nodes in separate processes under faults, contradicting requests and load.
 
-``make reliability`` runs all of it for long: RELIABILITY_EXAMPLES scales the lengths, and 100,000
-are 100,000 images through the core, ten minutes of nodes at 60 Hz and a minute of requests.
+``make reliability`` runs longer tests. RELIABILITY_EXAMPLES scales their lengths; 100,000 stands
+for 100,000 images through the core, ten minutes of nodes at 60 Hz and a minute of requests.
 """
 
 from __future__ import annotations
@@ -58,12 +58,12 @@ SHARE = EXAMPLES / 100_000
 LEARN_IMAGES = 10
 LAYOUTS = ("separate", "together")
 SERVICES = ("background", "initializer", "tracker")
-# A multiple of the motion's period, so that each run begins alike.
+# The length is a multiple of the motion's period, so that all runs begin alike.
 APART_S = 96.0
 
 
 class Live:
-    """The nodes of one camera as processes, and a camera of ours that shows them a person."""
+    """The nodes of one camera as processes, and a simulated camera."""
 
     def __init__(self, graph: Any, layout: str) -> None:
         self.graph, self.person, self.layout = graph, Person(), layout
@@ -134,7 +134,7 @@ class Live:
         images.publish(image_message(header, self.person.image(sent), "mono8"))
 
     def send_all(self, images: list[Sent]) -> None:
-        """Send each at its time."""
+        """Send each image at its time."""
         due_s = time.monotonic()
         for sent in images:
             due_s = max(due_s + sent.wait_s, time.monotonic() - 0.2)
@@ -151,17 +151,17 @@ class Live:
         return made
 
     def next_run(self) -> float:
-        """Return when the next run begins."""
+        """Return the start time of the next run."""
         self.now_s = APART_S * (1 + self.now_s // APART_S)
         return self.now_s
 
     def forget(self) -> None:
-        """Forget what was found so far, also what is still on its way."""
+        """Drop all results so far, including those in transit."""
         self.graph.spin(0.5)
         self.joint_states.clear()
 
     def undisturbed(self) -> None:
-        """Check that the person is tracked as ever."""
+        """Check that the person is tracked normally."""
         self.forget()
         sent = run_of(lambda images, _: images, from_s=self.next_run())
         for part in sent:
@@ -202,7 +202,7 @@ def judged(live: Live, name: str, fault: Callable[..., list[Sent]], during: Any 
     if during is not None:
         meanwhile = during(meanwhile)
         if meanwhile:
-            # The good images follow the last one, whenever it was.
+            # The images without fault follow the last faulty one.
             begin_s = meanwhile[-1].at_s + 1 / 15
             after = even(begin_s, begin_s + 2.0)
     else:
@@ -351,7 +351,7 @@ def test_all_at_once(live: Live) -> None:
     live.graph.wait(lambda: all(answer.done() for answer in answers), "all answers")
     assert len(answers) > 20
     live.check_logs()
-    # As it was before.
+    # The original settings are restored.
     models.publish(String(data=bodies[1]))
     settings = {
         "tracker": {"particles": 0, "preset": "default", "lost_iou": 0.4},
@@ -393,7 +393,7 @@ def test_nodes_for_long(live: Live, request: pytest.FixtureRequest) -> None:
     live.now_s = from_s + seconds
     pairs = [(s, live.arrived_s[i] - s) for i, s in sent_s.items() if i in live.arrived_s]
     times_s, took_s = np.array(pairs).T
-    # What is quick tells of the nodes, what is slow of other programs on the machine.
+    # Slow results may be due to other programs, so the quick ones are compared.
     first = np.percentile(took_s[times_s < start_s + 0.25 * seconds], 10)
     last = np.percentile(took_s[times_s > start_s + 0.75 * seconds], 10)
     print(f"{live.layout}: {number} images, {len(pairs)} answers, latency x {last / first:.2f}")
@@ -422,7 +422,7 @@ def test_the_core_for_long(request: pytest.FixtureRequest) -> None:
         start_s = time.perf_counter()
         estimate = tracker.track(silhouettes[number % len(silhouettes)])
         took_s[number] = time.perf_counter() - start_s
-        # What slows this down, such as tests beside it, is no fault of the tracker.
+        # Other programs can slow this test down, so the quick images are compared.
         start_s = time.perf_counter()
         np.sort(work)
         other_s[number] = time.perf_counter() - start_s

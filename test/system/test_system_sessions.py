@@ -1,4 +1,4 @@
-"""Whole sessions, synthetic and recorded: a bag through the live nodes, against ground truth."""
+"""Synthetic and recorded sessions, played to live nodes and compared with the ground truth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MEAN_ERROR_M = 0.15
 
 
 def deep(topic: str, end: str) -> tuple[str, ...]:
-    """Return arguments that let ``topic`` queue up, so that no slow machine loses an image."""
+    """Return arguments for a deep queue of ``topic``, so that a slow machine loses no image."""
     name = f"qos_overrides.{topic}.{end}"
     return ("-p", f"{name}.reliability:=reliable", "-p", f"{name}.depth:={qos.REPLAY.depth}")
 

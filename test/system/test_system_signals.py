@@ -18,26 +18,27 @@ from cardbox_tracker.start import NODES
 
 _LIMIT_S = 60.0
 PROGRAMS = tuple(NODES) if "RELIABILITY_EXAMPLES" in os.environ else ("tracker",)
-# Libraries in the order in which a node loads them, the last one by rclpy.init(); "" is none.
+# A node loads the libraries in this order, the last one in rclpy.init(); "" stands for none.
 STAGES = ("", "numpy", "_rclpy_pybind11", "librmw_fastrtps")
 
 
 def takes_signals(pid: int) -> bool:
-    """Whether a process has a handler for SIGTERM, which Python itself has not."""
+    """Return whether a process has a handler for SIGTERM; Python itself has none."""
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     caught = next(line for line in lines if line.startswith("SigCgt"))
     return bool(int(caught.split()[1], 16) & (1 << (signal.SIGTERM - 1)))
 
 
 def has_loaded(pid: int, library: str) -> bool:
-    """Whether a process has mapped a file with this name."""
+    """Return whether a process has mapped a file with this name."""
     return library in Path(f"/proc/{pid}/maps").read_text()
 
 
 def end_early(name: str, arguments: list[str], number: int, stage: str) -> tuple[int, str]:
-    """Start a program, send it a signal once it has loaded a library.
+    """Start a program and send it a signal when it has loaded a library.
 
-    Returns its exit code and what it said.
+    Returns:
+        Its exit code and its output.
     """
     process = subprocess.Popen(
         [sys.executable, "-m", "cardbox_tracker.start", name, *arguments],
@@ -63,8 +64,8 @@ def end_early(name: str, arguments: list[str], number: int, stage: str) -> tuple
 def test_a_node_that_is_starting_ends(name: str, number: int, stage: str) -> None:
     code, said = end_early(name, [], number, stage)
     assert "Traceback" not in said and "Exception" not in said, said
-    # Without a device, a bag or a robot three of them end themselves, and say why; once they are at
-    # their end, a signal ends them as any process.
+    # Three nodes end with an error without a device, a bag or a robot; a signal during their end
+    # may then stop them like any process.
     assert code == 0 or (name in ("camera", "play_bag", "retarget") and code in (1, -number))
 
 
@@ -75,7 +76,7 @@ def test_a_command_that_is_starting_ends(number: int, stage: str, tmp_path: Path
     arguments = ["synthesize", "--motion", "wave", "--output", str(tmp_path / "bag")]
     code, said = end_early("cardbox", arguments, number, stage)
     assert "Traceback" not in said and "Exception" not in said, said
-    # Before the command has begun, SIGTERM ends it as any process.
+    # Before the command has begun, SIGTERM ends it like any process.
     assert code in ((130,) if number == signal.SIGINT else (143, -15))
     assert not (tmp_path / "bag").exists()
 

@@ -31,18 +31,18 @@ from cardbox_tracker.ros.messages.conversions import stamp_ns  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 EMPTY, SEEN = 12, 60
-# Images of the person that the second camera does not have.
+# The second camera lacks these images of the person.
 SILENT = range(25, 45)
 PERIOD_NS, SKEW_NS, START_NS = 66_666_667, 8_000_000, 1_700_000_000_000_000_000
 NEARER_M = 0.2
 SESSION = Path(__file__).resolve().parents[3] / "shared" / "data" / "two_webcams"
 OF_CAMERA = ("image_raw/compressed", "camera_info")
-# Images that the search may need at the start.
+# The search may need this number of images at the start.
 SETTLED = 5
 
 
 def aside() -> tuple[np.ndarray, Camera]:
-    """A camera 60 degrees round to the person's left: its pose, (4, 4), and itself."""
+    """Return a camera 60 degrees to the person's left, and its pose (4, 4)."""
     angle = math.radians(60)
     c, s = math.cos(angle), math.sin(angle)
     pose = np.eye(4)
@@ -53,7 +53,7 @@ def aside() -> tuple[np.ndarray, Camera]:
 
 @pytest.fixture(scope="module")
 def recorded(scene: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Nobody, then the person 20 cm nearer than they were measured; extrinsics and body model."""
+    """Record an empty scene and then a person 20 cm nearer than measured; return the files."""
     folder = tmp_path_factory.mktemp("two")
     pose, other = aside()
     view = View.of(scene.body, scene.camera, OtherCamera(other, Extrinsics.of(pose)))
@@ -104,17 +104,17 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
         extrinsics_file=recorded["chain.yaml"],
         model_file=recorded["body.yaml"],
     )
-    # Again and again: a busy machine may miss a part; stamps that start over are followed.
+    # The player loops, because a busy machine may miss a part of the recording.
     graph.start("play_bag", str(recorded["bag"]), loop=True)
     nearer_m: dict[str, list[float]] = {"both": [], "one": [], "both again": []}
 
     def sorted_by_phase() -> dict[str, list[float]]:
-        # Of this turn of the loop, whose stamps come again in the next.
+        # The stamps of one turn of the loop recur in the next one.
         of_first = {stamp_ns(silhouette.header.stamp) for silhouette in seen_first[-SILENT.start :]}
         for message in states:
             assert message.header.frame_id == "cam0_optical"
-            # Of the first camera's images, also where the second one has its own 8 ms later. The
-            # first one may begin later, or lose an image; the stamp is the second one's then.
+            # The stamps are those of the first camera, or, without its image, those of the
+            # second camera, which are 8 ms later.
             at_ns = stamp_ns(message.header.stamp)
             number, rest_ns = divmod(at_ns - START_NS, PERIOD_NS)
             assert rest_ns == 0 or at_ns - rest_ns not in of_first
@@ -129,7 +129,7 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
         lambda: all(len(found) >= 10 for found in sorted_by_phase().values()),
         "joint states while both cameras see, one is silent, and both see again",
     )
-    # The outline of one camera does not show how near somebody is: 2 cm instead of 20.
+    # The silhouette of one camera would not show that the person is 20 cm nearer.
     assert np.median(nearer_m["both"]) == pytest.approx(NEARER_M, abs=0.08)
 
     def fits() -> bool:
@@ -150,7 +150,7 @@ def test_both_cameras_are_used_and_one_goes_on_while_the_other_is_silent(
 
 @pytest.mark.slow
 def test_a_recorded_person_is_measured_and_tracked_with_two_cameras(own_graph: Any) -> None:
-    """The distance is found, and the first ten seconds of motion are followed."""
+    """Check the measured distance and the first ten seconds of motion."""
     if not SESSION.is_dir():
         pytest.skip("no recorded session two_webcams in ../shared/data")
     graph = own_graph
@@ -183,7 +183,7 @@ def test_a_recorded_person_is_measured_and_tracked_with_two_cameras(own_graph: A
         assert graph.call("play_bag/resume").success
     graph.wait(lambda: statuses[-1].data == "finished", "the end")
     graph.wait(lambda: models, "the body model")
-    # Nobody said how far away the person is; the default would be 2.00 m.
+    # The distance was not given, and the default would be 2.00 m.
     distance_m = loads_body_model(models[-1].data).placement.distance_m
     assert distance_m == pytest.approx(session.truth.distance_m, abs=0.08)
     true_m = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
@@ -194,5 +194,5 @@ def test_a_recorded_person_is_measured_and_tracked_with_two_cameras(own_graph: A
         for i, p in enumerate(message.poses)
     ]
     print(f"{len(errors_m) // 6} images, mean error {np.mean(errors_m):.3f} m")
-    # Either camera alone is 8 and 11 cm off.
+    # The error with either camera alone is larger.
     assert np.mean(errors_m) < 0.06

@@ -21,7 +21,7 @@ from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import ResultBag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.simulation.motions import wave
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel.of(hip_height_m=-0.51)
@@ -79,7 +79,7 @@ def test_every_image_is_in_the_file(results: Path, tmp_path: Path) -> None:
 
 def test_errors_are_shown_where_there_is_a_truth(results: Path, tmp_path: Path) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
-    synthesize_session(tmp_path / "other", "bow", fps=2.0, width=64, height=48)
+    synthesize_session(tmp_path / "other", "bow", form=SessionFormat(2.0, 64, 48))
     truth = tmp_path / "other" / "ground_truth.json"
     assert view(results, "--truth", truth, "--save", tmp_path / "v.rrd") == 0
     # None of its frames has the stamp of an image.
@@ -142,7 +142,7 @@ def test_images_alone_are_tracked_or_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
-    synthesize_session(tmp_path / "session", "bow", fps=4.0, width=160, height=120)
+    synthesize_session(tmp_path / "session", "bow", form=SessionFormat(4.0, 160, 120))
     save_body_model(BODY, tmp_path / "person.yaml")
     out = tmp_path / "v.rrd"
     assert view(tmp_path / "session", "--start", "22", "--save", out) == 1

@@ -31,7 +31,7 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
     Args:
         keypoints_m: (..., 6, 3), ordered as ``KEYPOINT_NAMES``, metres in the optical frame.
         torso_rad: roll, pitch and yaw of the torso, (..., 3).
-        pitch_rad: how far the camera looks down.
+        pitch_rad: downward pitch of the camera.
 
     Returns:
         Shape (..., 11), rad, ordered as ``JOINT_NAMES[1:]``.
@@ -56,7 +56,7 @@ def joint_angles(keypoints_m: FloatArray, torso_rad: FloatArray, pitch_rad: floa
 def true_postures(session: RecordedSession) -> FloatArray:
     """Return the true postures (n, 12) of a session; ``torso_y`` is 0.
 
-    Unknown angles of the torso are taken for 0, which makes the angles of the arms wrong.
+    Unknown angles of the torso are replaced by 0, which makes the angles of the arms wrong.
     """
     postures = np.zeros((len(session.stamps_ns), 12))
     pitch_rad = float(np.radians(session.truth.pitch_deg))
@@ -66,7 +66,7 @@ def true_postures(session: RecordedSession) -> FloatArray:
 
 
 def comparable(session: RecordedSession, found: Container[int]) -> NDArray[np.bool_]:
-    """Return which images (n,) have a true torso and are among the stamps ``found``, ns.
+    """Return a mask (n,) of the images with a true torso and a stamp in ``found``, ns.
 
     Raises:
         ValueError: there is no such image.

@@ -15,7 +15,12 @@ from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
-from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH, recovery_of, track_session
+from cardbox_tracker.evaluation.recorded.tracking import (
+    WITH_DEPTH,
+    InputSelection,
+    recovery_of,
+    track_session,
+)
 from cardbox_tracker.evaluation.results import provenance, write_json
 from cardbox_tracker.files import atomic_path
 
@@ -35,16 +40,16 @@ def evaluate_sessions(
         folders: sessions, each with ``bag/`` and ``ground_truth.json``.
         output: folder of the results; made if it is missing.
         preset: a name of ``PRESETS``.
-        seeds: of initialization and filters; each is a run of its own.
-        jobs: processes.
-        recovery: also measure how soon it is right again after disturbances.
-        progress: told the finished fraction.
+        seeds: random seeds of initialization and filters, one run for each.
+        jobs: number of processes.
+        recovery: also count the recoveries from disturbances.
+        progress: called with the finished fraction.
 
     Returns:
         The contents of ``sessions.json``.
 
     Raises:
-        CardboxError: a folder is no session, or the results cannot be written.
+        CardboxError: a folder is not a session, or the results cannot be written.
     """
     for folder in folders:
         load_session(folder)  # report errors before the work begins
@@ -85,7 +90,7 @@ def _named(only: str | None) -> str:
 
 
 def _each_way(folder: Path) -> list[str | None]:
-    """Return how a session is tracked: all its cameras, each of several alone, with depth."""
+    """Return the cameras that track in each run: None for all, a name, or ``WITH_DEPTH``."""
     truth = load_session(folder).truth
     alone = truth.cameras if len(truth.cameras) > 1 else ()
     has_depth = truth.is_rectified or truth.depth_topic is not None
@@ -99,15 +104,16 @@ def evaluate_session(
     recovery: bool = False,
     only: str | None = None,
 ) -> dict[str, Any]:
-    """Return the figures of one session: of each run, and MediaPipe's beside them.
+    """Return the figures of one session: those of each run, and MediaPipe's.
 
-    All cameras of the session track, or the one that ``only`` names, without MediaPipe's figures.
-    With ``recovery`` the first seed's run also counts the recoveries from disturbances.
+    All cameras of the session track. If ``only`` names one camera, it tracks alone, and MediaPipe's
+    figures are omitted. With ``recovery``, the first seed's run also counts the recoveries from
+    disturbances.
     """
     session = load_session(folder)
     config = PRESETS[preset]()
     try:
-        runs = track_session(session, config, seeds, only)
+        runs = track_session(session, config, seeds, InputSelection(only))
         found = [figures(session, run) for run in runs]
         if runs[0].body is not None and recovery and only is None:
             found[0]["recovery"] = {

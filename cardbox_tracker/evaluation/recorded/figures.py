@@ -35,14 +35,14 @@ KINDS = ("shoulder", "elbow", "hand")
 """Keypoints i and i + 3 are of the same kind."""
 
 FAR_CM = 30.0
-"""A mean error beyond this is no tracking, whatever the state says."""
+"""A mean error beyond this counts as a failure of tracking in any state."""
 
 COVERAGE_STDDEVS = 2.0
 _LEAST_STDDEV_DEG = 0.5
 
 
 def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
-    """Return all figures of one run; without any estimate those that need one are missing."""
+    """Return all figures of one run; without an estimate, those that need one are missing."""
     have = np.asarray(np.isfinite(run.keypoints_m).all(axis=(1, 2)))
     is_tracking = run.states == TRACKING
     result: dict[str, Any] = {
@@ -93,10 +93,9 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
 
 
 def coverage(session: RecordedSession, run: SessionRun) -> dict[str, float]:
-    """Fraction of images in which a joint's true angle lies within two standard deviations.
+    """Return for each angle the fraction of images within two standard deviations of the truth.
 
-    Given for each angle of the posture, only where the state is ``tracking`` or ``uncertain`` and
-    the truth has the torso's angles.
+    Only images count whose state is ``tracking`` or ``uncertain`` and whose true torso is known.
     """
     have = ~np.isnan(run.stddevs).any(axis=1) & ~np.isnan(session.torso_rad).any(axis=1)
     if not have.any():
@@ -113,12 +112,12 @@ def coverage(session: RecordedSession, run: SessionRun) -> dict[str, float]:
 
 
 def lengths(session: RecordedSession, run: SessionRun) -> dict[str, float]:
-    """Return the measured lengths beside those of the truth's own joints.
+    """Compare the measured lengths with those between the true joints.
 
     Returns:
         ``upper_arm``, ``forearm`` and ``shoulders`` as ratios to the true ones, and
-        ``joint_height``: how much higher the shoulder joints are than the true ones while the arms
-        hang in the reference ``front``, cm; nan where the truth has no such image.
+        ``joint_height``, the height of the shoulder joints above the true ones in the reference
+        ``front``, cm; nan if the truth has no such image.
     """
     assert run.body is not None
     truth = session.keypoints_m
@@ -137,7 +136,7 @@ def lengths(session: RecordedSession, run: SessionRun) -> dict[str, float]:
 
 
 def _joint_height_m(body: BodyModel) -> float:
-    """Height of an upright person's shoulder joints above the camera's centre."""
+    """Return the height of an upright person's shoulder joints above the camera's centre."""
     return body.placement.hip_height_m + body_parts(body.sizes).shoulder_height_m
 
 

@@ -1,7 +1,7 @@
-"""How soon the tracker is right again after a disturbance.
+"""Recovery of the tracker after disturbances.
 
-A recording is tracked once as it is and once for each kind of disturbance, which then happens every
-few seconds:
+A recording is tracked once without disturbance and once for each kind of disturbance, which is
+repeated every few seconds:
 
 - ``absent``: nobody is in the silhouette for a second;
 - ``gap``: no image comes for half a second;
@@ -34,7 +34,7 @@ KINDS: dict[str, float] = {"absent": 1.0, "gap": 0.5, "arm hidden": 1.0}
 """Disturbances and how long each lasts, seconds."""
 
 PERIOD_S = 5.0
-"""From the beginning of one disturbance to that of the next."""
+"""Period of the disturbances."""
 
 _FIRST_S = 2.0
 _JUDGED_S = (0.5, 1.0)
@@ -44,7 +44,7 @@ _FOREARM_RADIUS_M = 0.09
 
 @dataclass(frozen=True)
 class Recovery:
-    """How many of the trials of one kind recovered."""
+    """Number of trials of one kind, and of those that recovered."""
 
     recovered: int
     trials: int
@@ -61,12 +61,12 @@ def measure_recovery(
     """Return the recoveries on one session, by kind of disturbance.
 
     Args:
-        session: the truth.
+        session: session with the ground truth.
         frames: all frames from the first neutral posture on.
         body: the measured person.
-        camera: working camera.
+        camera: camera at the working resolution.
         config: settings of the tracker.
-        seed: of all runs.
+        seed: random seed of all runs.
     """
     truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
     pitched = camera.with_pitch(body.camera_pose.pitch_rad)
@@ -110,7 +110,7 @@ def _beginnings(frames: list[RecordedFrame]) -> list[float]:
 def _disturbed(
     frames: list[RecordedFrame], kind: str | None, truth: dict[int, FloatArray], camera: Camera
 ) -> Iterator[tuple[RecordedFrame, Silhouette]]:
-    """Yield the frames that come, with what is seen of the person in each."""
+    """Yield the frames of the disturbed recording, each with its silhouette."""
     beginnings = _beginnings(frames) if kind is not None else []
     for frame in frames:
         trial = next(
@@ -136,7 +136,7 @@ def _without_forearm(
     if frame.stamp_ns not in truth:
         return frame.silhouette
     points = truth[frame.stamp_ns][3 * arm + 1 : 3 * arm + 3]
-    # A little beyond the hand, for the fingers.
+    # The fingers reach beyond the keypoint of the hand.
     ends = np.stack([points[0], points[1] + 0.3 * (points[1] - points[0])])
     (elbow, tip) = np.round(camera.project(ends)).astype(int).tolist()
     width = max(1, round(2 * _FOREARM_RADIUS_M * camera.fx / float(points[:, 2].mean())))

@@ -12,7 +12,7 @@ Results = Mapping[str, Any]
 """The contents of ``sessions.json``."""
 
 MOTION_CAPTURE = "cmu"
-"""Sessions with this in their name have motion capture as motions."""
+"""Sessions with this in their name have motions from motion capture."""
 
 
 def sessions_report(results: Results) -> str:
@@ -52,7 +52,7 @@ def mean_of(runs: Sequence[Mapping[str, Any]], *path: str) -> float:
 
 
 def _versus(results: Results) -> list[str]:
-    """Errors beside MediaPipe's."""
+    """Return the table of errors, compared with MediaPipe's."""
     columns: dict[str, Callable[[Results], float]] = {
         "absolute": lambda s: mean_of(s["runs"], "absolute"),
         "aligned": lambda s: mean_of(s["runs"], "aligned"),
@@ -68,7 +68,7 @@ def _versus(results: Results) -> list[str]:
         "",
         "Mean 3D distance of shoulders, elbows and hands. *Aligned*: after both skeletons are "
         "shifted to the middle of their shoulders; *PA*: after the best similarity transform. "
-        "MediaPipe Pose (full) has no metric place, so it has no absolute error.",
+        "MediaPipe Pose (full) gives no metric position, so it has no absolute error.",
         "",
         *_table(results, columns, "{:.1f}"),
     ]
@@ -127,10 +127,10 @@ def _steadiness(results: Results) -> list[str]:
     return [
         "## Steadiness, losses, uncertainty, time",
         "",
-        "Coverage: in how many images the true angle of a joint lies within two of its standard "
-        "deviations; mean, least and most over the 11 angles. The acceleration error is that of "
-        "the joints' places, and of their places beside the middle of the shoulders. MediaPipe's "
-        "time was measured in another run.",
+        "Coverage: fraction of images in which the true angle of a joint lies within two standard "
+        "deviations; mean, minimum and maximum over the 11 angles. The acceleration error is given "
+        "for the joints' positions, and for their positions relative to the middle of the "
+        "shoulders. MediaPipe's time was measured in another run.",
         "",
         *_table(results, columns, "{:.1f}"),
     ]
@@ -157,7 +157,7 @@ def _lengths(results: Results) -> list[str]:
 
 
 def _deviations(results: Results, columns: Mapping[str, Callable[[Results], float]]) -> list[str]:
-    """A sentence with the mean and the largest deviation of each length; none without lengths."""
+    """Return a sentence with the mean and the largest deviation of each length, or nothing."""
     table = np.array([[column(s) for column in columns.values()] for s in results["sessions"]])
     measured = table[np.isfinite(table).all(axis=1)]
     if not measured.size:
@@ -172,7 +172,7 @@ def _deviations(results: Results, columns: Mapping[str, Callable[[Results], floa
 
 
 def _recovery(results: Results) -> list[str]:
-    """Recoveries from each kind of disturbance; empty where they were not measured."""
+    """Return the table of recoveries; empty if they were not measured."""
     kinds = dict.fromkeys(
         kind for s in results["sessions"] for run in s["runs"] for kind in run.get("recovery", {})
     )
@@ -181,9 +181,9 @@ def _recovery(results: Results) -> list[str]:
     lines = [
         "## Recovery after disturbances",
         "",
-        "In brackets the trials, with the first seed. Recovered: half a second to one second after "
-        "the disturbance the mean error is at most 4 cm above that of the undisturbed run, or "
-        "below 10 cm.",
+        "The number of trials, with the first seed, is in brackets. A trial counts as recovered if "
+        "the mean error from half a second to one second after the disturbance is at most 4 cm "
+        "above that of the undisturbed run, or below 10 cm.",
         "",
         f"| session | {' | '.join(kinds)} |",
         "|---" * (len(kinds) + 1) + "|",
@@ -234,9 +234,9 @@ def _table(
     columns: Mapping[str, Callable[[Results], float]],
     form: str | tuple[str, ...],
 ) -> list[str]:
-    """Rows are sessions; then the means over all, and over those with motion capture.
+    """Return a table of sessions, with means over all and over those with motion capture.
 
-    ``form`` is that of all columns, or one of each.
+    ``form`` is the format of all columns, or one format for each column.
     """
     forms = (form,) * len(columns) if isinstance(form, str) else form
     sessions = results["sessions"]

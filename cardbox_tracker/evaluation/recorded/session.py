@@ -1,8 +1,8 @@
 """A recorded session with ground truth as arrays, one row for each image.
 
-A session is a folder with ``bag/`` and ``ground_truth.json``, and optionally
-``peer_mediapipe.json``: what MediaPipe Pose does on the same images, and ``extrinsics.yaml``:
-where several cameras stand.
+A session is a folder with ``bag/`` and ``ground_truth.json``. It may also have
+``peer_mediapipe.json`` with MediaPipe Pose's figures on the same images, and ``extrinsics.yaml``
+with the poses of several cameras.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cardbox_tracker.recordings.silhouettes import TimeSpan
 FloatArray = NDArray[np.float64]
 
 MARGIN_S = 0.2
-"""Nobody takes a posture, or leaves the image, exactly when a segment says; so much is left out."""
+"""Margin at both ends of a segment, because people move earlier or later than it says."""
 
 PROTOCOL = ("empty", "enter", "front", "side", "arms", "transition")
 """Segments before the motions; they are not scored."""
@@ -37,16 +37,16 @@ class RecordedSession:
     Attributes:
         name: of its folder.
         bag: its recording.
-        extrinsics: file that says where its cameras stand; None without it.
+        extrinsics: file with the poses of its cameras; None without it.
         truth: its ground truth.
         spans: ``empty`` and the three reference postures, without their margins.
-        start_s: when the motions begin, seconds from the bag's start.
+        start_s: start of the motions, seconds from the bag's start.
         stamps_ns: stamps of the scored images, (n,), int64.
-        segments: what the person does in each, (n,).
+        segments: name of the segment of each image, (n,).
         keypoints_m: true keypoints, (n, 6, 3), metres in the optical frame.
         torso_rad: true roll, pitch, yaw of the torso, (n, 3); nan where unknown.
         mediapipe: MediaPipe's figures over the motions, cm by name; empty without its file.
-        mediapipe_ms: its time for an image, as measured with them; None without its file.
+        mediapipe_ms: MediaPipe's time for an image, ms; None without its file.
     """
 
     name: str
@@ -67,7 +67,7 @@ def load_session(folder: str | os.PathLike[str]) -> RecordedSession:
     """Read the ground truth of a session.
 
     Raises:
-        CardboxError: the folder is no such session; the text names the missing part.
+        CardboxError: the folder is not a session; the text names the missing part.
     """
     path = Path(folder)
     truth = load_ground_truth(path / "ground_truth.json")
@@ -114,8 +114,7 @@ def _mediapipe(path: Path) -> tuple[dict[str, float], float | None]:
         return {n: float(v) for n, v in motions if _is_number(v)}, float(data["ms_median"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise CardboxError(
-            f"{path} is not what peer_mediapipe.json should be: {error!r}; remove it, or make it "
-            "again"
+            f"{path} is not a file of MediaPipe's figures: {error!r}; remove it, or make it again"
         ) from None
 
 

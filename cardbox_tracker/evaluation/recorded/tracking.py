@@ -24,22 +24,43 @@ from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 FloatArray = NDArray[np.float64]
 
 WITH_DEPTH = "depth"
-"""In place of a camera that tracks alone: all of them, and measured depth."""
+"""Given in place of one camera's name: all cameras track, with measured depth."""
 
 Observe = Callable[[int, int, Estimate, Tracker], None]
-"""Is told of every estimate: seed, stamp in ns, estimate and tracker."""
+"""Callback that receives the seed, the stamp in ns, the estimate and the tracker."""
+
+
+@dataclass(frozen=True)
+class InputSelection:
+    """Selection of the inputs that the tracker receives.
+
+    Attributes:
+        only: name of the one camera that tracks; None for all cameras; ``WITH_DEPTH`` for all
+            cameras with the session's depth images, or else the depth of its rectified pair.
+        has_images: False to give the tracker silhouettes without their images.
+        covered: returns the index of the camera that sees nothing, or None, for a time in seconds
+            since tracking began.
+    """
+
+    only: str | None = None
+    has_images: bool = True
+    covered: Callable[[float], int | None] | None = None
+
+
+ALL_INPUTS = InputSelection()
+"""All cameras with their images, without depth."""
 
 
 @dataclass(frozen=True)
 class SessionRun:
-    """What one seed found on one session, a row for each scored image of it.
+    """Results of one seed on one session of n scored images.
 
     Attributes:
-        body: the person as measured; None if the initialization failed.
-        failure: why it failed; empty if it did not.
+        body: the measured person; None if the initialization failed.
+        failure: reason why the initialization failed; empty if it did not.
         states: tracking state of each image, (n,); empty where the image was not tracked.
-        keypoints_m: (n, 6, 3), metres in the optical frame; nan where there is none.
-        postures: (n, 12), rad and metres; nan where there is none.
+        keypoints_m: (n, 6, 3), metres in the optical frame; nan without an estimate.
+        postures: (n, 12), rad and metres; nan without an estimate.
         stddevs: standard deviations, (n, 12).
         milliseconds: processor time of each tracked image from silhouette to posture, (m,).
     """
@@ -57,25 +78,24 @@ def track_session(
     session: RecordedSession,
     config: TrackerConfig,
     seeds: tuple[int, ...],
-    only: str | None = None,
+    inputs: InputSelection = ALL_INPUTS,
     observe: Observe | None = None,
-    has_images: bool = True,
     body: BodyModel | None = None,
-    covered: Callable[[float], int | None] | None = None,
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
 
-    Of several cameras the first one measures the person; all of them track, or the one that
-    ``only`` names, or with ``WITH_DEPTH`` all of them with the session's depth images, or else the
-    depth of its rectified pair.
-    Not ``has_images``: the tracker sees silhouettes alone. A ``body`` is tracked as it is, and not
-    measured. ``covered`` tells which of several cameras sees nothing, by its number, given the
-    seconds since tracking began; None: none of them.
+    Args:
+        session: the session.
+        config: settings of the tracker.
+        seeds: random seeds of initialization and tracker, one run for each.
+        inputs: selection of the inputs that the tracker receives.
+        observe: called with every estimate.
+        body: the person to track; if None, the first camera measures the person.
 
     Raises:
-        CardboxError: the recording cannot be read, or has no camera ``only``.
+        CardboxError: the recording cannot be read, or lacks the selected camera.
     """
-    depth = None
+    depth, only = None, inputs.only
     if only == WITH_DEPTH:
         depth, only = session.truth.depth_topic or STEREO, None
         config = config.with_depth()
@@ -102,12 +122,13 @@ def track_session(
         for taken in source.frames(session.start_s + offset_s):
             stamp_ns = taken.stamp_ns
             started_ns = stamp_ns if started_ns is None else started_ns
-            dark = covered((stamp_ns - started_ns) / 1e9) if covered else None
+            elapsed_s = (stamp_ns - started_ns) / 1e9
+            dark = inputs.covered(elapsed_s) if inputs.covered else None
             seen = [
                 replace(
                     one,
                     silhouette=one.silhouette if only in (None, name) and number != dark else None,
-                    image=one.image if has_images else None,
+                    image=one.image if inputs.has_images else None,
                 )
                 for number, (name, one) in enumerate(
                     zip(source.names, taken.observations, strict=True)
@@ -130,7 +151,7 @@ def track_session(
 def recovery_of(
     session: RecordedSession, body: BodyModel, config: TrackerConfig, seed: int
 ) -> dict[str, Recovery]:
-    """Return how often the tracker recovers from disturbances on one session, by their kind.
+    """Return the recoveries of the tracker on one session, by kind of disturbance.
 
     Raises:
         CardboxError: the recording cannot be read.
@@ -144,10 +165,10 @@ def recovery_of(
 
 
 def measured_body(session: RecordedSession, source: SilhouetteSource, seed: int) -> BodyModel:
-    """Return the person of a session as one camera measures them.
+    """Return the person of a session, measured by one camera.
 
     Raises:
-        CardboxError: the reference postures do not show them.
+        CardboxError: the person cannot be measured in the reference postures.
     """
     body, failure = _measure(session, source, seed)
     if body is None:
@@ -158,7 +179,7 @@ def measured_body(session: RecordedSession, source: SilhouetteSource, seed: int)
 def _measure(
     session: RecordedSession, source: SilhouetteSource, seed: int
 ) -> tuple[BodyModel | None, str]:
-    """Return the measured person, or None and why not."""
+    """Return the measured person, or None and the reason of the failure."""
     truth = session.truth
     config = InitializationConfig(
         distance_m=truth.distance_m,

@@ -27,7 +27,7 @@ from cardbox_tracker.vision.encodings import (
 
 ImageArray = NDArray[np.uint8]
 
-# As much as the parameters of the background node allow.
+# The parameters of the background node have the same limit.
 _MOST_WORKING_PIXELS = 4096 * 4096
 
 
@@ -49,18 +49,18 @@ def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS)
 
 
 def most_pixels_of(calibration: Calibration, most_megapixels: float) -> float:
-    """Return how many pixels an image of that camera may have.
+    """Return the largest number of pixels to decode for a camera.
 
-    A camera may deliver more than it was calibrated at, but not sixteen times as much.
+    It is sixteen times the size of the calibration at most.
     """
     return min(1e6 * most_megapixels, 16.0 * calibration.width * calibration.height)
 
 
 def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | None:
-    """Return the image (H, W, 3) or (H, W) that a silhouette (H, W) was cut out of; None for None.
+    """Return the image (H, W, 3) or (H, W) of a silhouette (H, W); None without a message.
 
     Raises:
-        CameraError: it has another size.
+        CameraError: image and silhouette differ in size.
         EncodingError: the encoding is not supported or the bytes do not match it.
     """
     if message is None:
@@ -77,10 +77,10 @@ def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | 
 
 
 def silhouette_of(message: Image) -> ImageArray:
-    """Return the silhouette (H, W), 0 or 255, a view of the message's data where rows are tight.
+    """Return the silhouette (H, W), 0 or 255; it is a view of the data if rows have no padding.
 
     Raises:
-        EncodingError: it is not mono8 or has fewer bytes than its size says.
+        EncodingError: the encoding is not mono8, or the bytes do not match the size.
     """
     if message.encoding not in ("mono8", "8UC1"):
         raise EncodingError(
@@ -101,9 +101,9 @@ def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Im
     """Return a message of ``image`` (H, W) or (H, W, 3), uint8 or float32.
 
     Args:
-        header: of the message.
-        image: its pixels.
-        encoding: their meaning; mono8 or bgr8 by default.
+        header: header of the message.
+        image: pixels.
+        encoding: encoding of the pixels; mono8 or bgr8 by default.
     """
     contiguous = np.ascontiguousarray(image)
     message = Image(
@@ -126,7 +126,7 @@ def check_shape(
     """Check that an image, (H, W) or (H, W, 3), has the aspect ratio of its calibration.
 
     Raises:
-        CameraError: it has not, so that the CameraInfo is not that of the image.
+        CameraError: the aspect ratios differ, so the CameraInfo does not belong to the image.
     """
     height, width = image.shape[:2]
     if abs(width * calibration.height - height * calibration.width) > max(width, height):
@@ -140,10 +140,9 @@ def check_shape(
 def camera_info_message(
     header: Header, camera: Camera, source: CameraInfo | None = None
 ) -> CameraInfo:
-    """Return the CameraInfo of an ideal pinhole camera: no distortion, its own size.
+    """Return the CameraInfo of an ideal pinhole camera without distortion.
 
-    Of ``source``, the CameraInfo of the camera whose image it is, stays what R and P say of its
-    place in a stereo pair.
+    R, and the baseline in P, are copied from ``source``, the CameraInfo of the original image.
     """
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
@@ -159,7 +158,7 @@ def camera_info_message(
 
 
 def depth_camera_of(message: CameraInfo) -> Camera | None:
-    """Return the pinhole camera of a rectified depth image; None if its CameraInfo says none."""
+    """Return the pinhole camera of a rectified depth image; None if the message has none."""
     p, width, height = np.array(message.p).reshape(3, 4), int(message.width), int(message.height)
     if min(width, height) <= 0 or matrix_problem(p[:, :3], width, height):
         return None
@@ -199,7 +198,7 @@ def camera_of(message: CameraInfo) -> Camera:
     """Return the pinhole camera of a ``silhouette/camera_info``.
 
     Raises:
-        CameraError: it has no size, no camera has such a matrix, or the image is distorted.
+        CameraError: the size or the matrix is invalid, or the image is distorted.
     """
     k = message.k
     pixels = message.width * message.height

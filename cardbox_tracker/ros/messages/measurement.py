@@ -1,4 +1,4 @@
-"""The outcome of an initialization as a message that programs can read, and back."""
+"""Conversion of the outcome of an initialization to a message and back."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def mean_iou_of(message: DiagnosticStatus) -> float:
     """Return the mean fit of the references, 0 to 1.
 
     Raises:
-        ValueError: the initialization failed; the text says why.
+        ValueError: the initialization failed; the text has the reason.
     """
     values = {entry.key: entry.value for entry in message.values}
     if _MEAN_IOU not in values:
@@ -45,7 +45,7 @@ def mean_iou_of(message: DiagnosticStatus) -> float:
 
 
 def answer_text(result: InitializationResult) -> str:
-    """Return the answer of the service: how well it fits, and the sizes in cm."""
+    """Return the answer of the service with the fit and the sizes in cm."""
     sizes = ", ".join(
         f"{name} {100 * value:.1f}"
         for name, value in zip(SIZE_NAMES, result.body.sizes, strict=True)

@@ -1,4 +1,4 @@
-"""The tracker's outputs as messages, and back where somebody reads them."""
+"""Conversion of the tracker's outputs to messages, and of some messages back."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def joint_state_message(header: Header, joints: JointValues) -> JointState:
     """Return joint values, rad and metres (or their deviations), as positions.
 
     Raises:
-        NotFiniteError: one is not a finite number.
+        NotFiniteError: a value is not a finite number.
     """
     return JointState(
         header=header,
@@ -42,7 +42,7 @@ def posture_of(message: JointState) -> FloatArray:
 
     Raises:
         NotFiniteError: a value is not a finite number.
-        CardboxError: a joint is missing, or it has another number of names than of values.
+        CardboxError: a joint is missing, or the numbers of names and values differ.
     """
     try:
         found = posture_from(joint_values_of(message))
@@ -70,7 +70,7 @@ def points_of(message: PoseArray) -> Points:
 
 
 def markers_message(header: Header, markers: Markers) -> MarkerArray:
-    """Return the shapes, in the frame of ``header``; without any, what removes those before.
+    """Return shapes in the frame of ``header``; without shapes, remove the earlier ones.
 
     Raises:
         NotFiniteError: a coordinate is not a finite number.
@@ -117,7 +117,7 @@ def _points(points_m: FloatArray) -> list[Point]:
 
 
 def _finite(values: FloatArray, what: str) -> FloatArray:
-    """Return ``values``; the last guard before they leave the node, whatever went wrong before."""
+    """Return ``values`` after a last check before they are published."""
     if not np.isfinite(values).all():
         raise NotFiniteError(
             f"the {what} of an image have values that are not finite numbers, so they are not "

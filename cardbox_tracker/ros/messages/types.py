@@ -1,4 +1,4 @@
-"""The installed classes of recorded topics' messages."""
+"""Message classes of recorded topics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def message_class(topic: str, kind: str) -> Any:
     """Return the class of the message type ``kind``, such as ``sensor_msgs/msg/Image``.
 
     Raises:
-        BagError: it is not installed; the text names ``topic``.
+        BagError: the type is not installed; the text names ``topic``.
     """
     parts = _TYPE.fullmatch(kind)
     if parts is None:
@@ -41,12 +41,13 @@ def message_classes(
     """Return the class of each topic's messages.
 
     Args:
-        kinds: type of each topic, by its name.
-        chosen: the topics that are wanted; if there are none, all whose type is installed.
-        leave_out: called with what to say of each topic that nobody chose and that has none.
+        kinds: message type by topic.
+        chosen: requested topics; if empty, all topics whose type is installed.
+        leave_out: called with a text for each topic that is skipped because its type is not
+            installed.
 
     Raises:
-        BagError: the type of a chosen topic is not installed, or that of all topics.
+        BagError: the type of a chosen topic is not installed, or no type is.
     """
     names = list(chosen)
     if names:

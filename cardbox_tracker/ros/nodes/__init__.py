@@ -1,4 +1,4 @@
-"""The nodes, one module each: it converts, calls the core and publishes.
+"""The nodes, each in its module, with their inputs, outputs and parameters.
 
-``single_process`` is all of them in one process.
+:mod:`.single_process` runs all nodes in one process.
 """

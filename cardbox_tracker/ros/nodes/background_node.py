@@ -20,7 +20,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.settings import settings_of
@@ -44,35 +44,35 @@ class BackgroundParameters(NodeParameters):
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
-        320, "working resolution, width", unit="px", limits=(32, 4096), read_only=True
+        320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START
     )
     height: int = parameter(
-        240, "working resolution, height", unit="px", limits=(32, 4096), read_only=True
+        240, "working resolution, height", unit="px", limits=(32, 4096), effect=AT_START
     )
     background_file: str = parameter(
         "",
-        "file to keep the learned background in; if it exists at the start and fits the camera and "
-        "what it shows, nothing has to be learned, although somebody stands there; empty: none",
-        read_only=True,
+        "file of the learned background; if it exists at the start and fits the camera and the "
+        "scene, nothing has to be learned, even with a person in view; empty: none",
+        effect=AT_START,
     )
     within_m: float = parameter(
         0.0,
         "with depth images: pixels nearer than this are the person, and nothing has to be "
-        "learned; choose it between the person and the wall; 0: learn the empty scene",
+        "learned; choose a distance between the person and the wall; 0: learn the empty scene",
         unit="m",
         limits=(0.0, WITHIN_LIMITS_M[1]),
     )
     depth: str = parameter(
         "",
-        "topic of these depth images (16UC1, 32FC1 or compressedDepth) from where the camera is, "
-        "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
-        read_only=True,
+        "topic of these depth images (16UC1, 32FC1 or compressedDepth) from the camera's position, "
+        "with the camera's field of view or a CameraInfo on TOPIC/camera_info; empty: none",
+        effect=AT_START,
     )
     learning: str = parameter(
         next(iter(WAYS)),
-        "still: learn the empty scene once nothing moves in it; person_in_view: learn around a "
-        "person, and the rest when they step aside; always: learn from the first images, whatever "
-        "moves",
+        "still: learn the empty scene when nothing moves; person_in_view: learn the scene around a "
+        "person, and the rest when the person steps aside; always: learn from the first images "
+        "despite movements",
         choices=tuple(WAYS),
         effect=_NEXT_LEARNING,
     )
@@ -97,7 +97,7 @@ class BackgroundParameters(NodeParameters):
     absorb_after: int = shared(BackgroundConfig, "absorb_after")
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together."""
+        """Raise ValueError if values contradict each other."""
         if self.within_m > 0.0 and not self.depth:
             raise ValueError(
                 f"within_m is {self.within_m:g} but no depth is given; set 'depth' to a topic of "
@@ -155,11 +155,11 @@ class BackgroundNode(CardboxNode):
 
     def _learn(self) -> str:
         if self.parameters.value.within_m > 0.0:
-            return "nothing has to be learned: within_m is set, so depth shows who is near"
+            return "nothing has to be learned: within_m is set, so depth shows the person"
         if self._pipeline is None or self._image is None:
             raise CameraError(
-                f"no image was received yet on {self._image_topic}, so there is nothing to learn "
-                "from; is the camera running, and its CameraInfo on "
+                f"no image was received yet on {self._image_topic}, so nothing can be learned; "
+                "is the camera running, and its CameraInfo on "
                 f"{self._info_topic}? See 'ros2 topic hz {self._image_topic}'"
             )
         self._kept.forget()
@@ -197,7 +197,7 @@ class BackgroundNode(CardboxNode):
         if pipeline is None:
             if not self._watch.seen:
                 self.diagnostics.wait_for(
-                    f"the CameraInfo on {self._info_topic} of the images on {self._image_topic}"
+                    f"the CameraInfo on {self._info_topic} for the images on {self._image_topic}"
                 )
             return
         calibration, most = pipeline.calibration, self.parameters.value.max_megapixels
@@ -219,7 +219,7 @@ class BackgroundNode(CardboxNode):
     def _prepare(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
     ) -> None:
-        """Go on with the background of before, or learn it."""
+        """Continue with the previous background, or learn a new one."""
         done = self._kept.resume(pipeline, image)
         if not done:
             pipeline.learning.add(image)
@@ -239,14 +239,14 @@ class BackgroundNode(CardboxNode):
         self.get_logger().info(done)
 
     def _send_image(self, header: Header, image: conversions.ImageArray) -> None:
-        """Publish an image, ahead of its silhouette, which the tracker pairs with it."""
+        """Publish an image before its silhouette; the tracker pairs both."""
         if self._images.get_subscription_count():
             self._images.publish(conversions.image_message(header, image))
 
     def _send(
         self, header: Header, silhouette: conversions.ImageArray, camera: Camera, sent_ns: int
     ) -> None:
-        """Publish a silhouette (H, W), 0 or 255, and then its calibration, which rarely changes."""
+        """Publish a silhouette (H, W), 0 or 255, and then its calibration."""
         self._silhouettes.publish(conversions.image_message(header, silhouette, "mono8"))
         self._infos.publish(conversions.camera_info_message(header, camera, self._info))
         self._covered = np.count_nonzero(silhouette) / silhouette.size

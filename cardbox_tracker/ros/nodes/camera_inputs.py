@@ -1,4 +1,4 @@
-"""The tracker's input: what its cameras, and a depth image, show at one time."""
+"""The tracker's input: synchronized observations of its cameras and depth images."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
 from cardbox_tracker.vision.stamps import StreamStatistics
 
 _SILENT_S = 3.0
-# The stamps of cameras are compared only while all of them send: one that pauses is behind.
+# A paused camera falls behind, so stamps are compared only while all cameras send.
 _RECENT_S = 0.5
 _OTHER_CLOCK_NS = 1_000_000_000
 
 
 class Received(NamedTuple):
-    """A silhouette with its image, or a depth image, as they came."""
+    """Messages of one stream: a silhouette with its image, or a depth image."""
 
     message: Image
     image: Image | None
@@ -44,15 +44,15 @@ class Received(NamedTuple):
 
 @dataclass(frozen=True)
 class ObservationSet:
-    """What all cameras saw at one time.
+    """Observations of all cameras at one time.
 
     Attributes:
-        header: stamp of the first camera's image, or of the earliest one, in the first camera's
-            frame.
-        headers: of each camera's silhouette, the first camera's first; None of one without.
-        observations: of each camera, as a tracker takes them.
-        sent_ns: when the last silhouette left its sender, ns since the epoch.
-        nothing: (H, W), a black image of the first camera.
+        header: header in the first camera's frame, with the stamp of its silhouette, or of the
+            earliest one.
+        headers: header of each camera's silhouette, the first camera's first; None without one.
+        observations: observation of each camera, as a tracker takes them.
+        sent_ns: send time of the last silhouette, ns since the epoch.
+        nothing: black image (H, W) of the first camera.
     """
 
     header: Header
@@ -62,14 +62,14 @@ class ObservationSet:
     nothing: ImageArray
 
     def picture(self, number: int = 0) -> ImageArray:
-        """Return a camera's image, or else its silhouette; black if it has neither."""
+        """Return a camera's image, or its silhouette, or a black image."""
         one = self.observations[number]
         seen = one.silhouette if one.image is None else one.image
         return self.nothing if seen is None else seen
 
 
 class _Stream:
-    """Messages of one camera, or depth images: how they arrive, and what is wrong with them."""
+    """Statistics and faults of the messages of one camera, or of the depth images."""
 
     def __init__(self, name: str, topic: str) -> None:
         self.name, self.topic = name, topic
@@ -81,16 +81,16 @@ class _Stream:
 
     @property
     def age_s(self) -> float:
-        """Seconds since the last message came, or since the start."""
+        """Seconds since the last message, or since the start."""
         return time.monotonic() - self._arrived_s
 
     def arrived(self, stamp_ns: int) -> bool:
-        """Take note of a message; return whether it can be used."""
+        """Count a message, and return whether it can be used."""
         self._arrived_s, self.newest_ns = time.monotonic(), stamp_ns
         return self.statistics.add(stamp_ns).is_usable
 
     def values(self) -> dict[str, str]:
-        """Return the rate since the last call, and the age of what came last."""
+        """Return the rate since the last call, and the age of the last message."""
         now_s, count = time.monotonic(), self.statistics.received
         rate = (count - self._counted) / max(now_s - self._counted_s, 1e-3)
         self._counted_s, self._counted = now_s, count
@@ -101,11 +101,11 @@ class _Stream:
 
 
 class CameraInputs:
-    """Subscribes to all cameras, and hands on what belongs to one time, in order.
+    """Subscribes to all cameras, and delivers messages of the same time in order.
 
-    Each silhouette is put together with its image (:class:`ImagePairing`). Those of several
-    cameras, and depth images, then find each other by their stamps
-    (:class:`~cardbox_tracker.vision.pairing.Arrivals`); a camera alone has nothing to wait for.
+    :class:`ImagePairing` pairs each silhouette with its image. With several cameras or depth
+    images, :class:`~cardbox_tracker.vision.pairing.Arrivals` then synchronizes the streams by their
+    stamps.
     """
 
     def __init__(
@@ -120,10 +120,10 @@ class CameraInputs:
         Args:
             node: the tracker.
             settings: its parameters.
-            changed: called with the first camera and the further ones when all are known, or
-                others than before; with None where nothing says any more where they stand.
-            deliver: called with what belongs to one time, for :meth:`observed`, and before it the
-                silhouette whose stamp stands for all.
+            changed: called with the first and the further cameras when all are known or one has
+                changed; called with None if their poses are no longer known.
+            deliver: called with the silhouette whose stamp represents the set, and with the
+                messages of one time, for :meth:`observed`.
 
         Raises:
             CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
@@ -160,12 +160,12 @@ class CameraInputs:
         return ", ".join(self._poses.missing)
 
     def wait_for_images(self, waits: bool) -> None:
-        """Say whether silhouettes wait for the images that they are cut out of."""
+        """Set whether silhouettes wait for their images."""
         for pairing in self._pairings:
             pairing.waits = waits
 
     def check(self) -> None:
-        """Raise CameraError if all cameras are there, but nothing says where they stand."""
+        """Raise CameraError if all cameras are known, but not their poses."""
         self._poses.check()
 
     def _on_poses(self) -> None:
@@ -178,7 +178,7 @@ class CameraInputs:
         stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
         is_usable = self._streams[number].arrived(stamp_ns)
         if len(self._streams) == 1:
-            # The node itself leaves out and counts what comes twice or too late.
+            # The node itself drops and counts repeated and late messages.
             self._deliver(received, [received])
             return
         if not is_usable:
@@ -186,23 +186,23 @@ class CameraInputs:
         self._arrivals.tolerance_ns = self._streams[0].statistics.period_ns // 2 or TOLERANCE_NS
         self._arrivals.add(number, stamp_ns, received)
         for one_time in self._arrivals.sets():
-            # The last one may be a depth image, which says nothing alone.
+            # A set with only a depth image cannot be tracked.
             if any(one is not None for one in one_time[: self._count]):
                 self._deliver(self._lead_of(one_time), one_time)
 
     def _lead_of(self, received: Sequence[Received | None]) -> Received:
-        """Return the silhouette whose stamp stands for all: the first camera's, or the earliest."""
+        """Return the silhouette whose stamp represents the set: the first camera's or earliest."""
         first = received[0]
         there = [one for one in received[: self._count] if one is not None]
         return first or min(there, key=lambda one: _stamp_ns(one.message))
 
     def observed(self, received: Sequence[Received | None]) -> ObservationSet:
-        """Return what was delivered, once the cameras are known, as arrays.
+        """Convert delivered messages to arrays, once the cameras are known.
 
-        A message that cannot be read is left out, and said.
+        A message that cannot be read is dropped and reported.
 
         Raises:
-            CameraError: none of the silhouettes can be read.
+            CameraError: no silhouette can be read.
         """
         first = self._poses.first
         assert first is not None
@@ -245,7 +245,7 @@ class CameraInputs:
         return depth_m
 
     def values(self, ious: Sequence[float | None]) -> dict[str, str]:
-        """Return rate, age and fit of each stream, for the diagnostics; a camera alone has none."""
+        """Return rate, age and fit of each stream for the diagnostics, if there are several."""
         values: dict[str, str] = {}
         if len(self._streams) == 1:
             return values
@@ -258,7 +258,7 @@ class CameraInputs:
         return values
 
     def warnings(self) -> dict[str, str]:
-        """Return what is wrong with single streams while the others go on, by kind."""
+        """Return warnings about single streams while the others continue, by kind."""
         if len(self._streams) == 1:
             return {}
         first, *others = self._streams
@@ -267,7 +267,7 @@ class CameraInputs:
             if stream.age_s > _SILENT_S:
                 texts[f"silence of {stream.name}"] = (
                     f"nothing has come on {stream.topic} for {stream.age_s:.0f} s; tracking goes "
-                    "on without it: is that camera running, and every node behind it?"
+                    "on without it. Are that camera and its background node running?"
                 )
             elif stream.problem:
                 texts[f"{stream.name} cannot be read"] = f"{stream.topic}: {stream.problem}"
@@ -278,8 +278,8 @@ class CameraInputs:
             if is_stamped and is_recent and apart_ns > _OTHER_CLOCK_NS:
                 texts[f"clock of {stream.name}"] = (
                     f"the stamps on {stream.topic} and {first.topic} are {apart_ns / 1e9:.1f} s "
-                    "apart, so that nothing belongs together; set the clocks of both computers by "
-                    "one, such as with chrony"
+                    "apart, so their images cannot be paired; synchronize the clocks of both "
+                    "computers, for example with chrony"
                 )
         return texts
 
@@ -287,7 +287,7 @@ class CameraInputs:
 def _picture(
     stream: _Stream, received: Received | None, camera: Camera
 ) -> tuple[ImageArray | None, ImageArray | None]:
-    """Return silhouette and image of a camera; None for what it lacks or cannot be read."""
+    """Return silhouette and image of a camera; None for each that is missing or unreadable."""
     if received is None:
         return None, None
     try:

@@ -1,4 +1,4 @@
-"""The node ``camera``: a V4L2 device or a video file, through OpenCV, as Image and CameraInfo."""
+"""The node ``camera`` publishes a V4L2 device or a video file as Image and CameraInfo."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Calibration, load_calibration
 from cardbox_tracker.vision.camera_device import (
@@ -37,63 +37,63 @@ class CameraParameters(NodeParameters):
     """Publish a V4L2 device or a video file."""
 
     device: str = parameter(
-        "/dev/video0", "V4L2 device; not used when a file is given", read_only=True
+        "/dev/video0", "V4L2 device; unused if a file is given", effect=AT_START
     )
-    file: str = parameter("", "video file to play instead of a device", read_only=True)
+    file: str = parameter("", "video file to play instead of a device", effect=AT_START)
     loop: bool = parameter(False, "play the file again and again", effect="end of the file")
     width: int = parameter(
-        640, "width to ask the device for", unit="px", limits=(32, 8192), read_only=True
+        640, "width to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     height: int = parameter(
-        480, "height to ask the device for", unit="px", limits=(32, 8192), read_only=True
+        480, "height to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     rate_hz: float = parameter(
         15.0,
         "images a second; 0 takes the file's own rate",
         unit="Hz",
         limits=(0.0, 240.0),
-        read_only=True,
+        effect=AT_START,
     )
     encoding: str = parameter(
         "mono8",
-        "mono8 is all the tracker needs and a third of the bytes; bgr8 for colour",
+        "mono8 suffices for the tracker and has a third of the bytes; bgr8 for colour",
         choices=("mono8", "bgr8"),
     )
     frame_id: str = parameter("camera_optical_frame", "name of the camera's optical frame")
-    calibration_file: str = parameter("", "YAML file of camera_calibration", read_only=True)
+    calibration_file: str = parameter("", "YAML file of camera_calibration", effect=AT_START)
     horizontal_fov_deg: float = parameter(
         0.0,
         "without a calibration file: assume an ideal lens of this field of view; 0: publish the "
         "camera as uncalibrated",
         unit="deg",
         limits=(0.0, 170.0),
-        read_only=True,
+        effect=AT_START,
     )
     settle_s: float = parameter(
         2.0,
-        "time for the automatic exposure before it is locked; the background must not change",
+        "time for the automatic exposure before it is locked, so that the background is constant",
         unit="s",
         limits=(0.0, 60.0),
-        read_only=True,
+        effect=AT_START,
     )
     lock_exposure: bool = parameter(
-        True, "switch exposure and white balance to manual where the device allows", read_only=True
+        True, "switch exposure and white balance to manual where the device allows", effect=AT_START
     )
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together."""
+        """Raise ValueError if values contradict each other."""
         if not self.device and not self.file:
             raise ValueError("device and file are both empty; give one, such as /dev/video0")
 
 
 class CameraNode(CardboxNode):
-    """Reads images in a thread of its own and publishes each with its calibration."""
+    """Reads images in a separate thread and publishes each with its calibration."""
 
     def __init__(self, **options: Any) -> None:
         """Open the device or file and start reading.
 
         Raises:
-            CameraError: it cannot be opened, or the calibration cannot be read.
+            CameraError: the source cannot be opened, or the calibration cannot be read.
         """
         super().__init__("camera", **options)
         self.parameters = LiveParameters(self, CameraParameters)
@@ -133,7 +133,7 @@ class CameraNode(CardboxNode):
         return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / 15.0
 
     def _read(self) -> None:
-        """Read, publish, keep the rate; a file that ends stops or starts over."""
+        """Read and publish images at the rate; a file stops or starts over at its end."""
         if self.parameters.value.file:
             self._wait_for_listener()
         started_s = due_s = time.monotonic()
@@ -167,10 +167,10 @@ class CameraNode(CardboxNode):
                     self.diagnostics.problem(f"cannot publish the image: {error!r}")
 
     def _wait_for_listener(self) -> None:
-        """Wait until somebody takes the images, so that a video is seen from its beginning."""
+        """Wait for a subscriber, so that it gets a video from the beginning."""
         while not self._stop.is_set():
             if self._images.get_subscription_count():
-                # Their CameraInfo, too, has to be found.
+                # DDS matches the subscriber of the CameraInfo separately.
                 self._stop.wait(_SETTLE_S)
                 return
             self.diagnostics.wait_for(f"a subscriber of {self._images.topic_name} to begin")
@@ -199,8 +199,8 @@ class CameraNode(CardboxNode):
                 self.get_logger().info(f"{what} is manual now")
             else:
                 self.diagnostics.warn(
-                    f"the device does not let its {what} be set to manual; if the background "
-                    "drifts, look for a control in 'v4l2-ctl --list-ctrls'"
+                    f"the device does not allow a manual {what}; if the background drifts, look "
+                    "for a control in 'v4l2-ctl --list-ctrls'"
                 )
 
     def close(self) -> None:
@@ -211,7 +211,7 @@ class CameraNode(CardboxNode):
 
 
 def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> Calibration:
-    """Return an ideal lens of that field of view; an uncalibrated camera (K zero) if it is 0."""
+    """Return an ideal lens of a field of view; if that is 0, an uncalibrated camera (K zero)."""
     k = np.zeros((3, 3))
     if horizontal_fov_deg > 0:
         focal_px = width / 2 / np.tan(np.radians(horizontal_fov_deg) / 2)

@@ -1,6 +1,6 @@
-"""Working cameras and where they stand, from what arrives: CameraInfo, /tf_static, and a file.
+"""Cameras at the working resolution and their poses, from CameraInfo, /tf_static and a file.
 
-The package tf2_msgs may be missing: then ``/tf_static`` is not read, and the texts say so.
+Without the package tf2_msgs, ``/tf_static`` is not read, and the error texts say so.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from cardbox_tracker.vision.extrinsics_sources import (
 )
 
 _STATIC_TOPIC = "/tf_static"
-# A robot has some hundred; anybody may send more.
+# A robot has a few hundred frames; the limit protects the memory.
 _MOST_TRANSFORMS = 1000
-# Two extrinsics that differ by less are the same, read again.
+# Extrinsics that differ by less are regarded as equal.
 _SAME_RAD, _SAME_M = 1e-5, 1e-5
 
 
 def silhouettes_of(cameras: Sequence[str]) -> list[str]:
-    """Return the topic of each camera's silhouettes; that of the node's own namespace for ""."""
+    """Return the topic of each camera's silhouettes; "" stands for the node's namespace."""
     return [f"{camera.rstrip('/')}/silhouette" if camera else "silhouette" for camera in cameras]
 
 
@@ -44,17 +44,18 @@ class CameraPoses:
 
     Attributes:
         names: their namespaces.
-        others: the further cameras; empty until everything is known.
+        others: the further cameras; empty until all cameras and poses are known.
         frame_id: the first camera's optical frame.
     """
 
     def __init__(
         self, node: CardboxNode, cameras: Sequence[str], file: str, changed: Callable[[], None]
     ) -> None:
-        """Listen with ``node``, and call ``changed`` when cameras are known or others than before.
+        """Subscribe with ``node``; call ``changed`` when all cameras are known or one has changed.
 
         Raises:
-            CardboxError: ``file`` is no extrinsics of these cameras, or a name no namespace.
+            CardboxError: ``file`` does not have the extrinsics of these cameras, or a name is not
+                a valid namespace.
         """
         self.names = [camera.strip("/") for camera in cameras]
         self.others: list[OtherCamera] = []
@@ -76,7 +77,7 @@ class CameraPoses:
 
     @property
     def first(self) -> Camera | None:
-        """The first camera, once all are known and where they stand."""
+        """The first camera; None until all cameras and poses are known."""
         is_known = len(self.others) == len(self.names) - 1
         return self._cameras[0] if is_known else None
 
@@ -92,7 +93,7 @@ class CameraPoses:
         return [topic for topic, camera in pairs if camera is None]
 
     def check(self) -> None:
-        """Raise CameraError if all cameras are there, but not where they stand."""
+        """Raise CameraError if all cameras are known, but not their poses."""
         if self._problem:
             raise CameraError(self._problem)
 
@@ -112,7 +113,7 @@ class CameraPoses:
         self._find(is_new=False)
 
     def _find(self, is_new: bool) -> None:
-        """Find where the cameras stand; ``is_new``: one of them is another than before."""
+        """Find the poses of the cameras; ``is_new`` is True if a camera has changed."""
         if None in self._cameras:
             return
         try:
@@ -145,7 +146,7 @@ class CameraPoses:
 
 
 def _is_same(one: CameraInfo, other: CameraInfo) -> bool:
-    """Whether two CameraInfo of a silhouette say the same, at whatever time."""
+    """Return whether two CameraInfo are equal apart from their stamps."""
     return (one.width, one.height, one.header.frame_id) == (
         other.width,
         other.height,

@@ -1,4 +1,4 @@
-"""The background node's silhouettes where they come from depth images: nothing is learned."""
+"""Silhouettes of the background node from depth images, without a learned background."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
 
 
 class Taken(NamedTuple):
-    """An image, or a depth image, of one time.
+    """An image or a depth image that waits for its counterpart.
 
     Attributes:
         message: header of the image, or the depth image.
-        camera: of the image; None of a depth image.
-        within_m: how near is near, at the time of the image.
-        sent_ns: when it was sent.
+        camera: camera of the image; None for a depth image.
+        within_m: depth limit at the time of the image, metres.
+        sent_ns: send time, ns since the epoch.
     """
 
     message: Any
@@ -34,21 +34,21 @@ class Taken(NamedTuple):
 
 
 Send = Callable[[Header, ImageArray, Camera, int], None]
-"""Takes header, silhouette, camera, and when the later of image and depth was sent."""
+"""Callback that receives header, silhouette, camera and the later of both send times, ns."""
 
 
 class DepthCut:
-    """Pairs images with depth images and cuts out whoever is near enough."""
+    """Pairs images with depth images and cuts out the pixels nearer than a limit."""
 
     def __init__(self, node: CardboxNode, topic: str, send: Send) -> None:
-        """Subscribe with ``node`` to depth images on ``topic``; ``send`` takes silhouettes."""
+        """Subscribe with ``node`` to depth images on ``topic``; ``send`` receives silhouettes."""
         self._node, self._topic = node, node.resolve(topic)
         self._send = send
         self._arrivals: Arrivals[Taken] = Arrivals(2, TOLERANCE_NS)
         self._input = DepthInput(node, topic, self._on_depth)
 
     def add(self, header: Header, camera: Camera, within_m: float, sent_ns: int) -> None:
-        """Take note of an image of ``camera``, of which whoever is ``within_m`` is wanted."""
+        """Add an image of ``camera``, in which pixels nearer than ``within_m`` are the person."""
         stamp_ns = conversions.stamp_ns(header.stamp)
         self._add(0, stamp_ns, Taken(header, camera, within_m, sent_ns))
 
@@ -68,7 +68,7 @@ class DepthCut:
             try:
                 depth_m = self._input.seen_by(seen.camera, measured.message)
             except EncodingError as error:
-                # Either message may have completed the set.
+                # The node would otherwise name the topic of the message that completed the set.
                 raise EncodingError(f"{self._topic}: {error}") from None
             silhouette = silhouette_within(depth_m, seen.within_m)
             sent_ns = max(seen.sent_ns, measured.sent_ns)

@@ -1,4 +1,4 @@
-"""What depth images add to a measurement: how far away the person is, and so their size."""
+"""The distance of the person, and so the size, from depth images of the references."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import DepthImage, median_depth
 
-# Of one posture a few are enough, and each takes as much memory as an image.
+# A few depth images of a posture are enough, and each takes much memory.
 _KEPT = 10
 
 
 class DepthDistance:
-    """Keeps the depth of the reference postures, as the camera that measures sees it."""
+    """Keeps the depth of the reference postures in the view of the measuring camera."""
 
     def __init__(
         self,
@@ -40,8 +40,8 @@ class DepthDistance:
     ) -> None:
         """Subscribe with ``node``, the initializer, to depth images on ``topic``.
 
-        ``camera`` returns the working camera, once it is known, whose silhouettes ``references``
-        holds.
+        ``camera`` returns the camera of the silhouettes in ``references``, or None until it is
+        known.
         """
         self._topic, self._references, self._camera = node.resolve(topic), references, camera
         self._recent: deque[tuple[int, DepthImage]] = deque(maxlen=_KEPT)
@@ -54,15 +54,15 @@ class DepthDistance:
             self._recent.append((stamp_ns(message.header.stamp), depth_m))
 
     def check(self) -> None:
-        """Check that it can measure, before anybody poses.
+        """Check before the reference postures that a measurement will be possible.
 
         Raises:
-            InitializationError: no depth image is there.
+            InitializationError: no depth image was received.
         """
         if not self._recent:
             raise InitializationError(
-                f"no depth image was received yet on {self._topic}; it measures how far away the "
-                "person is: start what publishes it, or give person_distance_m and set "
+                f"no depth image was received yet on {self._topic}, so the person's distance "
+                "cannot be measured; start its publisher, or give person_distance_m and set "
                 "measure_distance to false"
             )
 
@@ -70,12 +70,12 @@ class DepthDistance:
         """Keep the depth of the reference ``name``, if it is needed.
 
         Args:
-            name: of the reference.
-            frames: depth images to combine at most.
+            name: name of the reference.
+            frames: largest number of depth images to combine.
             now_ns: stamp of the camera's latest silhouette.
 
         Raises:
-            InitializationError: there is no depth image of that time.
+            InitializationError: no depth image has the time of the silhouettes.
         """
         if name not in SCALE_REFERENCES or now_ns is None:
             return
@@ -92,14 +92,14 @@ class DepthDistance:
         self._captured[name] = median_depth(alike)
 
     def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
-        """Measure a person, and their distance with the depth images.
+        """Measure a person, and the distance with the depth images.
 
         Args:
-            measure: with the camera.
+            measure: measurement with the camera at a given distance.
             config: settings; the search begins at their distance.
 
         Raises:
-            InitializationError: as ``measure``, or the depth images do not show that person.
+            InitializationError: ``measure`` failed, or the depth images do not fit the person.
         """
         camera, silhouettes = self._camera(), self._references.captured
         if camera is None or any(name not in self._captured for name in SCALE_REFERENCES):

@@ -1,4 +1,4 @@
-"""Depth images on a topic, as another camera at the same place sees them."""
+"""Depth images on a topic, converted to the view of a camera at the same position."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class DepthInput:
     """Subscribes to depth images, raw or packed, and to their CameraInfo if there is one.
 
     Attributes:
-        camera: that measured the depth; None: the one that is asked for in :meth:`seen_by`.
+        camera: camera that measured the depth; None for that of :meth:`seen_by`.
     """
 
     def __init__(self, node: CardboxNode, topic: str, heard: Callable[[Any, int], None]) -> None:
-        """Subscribe with ``node`` to ``topic``; ``heard`` takes a message and when it was sent.
+        """Subscribe with ``node`` to ``topic``; ``heard`` receives messages and send times.
 
-        A topic whose name ends in ``/compressedDepth`` has messages of image_transport's plugin.
-        The CameraInfo is on ``TOPIC/camera_info``, of the topic without that.
+        If the topic ends in ``/compressedDepth``, its messages are those of image_transport. The
+        CameraInfo is on ``TOPIC/camera_info``, where TOPIC is the name without this ending.
         """
         self.camera: Camera | None = None
         kind: Any = CompressedImage if topic.endswith(_PACKED) else Image
@@ -47,7 +47,7 @@ class DepthInput:
         """Return the depth (H, W), metres, of a message as ``camera`` sees it.
 
         Raises:
-            EncodingError: the message has no depth.
+            EncodingError: the encoding of the message is not one of depth.
         """
         depth_m = depth_from_image(message)
         if self.camera is None:

@@ -1,4 +1,4 @@
-"""Put each silhouette together with the image that it was cut out of, by their stamp."""
+"""Pairing of silhouettes with their images by the stamp."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from cardbox_tracker.ros.messages.conversions import stamp_ns
 from cardbox_tracker.ros.runtime.recent import RecentImages
 
 Deliver = Callable[[Image, Image | None, int], None]
-"""Takes a silhouette, its image if there is one, and when the silhouette left its sender, ns."""
+"""Callback that receives a silhouette, its image or None, and the silhouette's send time, ns."""
 
 _KEPT = 5
-# After so many silhouettes in a row without an image none is expected any more.
+# After so many consecutive silhouettes without an image, the next ones do not wait.
 _PATIENCE = 5
 
 
 class ImagePairing:
-    """Hands on every silhouette once and in order, with its image where that comes in time.
+    """Delivers every silhouette once and in order, with its image if that comes in time.
 
-    The background node sends an image before its silhouette, so it is mostly there. If not, the
-    silhouette waits for it, at most until the next silhouette.
+    The background node sends an image before its silhouette, so the image has usually arrived. If
+    not, the silhouette waits for it, but not longer than until the next silhouette.
 
     Attributes:
-        waits: False to hand on silhouettes at once, with what is there.
+        waits: False to deliver silhouettes at once, with or without image.
     """
 
     def __init__(self, deliver: Deliver) -> None:
-        """Hand on to ``deliver``."""
+        """Deliver to the callback ``deliver``."""
         self.waits = True
         self._deliver = deliver
         self._images = RecentImages(_KEPT)
         self._waiting: tuple[Image, int] | None = None
-        # None is expected before the first one: perhaps nobody sends any.
+        # Silhouettes wait only after the first image, because there may be no publisher.
         self._patience = 0
 
     def add_image(self, image: Image, _: int) -> None:
-        """Take an image, and hand on the silhouette that waits for it."""
+        """Add an image, and deliver the silhouette that waits for it."""
         self._images.append(image)
         self._patience = _PATIENCE
         if self._waiting is not None and _stamp(self._waiting[0]) == _stamp(image):
             self._hand_on(image)
 
     def add_silhouette(self, silhouette: Image, sent_ns: int) -> None:
-        """Take a silhouette; the one before has waited long enough."""
+        """Add a silhouette, and deliver the previous one if it still waits."""
         try:
             if self._waiting is not None:
                 self._patience -= 1
@@ -56,7 +56,7 @@ class ImagePairing:
                 self._hand_on(image)
 
     def _image_of(self, stamp: int) -> Image | None:
-        """Return the latest image of that stamp: where stamps repeat, those before are used."""
+        """Return the latest image of a stamp; after a repetition, earlier ones are used up."""
         return next((image for image in reversed(self._images) if _stamp(image) == stamp), None)
 
     def _hand_on(self, image: Image | None) -> None:

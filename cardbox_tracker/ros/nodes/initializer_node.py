@@ -1,4 +1,4 @@
-"""The node ``initializer``: silhouettes of three reference postures in, a measured body out."""
+"""The node ``initializer`` measures a body from the silhouettes of three reference postures."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class InitializerNode(CardboxNode):
         for name in REFERENCE_NAMES:
             self.offer(f"~/capture_{name}", partial(self._capture, name))
         self.offer("~/cancel", self._cancellation.cancel)
-        # It answers when the measurement is done; a second call meanwhile is refused at once.
+        # The service answers after the measurement; meanwhile, a second call is refused at once.
         self.create_service(
             Trigger,
             "~/initialize",
@@ -119,7 +119,7 @@ class InitializerNode(CardboxNode):
         return self._references.capture(name, given.capture_frames, self._camera, given.config())
 
     async def _initialize(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Measure in another thread, so that silhouettes and captures are still served."""
+        """Measure in another thread, so that the node still handles silhouettes and captures."""
         if not self._cancellation.begin():
             response.message = "an initialization is already running; wait for its answer"
             return response
@@ -158,7 +158,7 @@ class InitializerNode(CardboxNode):
                 )
             result = measured(references, distance, camera, settings.config(), self._progress)
         except CardboxError:
-            # Those captured by service stay, to be replaced one by one.
+            # References captured by service are kept and can be replaced one by one.
             references.captured, references.images = before
             raise
         answer = answer_text(result)
@@ -194,15 +194,15 @@ class InitializerNode(CardboxNode):
         }
 
     def close(self) -> None:
-        """End a guidance that is still running."""
+        """Stop the guidance if it is running."""
         self._cancellation.stop()
 
 
 class GuideOutputs:
-    """Tells a person what to do next: drawn on ``overlay``, in words to say aloud on ``~/say``.
+    """Outputs of the guidance: drawings on ``overlay`` and words to say aloud on ``~/say``.
 
-    ``~/status`` has the details for the operator. ``~/guiding`` is true meanwhile: the tracker then
-    leaves ``overlay`` to the guidance.
+    ``~/status`` has the details for the operator. While ``~/guiding`` is true, the tracker does not
+    publish ``overlay``.
     """
 
     def __init__(self, node: CardboxNode) -> None:
@@ -223,7 +223,7 @@ class GuideOutputs:
         if words:
             self._say.publish(String(data=words))
             if bell and prompt.mood != ASK:
-                # With the end of a line, at which 'ros2 launch' hands on what a node writes.
+                # 'ros2 launch' passes on a node's output only at the end of a line.
                 print("\a", file=sys.stderr, flush=True)
         self._prompt = prompt
         self._status.publish(String(data=prompt.text))
@@ -243,9 +243,9 @@ class GuideOutputs:
         camera: Camera | None,
         settings: InitializerParameters,
     ) -> None:
-        """Draw the present prompt over an image, if there is one and somebody to see it.
+        """Draw the current prompt over an image if there is a prompt and a subscriber.
 
-        ``message`` is the silhouette, and ``seen`` what it is cut out of, if that came in time.
+        ``message`` is the silhouette, and ``seen`` its image, if that came in time.
         """
         prompt = self._prompt
         if prompt is None or camera is None or not self._overlay.get_subscription_count():
@@ -256,7 +256,7 @@ class GuideOutputs:
         config = settings.config()
         if self._guide is None or (self._guide.camera, self._guide.config) != (camera, config):
             self._guide = Guide(camera, config)
-        # An image of another size is not that of the silhouette, which is drawn instead.
+        # An image of another size does not belong to the silhouette, which is drawn instead.
         fits = seen is not None and (seen.height, seen.width) == silhouette.shape
         image = conversions.image_of(seen) if fits else None
         picture = self._guide.draw(prompt, silhouette, image, settings.mirror)

@@ -1,4 +1,4 @@
-"""The parameters of the node ``initializer``, which its sources of the distance read, too."""
+"""The parameters of the node ``initializer`` and of its sources of the distance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
 )
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.vision.pairing import camera_names
 
 _MAX_PITCH_DEG = round(math.degrees(MAX_PITCH_RAD), 6)
@@ -39,8 +39,8 @@ class InitializerParameters(NodeParameters):
     least_iou: float = shared(InitializationConfig, "least_iou", effect=_NEXT_MEASUREMENT)
     capture_frames: int = parameter(
         5,
-        "silhouettes a capture combines, each pixel by majority; more of them remove more noise, "
-        "but the person must stand still for longer",
+        "number of silhouettes that a capture combines, each pixel by majority; more silhouettes "
+        "have less noise, but the person must stand still for longer",
         limits=(1, 30),
         effect=_NEXT_CAPTURE,
     )
@@ -53,27 +53,27 @@ class InitializerParameters(NodeParameters):
     )
     attempts: int = parameter(
         3,
-        "times the guidance tries each posture before it gives up",
+        "number of tries of the guidance for each posture",
         limits=(1, 20),
         effect=_NEXT_GUIDANCE,
     )
     mirror: bool = parameter(
         True,
-        "the guidance shows the person as in a mirror; false: as the camera does",
+        "the guidance shows the person as in a mirror; false: as in the image",
     )
     bell: bool = parameter(
         False,
-        "ring the terminal's bell when the guidance has captured a posture, or could not",
+        "ring the terminal's bell after each success or failure of the guidance",
     )
     model_file: str = parameter(
         "",
         "file to save the body model to; if it exists at the start, it is published; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     optical_frame_in_urdf: bool = parameter(
         True,
         "also put the camera's optical frame into robot_description; false if another node "
-        "already publishes where it is",
+        "publishes that frame",
         effect=_NEXT_MEASUREMENT,
     )
     torso_place_in_urdf: bool = parameter(
@@ -87,20 +87,20 @@ class InitializerParameters(NodeParameters):
     extrinsics_file: str = extrinsics_parameter()
     depth: str = parameter(
         "",
-        "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the (first) camera is, "
-        "of its view or with a CameraInfo on TOPIC/camera_info, which measure how far away the "
-        "person is; empty: none",
-        read_only=True,
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) to measure the person's distance, "
+        "from the (first) camera's position, with its field of view or a CameraInfo on "
+        "TOPIC/camera_info; empty: none",
+        effect=AT_START,
     )
     measure_distance: bool = parameter(
         True,
-        "depth images, or with two cameras or more the second one, measure how far away the person "
-        "is; false: person_distance_m is that",
+        "measure the person's distance with depth images, or with the second of several cameras; "
+        "false: use person_distance_m",
         effect=_NEXT_MEASUREMENT,
     )
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together."""
+        """Raise ValueError if values contradict each other."""
         camera_names(self.cameras)
 
     def config(self) -> InitializationConfig:

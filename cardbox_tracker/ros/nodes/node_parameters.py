@@ -1,4 +1,4 @@
-"""The parameters of every node, of which ``config/*.yaml`` and ``docs/parameters.md`` are made."""
+"""The parameters of every node, the source of ``config/*.yaml`` and ``docs/parameters.md``."""
 
 from __future__ import annotations
 
@@ -22,4 +22,4 @@ NODES: dict[str, type[NodeParameters]] = {
     "rula": RulaParameters,
     "retarget": RetargetParameters,
 }
-"""Node name to its parameters."""
+"""Parameter class of each node, by name."""

@@ -3,8 +3,8 @@
     play_bag BAG [--rate 2] [--loop] [--topics /image_raw] [--pause-at 4.5 9] ...
 
 It pauses at the times of ``--pause-at`` and on the service ``play_bag/pause``, and continues on
-``play_bag/resume``; the latched topic ``play_bag/status`` says ``waiting``, ``playing``,
-``paused at 4.500 s`` or ``finished``. So a script can pause the recording at a reference posture,
+``play_bag/resume``. The latched topic ``play_bag/status`` is ``waiting``, ``playing``,
+``paused at 4.500 s`` or ``finished``. A script can thus pause the recording at a reference posture,
 call ``initializer/capture_front``, and resume. The exit code is 0 at the end of the bag.
 """
 
@@ -32,14 +32,14 @@ from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 
 _PROGRESS_S = 5.0
-# The nodes of a second camera may start so much later.
+# The nodes of a second camera may start this much later.
 _OTHER_CAMERAS_S = 3.0
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-# Recorded once, when they were published; a late subscriber needs them too.
+# These messages are recorded once, and late subscribers need them too.
 _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/mean", "/stddev")
 
 
@@ -47,47 +47,51 @@ _LATCHED_ENDINGS = ("tf_static", "body_model", "robot_description", "background/
 class PlayBagParameters(NodeParameters):
     """Play a recording."""
 
-    bag: str = parameter("", "rosbag2 folder or .mcap file to play", read_only=True)
+    bag: str = parameter("", "rosbag2 folder or .mcap file to play", effect=AT_START)
     rate: float = parameter(
         1.0, "speed; 2 plays twice as fast", limits=(0.01, 100.0), effect="at once"
     )
     loop: bool = parameter(
         False, "play again and again; the stamps start over too", effect="end of the bag"
     )
-    topics: list[str] = parameter([], "topics to play; all if empty", read_only=True)
+    topics: list[str] = parameter([], "topics to play; all if empty", effect=AT_START)
     start_s: float = parameter(
         0.0,
         "play from this time on, from the bag's start",
         unit="s",
         limits=(0.0, 1e6),
-        read_only=True,
+        effect=AT_START,
     )
     duration_s: float = parameter(
-        0.0, "play this long; 0: to the end of the bag", unit="s", limits=(0.0, 1e6), read_only=True
+        0.0,
+        "play this long; 0: to the end of the bag",
+        unit="s",
+        limits=(0.0, 1e6),
+        effect=AT_START,
     )
     pause_at: list[float] = parameter(
-        [], "pause at these times from the bag's start, s, until play_bag/resume", read_only=True
+        [], "pause at these times from the bag's start, s, until play_bag/resume", effect=AT_START
     )
     wait_for_subscribers: bool = parameter(
-        True, "begin when somebody subscribes to a played image topic", read_only=True
+        True, "begin when somebody subscribes to a played image topic", effect=AT_START
     )
     wait_for_topics: list[str] = parameter(
         [],
-        "begin when somebody publishes these topics, such as keypoints: at its very first start "
-        "the tracker compiles for half a minute",
-        read_only=True,
+        "begin when these topics have a publisher; with keypoints, the player waits for the "
+        "tracker, which compiles for half a minute at its very first start",
+        effect=AT_START,
     )
     delay_s: float = parameter(
         0.5,
-        "the first message is sent when no subscriber has come or gone for this time, so that "
-        "none misses the beginning; for 3 s while images of a further camera have none",
+        "send the first message when no subscriber has come or gone for this time, so that none "
+        "misses the beginning; at least 3 s while images of a further camera have no subscriber",
         unit="s",
         limits=(0.0, 600.0),
-        read_only=True,
+        effect=AT_START,
     )
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together."""
+        """Raise ValueError if values contradict each other."""
         if not self.bag:
             raise ValueError("no bag is given; run 'play_bag BAG' or set the parameter 'bag'")
 
@@ -99,7 +103,7 @@ class PlayBagNode(CardboxNode):
         """Open the bag and advertise its topics.
 
         Raises:
-            CardboxError: no bag is given, or it cannot be read or lacks a topic.
+            CardboxError: no bag is given, or the bag cannot be read or lacks a topic.
         """
         super().__init__("play_bag", **options)
         self.parameters = LiveParameters(self, PlayBagParameters, lambda _: self._set_anchor())
@@ -198,8 +202,8 @@ class PlayBagNode(CardboxNode):
     def _settle(self, delay_s: float) -> None:
         """Serve calls until no subscriber has come or gone for ``delay_s``.
 
-        DDS matches a subscriber topic by topic, its CameraInfo perhaps last. The nodes of several
-        cameras start one after the other: while images of one have no subscriber it waits longer.
+        DDS matches a subscriber topic by topic. The nodes of several cameras start one after the
+        other, so the player waits longer while images of one camera have no subscriber.
         """
         subscribers, since_s = list[int](), time.monotonic()
         others_s = _OTHER_CAMERAS_S if delay_s and self.parameters.value.wait_for_subscribers else 0
@@ -213,7 +217,7 @@ class PlayBagNode(CardboxNode):
                 subscribers, since_s = found, time.monotonic()
 
     def _set_anchor(self) -> None:
-        """From now on, bag time runs from the present position."""
+        """Let bag time run on from the current position."""
         self._anchor = (time.monotonic(), self._position_s)
 
     def _all(self) -> list[Publisher]:
@@ -246,7 +250,7 @@ def overrides_from(arguments: list[str]) -> list[Parameter]:
     """Turn the command line (without ROS arguments) into values of the node's parameters.
 
     Raises:
-        SystemExit: it is wrong, or asks for something to be printed.
+        SystemExit: the command line is wrong, or requests help or topic names.
     """
     parser = argparse.ArgumentParser(
         prog="play_bag",
@@ -279,7 +283,7 @@ def overrides_from(arguments: list[str]) -> list[Parameter]:
         "--below",
         action="append",
         metavar="NAMESPACE",
-        help="with --find-topics: of the camera below it; several times for several cameras",
+        help="with --find-topics: namespace of a camera; repeat it for several cameras",
     )
     given = vars(parser.parse_args(arguments))
     wanted, cameras = given.pop("find_topics"), given.pop("below") or []

@@ -1,4 +1,4 @@
-"""Keep the latest silhouettes and images, and make reference silhouettes of them on request."""
+"""Capture of reference silhouettes from the latest silhouettes and images."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Camera
 
 KEPT = 30
-"""Silhouettes that are kept: as many as the parameter capture_frames allows."""
+"""Number of silhouettes to keep, the maximum of the parameter capture_frames."""
 ONE_POSTURE_NS = 1_000_000_000
 """Older silhouettes may show the posture before."""
 _OLD_S = 2.0
 
 
 def alike_of(recent: RecentImages, frames: int) -> list[Image]:
-    """Return those of the latest ``frames`` that show the posture, and have the size, of the last.
+    """Return the latest images, ``frames`` at most, with the posture and size of the last one.
 
-    At least one is there.
+    The last image is always among them.
     """
     messages = list(recent)[-frames:]
     latest = messages[-1]
@@ -52,11 +52,11 @@ class ReferenceCapture:
 
     Attributes:
         captured: reference silhouettes (H, W), 0 or 255.
-        images: the images behind those silhouettes that came in time, (H, W, 3) bgr or (H, W).
+        images: images (H, W, 3) bgr or (H, W) of the silhouettes whose image came in time.
     """
 
     def __init__(self, topic: str) -> None:
-        """``topic`` is where silhouettes come from, for the texts."""
+        """Begin without references; error texts name the ``topic`` of the silhouettes."""
         self.captured: dict[str, Silhouette] = {}
         self.images: dict[str, list[ImageArray]] = {}
         self._topic = topic
@@ -65,21 +65,21 @@ class ReferenceCapture:
         self._received_s = 0.0
 
     def add(self, message: Image) -> None:
-        """Keep a silhouette as the latest one.
+        """Add the latest silhouette.
 
         Raises:
-            EncodingError: it is no silhouette.
+            EncodingError: the message is not a silhouette.
         """
         silhouette_of(message)
         self._recent.append(message)
         self._received_s = time.monotonic()
 
     def add_image(self, message: Image, _: int) -> None:
-        """Keep the image that a silhouette with the same stamp is cut out of."""
+        """Add the image of the silhouette with the same stamp."""
         self._recent_images.append(message)
 
     def behind(self, message: Image) -> Image | None:
-        """Return the image that a silhouette is cut out of, if it is there already."""
+        """Return the image of a silhouette, or None if it has not arrived."""
         stamp = stamp_ns(message.header.stamp)
         images = reversed(self._recent_images)
         return next((image for image in images if stamp_ns(image.header.stamp) == stamp), None)
@@ -108,14 +108,14 @@ class ReferenceCapture:
     ) -> str:
         """Keep the majority of the latest ``frames`` silhouettes as the reference ``name``.
 
-        Where the working camera is known already, they are compared with what was asked for.
+        If the working camera is known, the posture is compared with the requested one.
 
         Returns:
-            What was done and what is missing, for a person.
+            Text with the result and the missing references, for a person.
 
         Raises:
-            InitializationError: there is no silhouette, nobody in it, they are cut off, or hold
-                another of the postures.
+            InitializationError: there is no silhouette, or it shows nobody, a person who is cut
+                off, or another posture.
         """
         self.check_running()
         alike = alike_of(self._recent, frames)
@@ -128,7 +128,7 @@ class ReferenceCapture:
         stamps = {stamp_ns(message.header.stamp) for message in alike}
         images = [m for m in self._recent_images if stamp_ns(m.header.stamp) in stamps]
         self.captured[name] = silhouette
-        # Not more than silhouettes, where stamps repeat.
+        # If stamps repeat, there can be more images than silhouettes.
         self.images[name] = [image_of(message) for message in images[-len(alike) :]]
         text = f"captured '{name}' from {len(silhouettes)} silhouettes{warning}"
         age_s = time.monotonic() - self._received_s

@@ -1,6 +1,6 @@
-"""What the tracker publishes after REP-155 below ``/humans``.
+"""The tracker's topics after REP-155 below ``/humans``.
 
-Who is there is a message of the package hri_msgs, which may be missing: then it is not published.
+Without the package hri_msgs, the list of tracked people is not published.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 
 
 class Rep155Outputs:
-    """What other programs know of the body ``rep155_id``: joints, URDF, and that it is there."""
+    """Publishes joints, URDF and presence of the body ``rep155_id``."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         """Advertise the topics of the body ``settings.rep155_id``."""
@@ -35,7 +35,7 @@ class Rep155Outputs:
         self._described: tuple[Any, str] | None = None
         place = f"/humans/bodies/{body_id}"
         self._joints = node.advertise(JointState, f"{place}/joint_states", qos.RESULT)
-        # The first is what ROS names it, the second what libhri reads.
+        # The first name is ROS's convention; libhri reads the second one.
         self._descriptions = [
             node.advertise(String, f"{place}/{name}", qos.LATCHED)
             for name in ("robot_description", "urdf")
@@ -48,7 +48,7 @@ class Rep155Outputs:
         )
 
     def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
-        """Publish the posture if there is one, before it the URDF if the person is another."""
+        """Publish the posture if there is one, and before it the URDF of a new person."""
         if self._tracked is not None:
             ids = [] if estimate.posture is None else [self._id]
             self._tracked.publish(self._ids_list(header=header, ids=ids))

@@ -1,4 +1,4 @@
-"""The node ``retarget``: the tracker's posture in, commands for a robot arm out."""
+"""The node ``retarget`` turns the tracker's postures into commands for a robot arm."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cardbox_tracker.ros.messages.results import posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import settings_of
 
@@ -34,30 +34,30 @@ _CHECK_S = 0.1
 
 
 def _fixed(name: str) -> Any:
-    """Return a setting of the retargeting, which stays as it is while a robot moves."""
-    return shared(RetargetConfig, name, read_only=True)
+    """Return a setting of the retargeting, which cannot change while a robot moves."""
+    return shared(RetargetConfig, name, effect=AT_START)
 
 
 @dataclass(frozen=True)
 class RetargetParameters(NodeParameters):
     """Move a robot arm as the tracked person moves theirs."""
 
-    robot_file: str = parameter("", "URDF of the robot; has to be given", read_only=True)
+    robot_file: str = parameter("", "URDF of the robot; has to be given", effect=AT_START)
     joint_map_file: str = parameter(
         "",
-        "which joint moves which, as in config/example_joint_map.yaml; empty: the robot's hand "
-        "follows the person's by inverse kinematics",
-        read_only=True,
+        "map of joints, as in config/example_joint_map.yaml; empty: the robot's hand follows the "
+        "person's hand by inverse kinematics",
+        effect=AT_START,
     )
     hand_link: str = parameter(
-        "", "the robot's hand; empty: the link with the most joints before it", read_only=True
+        "", "the robot's hand; empty: the link with the most joints before it", effect=AT_START
     )
     timeout_s: float = parameter(
         0.5,
-        "dead-man: without a posture for so long the robot stands still",
+        "dead-man: the robot stands still after this time without a posture",
         unit="s",
         limits=(0.05, 10.0),
-        read_only=True,
+        effect=AT_START,
     )
     side: str = _fixed("side")
     max_speed: float = _fixed("max_speed")
@@ -74,13 +74,13 @@ class RetargetParameters(NodeParameters):
 
 
 class RetargetNode(CardboxNode):
-    """Commands a robot, and lets it stand still whenever the posture is not sure."""
+    """Commands a robot, which stands still while the posture is uncertain."""
 
     def __init__(self, **options: Any) -> None:
         """Read the robot and subscribe to what the tracker publishes.
 
         Raises:
-            CardboxError: there is no robot, or it cannot be used as the parameters say.
+            CardboxError: no robot is given, or the parameters do not fit it.
         """
         super().__init__("retarget", **options)
         settings = LiveParameters(self, RetargetParameters).value
@@ -114,7 +114,7 @@ class RetargetNode(CardboxNode):
         self._body = loads_body_model(message.data, source=self.resolve("body_model"))
 
     def _on_state(self, message: String, _: int) -> None:
-        # It comes before the joints of its image, and alone where there are none.
+        # The state comes before the joints of its image, or without joints.
         self._state = message.data
         if message.data != TRACKING:
             self._hold(message.data)
@@ -123,7 +123,7 @@ class RetargetNode(CardboxNode):
         self._joints = message
 
     def _on_stddev(self, message: JointState, sent_ns: int) -> None:
-        """The tracker sends the deviations after the joints, under the same stamp."""
+        """Command the robot; the deviations come after the joints, with the same stamp."""
         if self._joints.header.stamp != message.header.stamp:
             return
         stamp_ns = conversions.stamp_ns(message.header.stamp)
@@ -140,7 +140,7 @@ class RetargetNode(CardboxNode):
             self._hold(f"no posture for {self._timeout_s:g} s")
 
     def _hold(self, reason: str) -> None:
-        """Stand still: the present positions are sent once."""
+        """Send the current positions once, so that the robot stands still."""
         command = self._retargeter.hold(reason)
         if command.status != self._status:
             self._send(command, Header())
@@ -150,7 +150,7 @@ class RetargetNode(CardboxNode):
         nanoseconds = round(command.duration_s * 1e9)
         duration = Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
         point = JointTrajectoryPoint(positions=positions, time_from_start=duration)
-        # Without a stamp: begin at once. That of the image has passed.
+        # A trajectory without a stamp begins at once; the stamp of the image has passed.
         self._trajectory.publish(JointTrajectory(joint_names=names, points=[point]))
         self._commands.publish(Float64MultiArray(data=positions))
         self._robot_joints.publish(JointState(header=header, name=names, position=positions))

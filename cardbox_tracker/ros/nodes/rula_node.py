@@ -1,4 +1,4 @@
-"""The node ``rula``: joint states and their deviations in, RULA scores and their chances out."""
+"""The node ``rula`` publishes RULA scores and their probabilities for the tracked posture."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cardbox_tracker.ros.messages.results import posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter, shared
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import settings_of
 
@@ -55,7 +55,7 @@ class RulaParameters(NodeParameters):
     side_bent_deg: float = shared(RulaConfig, "side_bent_deg")
     upright_deg: float = shared(RulaConfig, "upright_deg")
     seed: int = parameter(
-        0, "random seed of the postures that are drawn", limits=(0, 2**31 - 1), read_only=True
+        0, "random seed of the posture samples", limits=(0, 2**31 - 1), effect=AT_START
     )
 
     def config(self) -> RulaConfig:
@@ -96,7 +96,7 @@ class RulaNode(CardboxNode):
         self._joints = message
 
     def _on_stddev(self, message: JointState, sent_ns: int) -> None:
-        """The tracker sends the deviations after the joints, under the same stamp."""
+        """Score the posture; the deviations come after the joints, with the same stamp."""
         if self._joints.header.stamp != message.header.stamp or self._body is None:
             return
         if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
@@ -117,7 +117,7 @@ def _chances_message(scores: ScoreDistribution) -> Float32MultiArray:
 
 
 def _report_message(message: JointState, scores: ScoreDistribution, name: str) -> DiagnosticArray:
-    """Return all that is known of one image, under its header."""
+    """Return the scores of one image under its header."""
     meaning = next(text for low, high, text in ACTION_LEVELS if low <= scores.likeliest <= high)
     values = {
         "score": f"{scores.mean:.2f}",

@@ -1,4 +1,4 @@
-"""What a second camera adds to a measurement: how far away the person is, and so their size."""
+"""The distance of the person, and so the size, from the silhouettes of a second camera."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Camera
 
 Progress = Callable[[float], None]
-"""Takes the fraction of a measurement that is done."""
+"""Callback that receives the finished fraction of a measurement."""
 
 
 class SecondCamera:
-    """Captures the reference postures as the second of several cameras sees them."""
+    """Captures the reference postures in the view of the second of several cameras."""
 
     def __init__(self, node: CardboxNode, settings: InitializerParameters) -> None:
         """Subscribe with ``node``, the initializer, to the first two of its ``cameras``.
@@ -59,30 +59,30 @@ class SecondCamera:
         self._recent.append(message)
 
     def check(self) -> None:
-        """Check that it can measure, before anybody poses.
+        """Check before the reference postures that a measurement will be possible.
 
         Raises:
-            CameraError: nothing says where the cameras stand, or two sources disagree.
-            InitializationError: a camera is not there.
+            CameraError: the poses of the cameras are unknown, or two sources disagree.
+            InitializationError: nothing was received from a camera.
         """
         self._poses.check()
         if self._poses.first is None or not self._recent:
             raise InitializationError(
-                f"no silhouette was received yet on {self._topic}, or no CameraInfo of a camera; "
-                "with two cameras the second one measures how far away the person is: start its "
-                "background node, or give person_distance_m and set measure_distance to false"
+                f"no silhouette was received yet on {self._topic}, or no CameraInfo of a camera, "
+                "so the second camera cannot measure the person's distance; start its background "
+                "node, or give person_distance_m and set measure_distance to false"
             )
 
     def capture(self, name: str, frames: int, now_ns: int | None) -> None:
-        """Keep what this camera saw of the reference ``name``, if it is needed.
+        """Keep this camera's silhouettes of the reference ``name``, if it is needed.
 
         Args:
-            name: of the reference.
-            frames: silhouettes to combine at most.
+            name: name of the reference.
+            frames: largest number of silhouettes to combine.
             now_ns: stamp of the first camera's latest silhouette.
 
         Raises:
-            InitializationError: this camera has nothing of that time.
+            InitializationError: this camera has no silhouette of that time.
         """
         if name not in SCALE_REFERENCES or now_ns is None:
             return
@@ -95,14 +95,14 @@ class SecondCamera:
         self._captured[name] = average_silhouette([silhouette_of(message) for message in alike])
 
     def measure(self, measure: Measure, config: InitializationConfig) -> InitializationResult:
-        """Measure a person with the first camera, and their distance with this one.
+        """Measure a person with the first camera, and the distance with this one.
 
         Args:
-            measure: with the first camera.
+            measure: measurement with the first camera at a given distance.
             config: settings; the search begins at their distance.
 
         Raises:
-            InitializationError: as ``measure``, or this camera does not show that person.
+            InitializationError: ``measure`` failed, or this camera's silhouettes do not fit.
         """
         self.check()
         first = self._poses.first
@@ -122,13 +122,13 @@ def distance_source(
     references: ReferenceCapture,
     camera: Callable[[], Camera | None],
 ) -> DepthDistance | SecondCamera | None:
-    """Return what measures how far away the person is, if there is anything.
+    """Return the source of the person's distance, or None.
 
     Args:
         node: the initializer.
-        settings: its parameters.
-        references: the silhouettes of the first camera.
-        camera: returns the first camera at the working resolution, once it is known.
+        settings: parameters of the initializer.
+        references: silhouettes of the first camera.
+        camera: returns the first camera at the working resolution, or None until it is known.
 
     Raises:
         CardboxError: the file of the extrinsics cannot be read, or a name is not allowed.
@@ -145,10 +145,10 @@ def measured(
     config: InitializationConfig,
     progress: Progress,
 ) -> InitializationResult:
-    """Measure the person of ``references`` with the first ``camera``; ``distance``: how far away.
+    """Measure the person of ``references`` with ``camera``, and the distance with ``distance``.
 
     Raises:
-        InitializationError: they are unusable, or the model does not fit them.
+        InitializationError: the references are unusable, or the model does not fit them.
     """
 
     def measure(at: InitializationConfig, done: Progress) -> InitializationResult:

@@ -1,10 +1,10 @@
-"""Parameters that more than one node has."""
+"""Parameters of several nodes."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from cardbox_tracker.ros.runtime.parameter_fields import parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, parameter
 from cardbox_tracker.vision.encodings import MOST_PIXELS
 
 
@@ -15,27 +15,27 @@ def cameras_parameter() -> Any:
         "namespaces of the cameras that see the person, such as cam0 and cam1 for "
         "cam0/silhouette and cam1/silhouette; results are in the first one's frame; empty: one "
         "camera, without a namespace of its own",
-        read_only=True,
+        effect=AT_START,
     )
 
 
 def extrinsics_parameter() -> Any:
-    """Return the field of the file that says where the cameras stand."""
+    """Return the field of the file with the cameras' poses."""
     return parameter(
         "",
-        "where the cameras stand: a camchain of Kalibr (YAML) or a camera group of aniposelib "
+        "file with the cameras' poses: a camchain of Kalibr (YAML) or a camera group of aniposelib "
         "(TOML); not needed for a rectified pair or with /tf_static; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
 
 
 def image_transport_parameter() -> Any:
-    """Return the field of the topic images come on."""
+    """Return the field of the image topic's transport."""
     return parameter(
         "raw",
         "raw subscribes to image_raw, compressed to image_raw/compressed",
         choices=("raw", "compressed"),
-        read_only=True,
+        effect=AT_START,
     )
 
 
@@ -43,7 +43,7 @@ def max_megapixels_parameter() -> Any:
     """Return the field of the largest image that is decoded."""
     return parameter(
         round(MOST_PIXELS / 1e6, 1),
-        "images with more million pixels are refused before they are decoded, as are those with "
-        "sixteen times the pixels of their CameraInfo; a few bytes can stand for gigabytes",
+        "larger images, in millions of pixels, are refused before they are decoded, as are images "
+        "with sixteen times the pixels of their CameraInfo; a few bytes can expand to gigabytes",
         limits=(0.01, round(MOST_PIXELS / 1e6, 1)),
     )

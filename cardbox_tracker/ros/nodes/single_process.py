@@ -2,11 +2,10 @@
 
     cardbox_nodes [--with camera | --with play_bag] --ros-args --params-file NODES.yaml
 
-Nothing differs for other nodes: the same names, topics and services. Silhouettes are handed over
-inside the process, so that no other has to be woken; in exchange the nodes share one core.
-
-Parameters are given by node in a YAML file, as ``config/cardbox_nodes.yaml`` has them, or without a
-namespace as ``-p tracker:preset:=paper``; remappings by node as
+Names, topics and services are the same as with separate processes. Silhouettes are passed inside
+the process, which is faster than DDS, but the nodes share one core. Give parameters by node in a
+YAML file like ``config/cardbox_nodes.yaml``, or, without a namespace, as
+``-p tracker:preset:=paper``. Give remappings by node as
 ``-r background:image_raw:=/camera/image_raw``.
 """
 
@@ -39,15 +38,15 @@ class AllNodes:
     """The nodes of one camera, in the order of the data."""
 
     def __init__(self, source: str | None) -> None:
-        """Create them, with the ``source`` of images if it is one of ``SOURCES``.
+        """Create the nodes, with the ``source`` of images if it is one of ``SOURCES``.
 
         Raises:
-            CardboxError: one of them cannot start.
+            CardboxError: a node cannot start.
         """
         self.nodes: list[CardboxNode] = []
         self._player: PlayBagNode | None = None
         self._playing: threading.Thread | None = None
-        # The tracker is handed a silhouette before the initializer is.
+        # The tracker subscribes first, so it gets a silhouette before the initializer.
         kinds: list[Callable[..., CardboxNode]] = [BackgroundNode, TrackerNode, InitializerNode]
         if source == "camera":
             kinds.append(CameraNode)
@@ -63,18 +62,18 @@ class AllNodes:
             raise
 
     def work(self) -> None:
-        """Serve all nodes until they are told to stop."""
+        """Spin all nodes until they are told to stop."""
         executor = SingleThreadedExecutor()
         for node in self.nodes:
             executor.add_node(node)
         if self._player is not None:
-            # In a thread of its own, so that it keeps the time of the recording.
+            # A separate thread lets the player keep the time of the recording.
             self._playing = threading.Thread(target=partial(_play, self._player), daemon=True)
             self._playing.start()
         executor.spin()
 
     def close(self) -> None:
-        """Release what the nodes hold, the source first."""
+        """Release the resources of the nodes, the source first."""
         if self._playing is not None:
             # The player ends with ROS; a thread that used ROS afterwards would abort the process.
             try_shutdown()
@@ -86,14 +85,14 @@ class AllNodes:
 
 
 def _check_cameras(node: Any) -> None:
-    """Refuse several cameras: there is one background here, which would serve one of them."""
+    """Refuse several cameras, because this process has a background node for one camera."""
     cameras = getattr(node.parameters.value, "cameras", ())
     if cameras:
         raise CardboxError(
             f"the parameter cameras of {node.get_name()} is [{', '.join(cameras)}]; expected none "
-            "in cardbox_nodes, whose one process cannot keep up with several cameras: start each "
-            "node by itself, a background for each camera, as two_cameras.launch.py, stereo.launch"
-            ".py and replay.launch.py cameras:=[...] do"
+            "in cardbox_nodes, because one process is too slow for several cameras: start the "
+            "nodes separately, a background for each camera, as two_cameras.launch.py, "
+            "stereo.launch.py and replay.launch.py cameras:=[...] do"
         )
 
 
@@ -105,13 +104,13 @@ def _play(player: PlayBagNode) -> None:
     except ExternalShutdownException:
         pass
     except Exception:
-        # As in every node, exceptions while ROS shuts down are expected.
+        # Exceptions while ROS shuts down are expected.
         if player.context.ok():
             raise
 
 
 def source_from(arguments: Sequence[str]) -> str | None:
-    """Return the source asked for on the command line (without ROS arguments)."""
+    """Return the source given on the command line (without ROS arguments)."""
     parser = argparse.ArgumentParser(
         prog="cardbox_nodes",
         description="background, initializer and tracker in one process.",

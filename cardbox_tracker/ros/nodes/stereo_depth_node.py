@@ -1,4 +1,4 @@
-"""The node ``stereo_depth``: two images of a rectified pair in, a depth image out."""
+"""The node ``stereo_depth`` measures depth images from the images of a rectified pair."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.recent import RecentImages
 from cardbox_tracker.vision.camera import Calibration, Camera, Rectifier
@@ -28,7 +28,7 @@ from cardbox_tracker.vision.resize import to_working_size
 from cardbox_tracker.vision.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 
 _DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
-# Images of either side that wait for one of the other.
+# Largest number of images of one side that wait for the other side.
 _KEPT = 4
 
 
@@ -38,17 +38,17 @@ class StereoDepthParameters(NodeParameters):
 
     image_transport: str = image_transport_parameter()
     width: int = parameter(
-        320, "width at which depth is measured", unit="px", limits=(32, 4096), read_only=True
+        320, "width at which depth is measured", unit="px", limits=(32, 4096), effect=AT_START
     )
     nearest_m: float = parameter(
         NEAREST_M,
-        "nearer things are not found; the time grows with what this costs",
+        "nearer objects are not found; smaller values cost more time",
         unit="m",
         limits=(0.1, 20.0),
     )
     tolerance_s: float = parameter(
         0.005,
-        "a left and a right image whose stamps differ by no more are a pair",
+        "largest difference of the stamps of a left and a right image that form a pair",
         unit="s",
         limits=(0.0, 1.0),
     )
@@ -56,7 +56,7 @@ class StereoDepthParameters(NodeParameters):
 
 
 class _Pair(NamedTuple):
-    """What both CameraInfo say, kept until one of them changes."""
+    """Data of both CameraInfo, kept until one of them changes."""
 
     calibrations: list[Calibration]
     rectifiers: list[Rectifier | None]
@@ -121,7 +121,7 @@ class StereoDepthNode(CardboxNode):
         self._match(sent_ns)
 
     def _match(self, sent_ns: int) -> None:
-        """Measure the latest pair that belongs together; what is older is forgotten."""
+        """Measure the latest pair of matching stamps, and drop older images."""
         tolerance_ns = 1e9 * self.parameters.value.tolerance_s
         for left in reversed(self._kept["left"]):
             stamp_ns = conversions.stamp_ns(left.header.stamp)
@@ -163,7 +163,7 @@ class StereoDepthNode(CardboxNode):
         self.diagnostics.working(sent_ns)
 
     def _pair_of_infos(self) -> _Pair:
-        """Return what both CameraInfo say; raise CameraError where they are no rectified pair."""
+        """Return the data of both CameraInfo; raise CameraError if they are not rectified."""
         settings = self.parameters.value
         calibrations = [
             calibration_from_info(self._infos[side], topic, self.resolve(f"{side}/camera_info"))
@@ -172,7 +172,7 @@ class StereoDepthNode(CardboxNode):
         where = of_rectified_pair(self._infos["left"], self._infos["right"], "the right camera")
         if where is None:
             raise CameraError(
-                "the cameras are no rectified pair: expected P[0,3] = -fx B below 0 in "
+                "the cameras are not a rectified pair: expected P[0,3] = -fx B below 0 in "
                 f"{self.resolve('right/camera_info')}; calibrate them together, and rectify "
                 "the images with stereo_image_proc"
             )

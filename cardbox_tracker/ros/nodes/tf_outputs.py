@@ -1,6 +1,6 @@
 """The tracker's output on ``/tf``, in place of robot_state_publisher.
 
-The message is one of the package tf2_msgs, which may be missing: ROS has it, PyPI has not.
+It needs the package tf2_msgs, which is part of ROS, but not available on PyPI.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from cardbox_tracker.ros.runtime.node import CardboxNode
 
 
 class TfOutputs:
-    """The frames of the links of ``robot_description``, in the posture of each image."""
+    """Publishes the frames of the links of ``robot_description`` for each image."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
         """Advertise ``/tf`` for ``node``.
@@ -38,7 +38,7 @@ class TfOutputs:
         self._links: LinkTransforms | None = None
 
     def publish(self, header: Header, estimate: Estimate, tracker: Tracker) -> None:
-        """Publish the frames of an image; none without a posture."""
+        """Publish the frames of an image if it has a posture."""
         settings = self._settings
         joints = joint_values(estimate, settings.torso_place)
         if joints is None:

@@ -1,4 +1,4 @@
-"""The node ``tracker``: silhouettes and a body model in, joint states out."""
+"""The node ``tracker`` publishes joint states from silhouettes and a body model."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ _DOES = "Follow the measured person: silhouettes in, joint states out."
 
 
 class TrackerNode(CardboxNode):
-    """Follows one measured person from silhouette to silhouette, with one camera or several."""
+    """Tracks one measured person with one or several cameras."""
 
     def __init__(self, **options: Any) -> None:
         """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
-        # Compiled before the first image arrives, unless it is in the cache.
+        # The code is compiled before the first image arrives, unless the cache has it.
         self.get_logger().info("preparing (the very first start compiles for half a minute)")
         compile_all()
         self._body: BodyModel | None = None
@@ -76,7 +76,7 @@ class TrackerNode(CardboxNode):
         self._wait()
 
     def _on_cameras(self, first: Camera | None, others: Sequence[OtherCamera]) -> None:
-        """Take the cameras, when all are known or one is another than before."""
+        """Use the cameras when all are known or one has changed."""
         if not (others or self._others) and first == self._camera:
             return
         self._camera, self._others = first, others
@@ -84,7 +84,7 @@ class TrackerNode(CardboxNode):
         self._build("new cameras" if others else "new camera")
 
     def _changed(self, settings: TrackerParameters) -> None:
-        """Take parameters that were set."""
+        """Apply changed parameters."""
         if self._tracker is None:
             return
         config = settings.config()
@@ -94,9 +94,9 @@ class TrackerNode(CardboxNode):
             self._tracker.configure(config)
 
     def _build(self, reason: str) -> None:
-        """Set the tracker up for the body, the cameras and the parameters of now.
+        """Set up a tracker for the current body, cameras and parameters.
 
-        The same seed and images then give the same results, also after a reset.
+        The same seed and images give the same results, also after a reset.
         """
         if self._body is None or self._camera is None:
             return
@@ -119,7 +119,7 @@ class TrackerNode(CardboxNode):
         return "tracking starts again from the front reference posture"
 
     def _wait(self) -> None:
-        """Say what is missing, if anything is."""
+        """Report missing inputs."""
         if self._body is None:
             self.diagnostics.wait_for(
                 f"a body model on {self._model_topic} (call initializer/initialize, or give "
@@ -132,7 +132,7 @@ class TrackerNode(CardboxNode):
             )
 
     def _on_input(self, lead: Received, received: Sequence[Received | None]) -> None:
-        """Track what all cameras show at one time; ``lead`` has the stamp that stands for all."""
+        """Track the messages of one time; ``lead`` has the stamp that represents them."""
         step = self.diagnostics.input.add(conversions.stamp_ns(lead.message.header.stamp))
         if step is StampOrder.RESTART:
             self._build("an image is older than the one before (a bag that loops?)")
@@ -154,7 +154,7 @@ class TrackerNode(CardboxNode):
         self.diagnostics.working(seen.sent_ns)
 
     def _warnings(self) -> dict[str, str]:
-        """Return what is wrong, for the diagnostics."""
+        """Return warnings for the diagnostics."""
         return self._inputs.warnings() | self._agreement.warnings() | self._report.warnings()
 
     def _values(self) -> dict[str, str]:

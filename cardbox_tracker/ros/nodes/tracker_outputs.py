@@ -1,4 +1,4 @@
-"""What the tracker publishes for each image."""
+"""The tracker's topics."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class TrackerOutputs:
     """The tracker's topics; each message is made only while the topic has a subscriber."""
 
     def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
-        """Advertise the topics for ``node``, those of REP-155 and TF if ``settings`` ask for them.
+        """Advertise the topics for ``node``; ``settings`` decide about REP-155 and TF.
 
         Raises:
-            CardboxError: they ask for TF, whose messages are not installed.
+            CardboxError: TF is requested, but its messages are not installed.
         """
         topics = outputs(settings.torso_place)
         self._publishers = {
@@ -52,7 +52,7 @@ class TrackerOutputs:
         self._guided = message.data
 
     def publish(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> None:
-        """Publish the outputs of a time; without a posture, no old one under its stamp."""
+        """Publish the outputs of an image; a lost posture is not repeated."""
         header = seen.header
         for output, value in self._stream.values(estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
@@ -73,7 +73,7 @@ class TrackerOutputs:
         return _wanted(self._publishers[output.topic])
 
     def waiting(self, message: Image, seen: Image | None, text: str) -> None:
-        """Publish on ``overlay`` the image, or the silhouette, and what the tracker waits for."""
+        """Publish on ``overlay`` the image, or the silhouette, with a text about missing inputs."""
         if not _wanted(self._overlay) or self._guided:
             return
         silhouette = conversions.silhouette_of(message)

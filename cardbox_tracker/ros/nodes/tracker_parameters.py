@@ -1,4 +1,4 @@
-"""The parameters of the tracker, in which 0 or ``preset`` means that the chosen preset decides."""
+"""The parameters of the tracker; 0 or ``preset`` selects the value of the preset."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 from cardbox_tracker.estimation.settings_file import read_settings
 from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
 from cardbox_tracker.ros.runtime.parameter_fields import (
+    AT_START,
     RESTARTS,
     NodeParameters,
     parameter,
@@ -45,12 +46,11 @@ _PARAMETERS = MappingProxyType(
         "lost_frames": "lost_frames",
     }
 )
-"""Settings of the core that are parameters, with the name of each."""
+"""Parameters that are settings of the core, and the names of these settings."""
 
 MOST_MOVES = 20_000
-"""Particles of a filter times cycles: an image then takes about 0.2 s at 320x240 and 0.3 s at
-1280x960 on one core (docs/benchmarks.md has the time of fewer). Until an image is done a node hears
-of no other image, service or signal; ``cardbox track`` has no such limit."""
+"""Largest product of particles and cycles. During an image the node handles no other image, service
+or signal, so an image must not take much longer than 0.2 s. ``cardbox track`` has no such limit."""
 
 
 def _of_preset(
@@ -60,7 +60,7 @@ def _of_preset(
     most: float | None = None,
     more: str = "",
 ) -> Any:
-    """Return a parameter for a setting of which 0 means that the preset decides."""
+    """Return a parameter for a setting; 0 selects the value of the preset."""
     core = settings_of(kind)[name]
     return shared(
         kind,
@@ -76,12 +76,12 @@ class TrackerParameters(NodeParameters):
     """Follow the person's posture; 0 or ``preset`` leaves a setting to the preset."""
 
     retired = MappingProxyType(
-        {"refine_sizes": "breadths stay as they were measured; for others measure again"}
+        {"refine_sizes": "measured breadths are not refined; measure the person again"}
     )
 
     preset: str = parameter(
         "default",
-        "paper: its Table I; default: what tracks best",
+        "paper: the settings of its Table I; default: the most accurate tracking",
         choices=tuple(PRESETS),
         effect=RESTARTS,
     )
@@ -92,8 +92,8 @@ class TrackerParameters(NodeParameters):
         FilterConfig,
         "particles",
         most=MOST_MOVES,
-        more="; an image takes about 10 us for each of them and cycle, and particles x cycles is "
-        f"at most {MOST_MOVES}",
+        more="; each particle takes about 10 us per cycle, and particles x cycles is at most "
+        f"{MOST_MOVES}",
     )
     cycles: int = _of_preset(TrackerConfig, "cycles")
     average: int = _of_preset(TrackerConfig, "average", most=MOST_MOVES)
@@ -103,13 +103,13 @@ class TrackerParameters(NodeParameters):
     torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
     arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
     effort: float = shared(WholeBodyConfig, "effort")
-    corrector: str = shared(WholeBodyConfig, "corrector", read_only=True)
+    corrector: str = shared(WholeBodyConfig, "corrector", effect=AT_START)
     output_smoothing_s: float = shared(WholeBodyConfig, "output_smoothing_s")
     settings_file: str = parameter(
         "",
-        "YAML file with further settings, by the names at the end of docs/parameters.md; what "
-        "differs from a default here goes before; empty: none",
-        read_only=True,
+        "YAML file with further settings, by the names at the end of docs/parameters.md; "
+        "parameters that differ from their default take precedence; empty: none",
+        effect=AT_START,
     )
     relocalize: str = shared(
         TrackerConfig,
@@ -127,45 +127,45 @@ class TrackerParameters(NodeParameters):
     model_file: str = parameter(
         "",
         "body model to start with; one that arrives on body_model replaces it; empty: none",
-        read_only=True,
+        effect=AT_START,
     )
     torso_place: bool = parameter(
         True,
-        "joint_states also has torso_x and torso_z, where the person stands; must be the same as "
+        "joint_states also has torso_x and torso_z, the person's position; must be the same as "
         "the initializer's torso_place_in_urdf",
-        read_only=True,
+        effect=AT_START,
     )
     use_image: bool = parameter(
         True,
-        "also take silhouette/image, to see hands and forearms before the torso by the colours "
-        "that the body model has of them",
-        read_only=True,
+        "also use silhouette/image to find hands and forearms in front of the torso by the colours "
+        "in the body model",
+        effect=AT_START,
     )
     publish_tf: bool = parameter(
         False,
-        "also publish the links of robot_description on /tf, as robot_state_publisher would; not "
-        "beside it, and not with several trackers in one TF tree; needs the package tf2_msgs",
-        read_only=True,
+        "also publish the links of robot_description on /tf, instead of robot_state_publisher; "
+        "not for several trackers in one TF tree; needs the package tf2_msgs",
+        effect=AT_START,
     )
     optical_frame_in_tf: bool = parameter(
         True,
-        "publish_tf also says where the camera's optical frame is; false if another node does",
-        read_only=True,
+        "publish_tf includes the camera's optical frame; false if another node publishes it",
+        effect=AT_START,
     )
     rep155_id: str = parameter(
         "",
         "also publish /humans/bodies/ID/joint_states and .../robot_description after REP-155, for "
         "this ID of letters, digits and underscores; empty: do not",
-        read_only=True,
+        effect=AT_START,
     )
 
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
     depth: str = parameter(
         "",
-        "topic of depth images (16UC1, 32FC1 or compressedDepth) from where the first camera is, "
-        "of its view or with a CameraInfo on TOPIC/camera_info; empty: none",
-        read_only=True,
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) from the first camera's position, "
+        "with its field of view or a CameraInfo on TOPIC/camera_info; empty: none",
+        effect=AT_START,
     )
 
     def config(self) -> TrackerConfig:
@@ -173,7 +173,7 @@ class TrackerParameters(NodeParameters):
 
         Raises:
             CardboxError: the settings file cannot be used.
-            ValueError: values do not go together, or one has no effect.
+            ValueError: values contradict each other, or one has no effect.
         """
         base = PRESETS[self.preset]()
         if self.depth:
@@ -196,21 +196,21 @@ class TrackerParameters(NodeParameters):
         return given
 
     def check(self) -> None:
-        """Raise ValueError or CardboxError where values do not go together."""
+        """Raise ValueError or CardboxError if values contradict each other."""
         config = self.config()
         load_corrector(config.whole_body.corrector)
         if (len(self.cameras) > 1 or self.depth) and not config.has_several_views:
             raise ValueError(
-                f"several cameras and depth need the preset default, but it is {self.preset}, "
-                "which has one outline"
+                f"the preset {self.preset} uses the silhouette of one camera; set preset to "
+                "default with several cameras or depth"
             )
         camera_names(self.cameras)
         most = max(config.torso.particles, config.arm.particles)
         if most * config.cycles > MOST_MOVES:
             raise ValueError(
                 f"{most} particles x {config.cycles} cycles are {most * config.cycles}; expected "
-                f"{MOST_MOVES} at most, which take about 0.2 s an image at 320x240: the node is "
-                "deaf that long. For more, track a recording with 'cardbox track'"
+                f"{MOST_MOVES} at most, because the node handles nothing else during an image; "
+                "for more, track a recording with 'cardbox track'"
             )
         if self.rep155_id and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.rep155_id):
             raise ValueError(

@@ -1,6 +1,6 @@
-"""``cardbox call``: call a service of the running nodes, where there is no ``ros2`` command.
+"""``cardbox call``: call a service of the running nodes without the command ``ros2``.
 
-Packages of the Python index bring rclpy but not ROS's command line.
+The packages on PyPI contain rclpy but not ROS's command line.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
     """Call the Trigger service ``service`` and return its answer.
 
     Args:
-        service: its name, such as ``initializer/initialize``.
-        say: gets each line of the node's topic ``status``, and a line while the service is awaited.
+        service: name of the service, such as ``initializer/initialize``.
+        say: called with each line of the node's topic ``status``, and with a line while waiting.
 
     Raises:
-        CardboxError: ``service`` is no name, nobody offers it, or it refused; the text says why.
+        CardboxError: ``service`` is not a valid name or not available, or it refused; the text
+            has the reason.
     """
     rclpy.init(args=[])
     try:
@@ -49,14 +50,14 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
                 raise CardboxError(_not_found(node, service))
             if waited_s > _TELL_S and not told:
                 told = True
-                say(f"waiting up to {_FIND_S:g} s for somebody to offer {service}")
+                say(f"waiting up to {_FIND_S:g} s for the service {service}")
             executor.spin_once(timeout_sec=_STEP_S)
         status = f"{service.rpartition('/')[0]}/status".lstrip("/")
         topic = f"/{status}" if service.startswith("/") else status
         asked = False
 
         def show(message: String) -> None:
-            # The latched line from before the call would tell of an earlier one.
+            # The latched line from before the call belongs to an earlier call.
             if asked:
                 say(message.data)
 
@@ -84,14 +85,14 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
 def _client(node: Node, service: str) -> Client:
     try:
         if not service:
-            raise ValueError("it is empty")
+            raise ValueError("the name is empty")
         return node.create_client(Trigger, service)
     except Exception as error:
-        # Another class in each release of rclpy.
+        # The class of this error depends on the release of rclpy.
         reason = " ".join(str(error).split())
         raise CardboxError(
-            f"{quoted(service)} is no name of a service: {cut(reason)}; expected one such as "
-            "initializer/initialize"
+            f"{quoted(service)} is not a valid name of a service: {cut(reason)}; expected a name "
+            "such as initializer/initialize"
         ) from None
 
 

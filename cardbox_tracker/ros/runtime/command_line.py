@@ -1,4 +1,4 @@
-"""The command line of a node that has parameters only: it prints help and refuses other words."""
+"""Command line of a node that has only parameters: it prints help and refuses other arguments."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from cardbox_tracker.ros.runtime.node import own_arguments
 
 
 def plain_command_line(name: str, does: str, args: list[str] | None) -> list[str]:
-    """Return the whole command line of the node ``name``, which has no arguments but ROS's.
+    """Return the complete command line of the node ``name``, which has only ROS arguments.
 
     Args:
-        name: of the executable.
-        does: what it does, a sentence for its help.
-        args: what follows the name; None: what this process was started with.
+        name: name of the executable.
+        does: sentence for the help.
+        args: arguments after the name; None for those of this process.
 
     Raises:
-        SystemExit: there are others (code 2), or help was asked for (code 0).
+        SystemExit: there are other arguments (code 2), or help was requested (code 0).
     """
     command_line = list(sys.argv) if args is None else [name, *args]
     parser = argparse.ArgumentParser(

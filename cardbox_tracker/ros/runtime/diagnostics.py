@@ -1,8 +1,8 @@
 """The state of a node on ``/diagnostics`` once a second, and in its log when it changes.
 
-A node that publishes nothing yet reports what it waits for, and one whose input has ceased says so.
-Lost images are counted by the spacing of their stamps, since the middleware does not report them.
-Nothing that arrives can fill the log: :mod:`.log_limit`.
+A node reports when it waits for input and when its input has ceased. Lost images are counted by the
+spacing of their stamps, because the middleware does not report them. :mod:`.log_limit` limits
+repeated log messages.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from cardbox_tracker.ros.runtime.log_limit import LogLimit
 from cardbox_tracker.vision.stamps import WINDOW, StreamStatistics
 
 PERIOD_S = 1.0
-# Without input for so long, and for so many periods, it has ceased.
+# The input has ceased after this time and this number of periods without a message.
 _SILENT_S = 3.0
 _SILENT_PERIODS = 5.0
-# With fewer results the median latency is not judged.
+# The median latency needs at least this many results.
 _ENOUGH = 30
 
 _CEASED = "is the camera running and connected, and every node between it and this one?"
@@ -37,7 +37,7 @@ _PLAYED = (
 _PLAYING = "/play_bag/status"
 
 STATUS = "status"
-"""Key of the value that says whether a node is ``waiting``, ``working`` or has an ``error``."""
+"""Key of the node's state: ``waiting``, ``working`` or ``error``."""
 
 WAITING, WORKING, ERROR = "waiting", "working", "error"
 
@@ -47,17 +47,17 @@ class NodeDiagnostics:
 
     Attributes:
         input: the images or silhouettes that drive the node.
-        extra: called once a second for further values, name to text.
-        source: what drives the node and where it comes from, such as "images on /image_raw"; said
-            when it ceases.
-        advice: called once a second for warnings that come and go, such as lost images: kind to
-            text. The kind "" is for what the node logs itself.
-        remarks: called once a second for what every node watches, such as the types of its topics;
-            it logs for itself.
+        extra: called once a second; returns further values, text by name.
+        source: name of the input, such as "images on /image_raw", for the report that it has
+            ceased.
+        advice: called once a second; returns temporary warnings, such as lost images, text by kind.
+            Warnings of the kind "" are not logged here, because the node logs them.
+        remarks: called once a second; returns warnings of common checks, such as the types of the
+            topics, which write their own log messages.
     """
 
     def __init__(self, node: Node) -> None:
-        """Publish for ``node`` from now on."""
+        """Publish the diagnostics of ``node`` from now on."""
         self.input = StreamStatistics()
         self.extra: Callable[[], dict[str, str]] = dict
         self.advice: Callable[[], dict[str, str]] = dict
@@ -91,7 +91,7 @@ class NodeDiagnostics:
             self._node.get_logger().info(f"waiting for {text}")
 
     def problem(self, text: str, kind: str = ERROR) -> None:
-        """Report an error, shown until :meth:`working`; those of one ``kind`` share a log limit."""
+        """Report an error until :meth:`working`; errors of one ``kind`` share a log limit."""
         self._problem, self._kind = text, kind
         if self._log.allows(kind, text):
             self._node.get_logger().error(text)
@@ -99,14 +99,14 @@ class NodeDiagnostics:
     def say(self, kind: str, text: str, *, warning: bool = False) -> None:
         """Log an event that other programs can cause at any rate, within the log limit."""
         if self._log.allows(kind, text):
-            # rclpy refuses another level from the same line.
+            # rclpy allows only one level per line of code.
             if warning:
                 self._node.get_logger().warning(text)
             else:
                 self._node.get_logger().info(text)
 
     def working(self, sent_ns: int = 0) -> None:
-        """Count an output; ``sent_ns`` is when its input left the sender, ns since the epoch."""
+        """Count an output; ``sent_ns`` is the send time of its input, ns since the epoch."""
         if self._waiting or self._problem:
             self._waiting = self._problem = ""
         self._published += 1
@@ -117,13 +117,13 @@ class NodeDiagnostics:
             self._late += 0 < self.input.period_ns < latency_ns
 
     def warn(self, text: str) -> None:
-        """Add a warning that stays, such as an incompatible QoS."""
+        """Add a permanent warning, such as an incompatible QoS."""
         if text not in self._warnings:
             self._warnings.append(text)
             self._node.get_logger().warning(text)
 
     def _look_for_silence(self) -> None:
-        """Notice that the input has ceased, or that it is back."""
+        """Detect that the input has ceased or has come back."""
         received, since_s = self._arrived
         now_s = time.monotonic()
         if self.input.received != received:
@@ -137,7 +137,7 @@ class NodeDiagnostics:
             _SILENT_S, _SILENT_PERIODS * self.input.period_ns / 1e9
         ):
             return
-        # A pause is no fault, and whether it is one cannot be seen from here: so no warning.
+        # The player may have been paused, which is not a fault and cannot be detected here.
         topics = self._node.get_topic_names_and_types()
         self._is_played = any(name.endswith(_PLAYING) for name, _ in topics)
         why = _PLAYED if self._is_played else _CEASED
@@ -148,7 +148,7 @@ class NodeDiagnostics:
         self._silence = f"{self.source}, which have ceased {silent_s:.0f} s ago: {why}"
 
     def _slowness(self) -> dict[str, str]:
-        """Return what to say where results need longer than images have time."""
+        """Return a warning if results take longer than the period of the images."""
         if len(self._latencies_ms) < _ENOUGH:
             return {}
         latency_ms, period_ms = np.median(self._latencies_ms), self.input.period_ns / 1e6
@@ -156,12 +156,12 @@ class NodeDiagnostics:
             return {}
         return {
             "slow": f"results come {latency_ms:.0f} ms after their images, which come every "
-            f"{period_ms:.0f} ms, so that images wait or are left out; lower the effort of "
+            f"{period_ms:.0f} ms, so images wait or are dropped; lower the effort of "
             "the tracker, take a smaller working resolution, or fewer images a second"
         }
 
     def _remarks(self) -> list[str]:
-        """Return all warnings of now; each kind that is new is logged."""
+        """Return all current warnings, and log each new kind."""
         found = self.input.remarks() | self._slowness() | self.advice()
         for kind, text in found.items():
             if kind and self._log.allows(kind, kind):
@@ -169,7 +169,7 @@ class NodeDiagnostics:
         return [*self._warnings, *self.remarks(), *found.values()]
 
     def publish(self) -> None:
-        """Publish the status, and log what has changed; the timer calls it once a second."""
+        """Publish the status and log its changes; a timer calls this once a second."""
         self._look_for_silence()
         if self._problem and not self._silence:
             self.problem(self._problem, self._kind)

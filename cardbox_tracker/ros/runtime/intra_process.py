@@ -1,8 +1,7 @@
 """Messages passed between the nodes of one process without DDS.
 
-Over DDS a silhouette is serialized, copied, announced to another thread and deserialized; passed on
-inside the process, the tracker has it at once. Nodes of other processes get the message over DDS,
-after those of this one.
+DDS serializes and copies each message and wakes another thread. Inside one process, the tracker
+gets the silhouette directly. Nodes of other processes then get the message over DDS.
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ class IntraProcess:
     """The subscribers of this process by topic; one object for all its nodes."""
 
     def __init__(self) -> None:
-        """Start with no topic."""
+        """Begin without topics."""
         self._subscribers: dict[str, list[Subscriber]] = {}
 
     def advertise(self, publisher: Publisher) -> IntraProcessPublisher:
-        """Hand over what is published with ``publisher`` from now on."""
+        """Pass the messages of ``publisher`` to subscribers of this process from now on."""
         return IntraProcessPublisher(
             publisher, self._subscribers.setdefault(publisher.topic_name, [])
         )
 
     def subscribe(self, topic: str, subscriber: Subscriber) -> bool:
-        """Call ``subscriber`` with each message; False if no node here advertises ``topic``."""
+        """Call ``subscriber`` with each message; return False if nobody here offers ``topic``."""
         subscribers = self._subscribers.get(topic)
         if subscribers is None:
             return False
@@ -40,10 +39,10 @@ class IntraProcess:
 
 
 class IntraProcessPublisher:
-    """Publishes to the subscribers of this process in their order, then to all others."""
+    """Publishes to the subscribers of this process in order, then to all others."""
 
     def __init__(self, publisher: Publisher, subscribers: list[Subscriber]) -> None:
-        """Publish with ``publisher`` where a node of another process subscribes."""
+        """Publish to other processes with ``publisher``."""
         self._publisher = publisher
         self._subscribers = subscribers
 
@@ -52,7 +51,7 @@ class IntraProcessPublisher:
         return len(self._subscribers) + int(self._publisher.get_subscription_count())
 
     def publish(self, message: Any) -> None:
-        """Return when the subscribers of this process are done; they must not change it."""
+        """Call all subscribers of this process, which must not change ``message``."""
         for subscriber in self._subscribers:
             subscriber(message, {"source_timestamp": time.time_ns()})
         if self._publisher.get_subscription_count():

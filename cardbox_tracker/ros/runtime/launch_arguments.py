@@ -1,7 +1,7 @@
 """Arguments of the launch files: their types, checks and error texts.
 
-``ros2 launch`` runs under the system's Python, which does not see the virtual environment that the
-nodes run in. Hence only the standard library is imported here.
+``ros2 launch`` runs under the system's Python, which does not see the nodes' virtual environment.
+Therefore this module imports only the standard library.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from cardbox_tracker.errors import CardboxError, quoted
 
 _PACKAGE = "cardbox_tracker"
-# Options of ``ros2 launch`` that it passes on like arguments.
+# ``ros2 launch`` passes these options on like arguments.
 _OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
 
 Value = bool | int | float | str | list[float] | list[str]
@@ -35,13 +35,13 @@ class Argument:
     """One argument of a launch file.
 
     Attributes:
-        default: as text; None if it must be given.
+        default: default as text; None if the argument is required.
         meaning: one line for ``--show-args``.
         kind: type of its value; ``list`` is a list of numbers, ``Path`` the name of a file to read.
-        choices: the texts that are allowed; empty: any.
-        limits: lowest and highest number that is allowed.
-        name: True if its value must be a letter, then letters, digits and underscores, or empty;
-            of a list, each of them, and all different.
+        choices: allowed texts; empty if any text is allowed.
+        limits: lowest and highest allowed number.
+        name: True if the value must be empty, or a letter followed by letters, digits and
+            underscores. In a list, this holds for each item, and all must differ.
     """
 
     default: str | None
@@ -52,10 +52,10 @@ class Argument:
     name: bool = False
 
     def value(self, text: str) -> Value:
-        """Return the value that ``text`` stands for.
+        """Return the value of ``text``.
 
         Raises:
-            ValueError: it stands for none; the error's text is what was expected.
+            ValueError: ``text`` is not valid; the error's text is the expectation.
         """
         expected = " or ".join(self.choices) if self.choices else _EXPECTED.get(self.kind, "")
         lowest, highest = self.limits or (-math.inf, math.inf)
@@ -80,7 +80,7 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
     """Return the value of each of ``arguments`` from the texts ``given`` by name.
 
     Raises:
-        CardboxError: some are wrong; the text names each, and what was expected.
+        CardboxError: values are wrong; the text has each of them and the expectation.
     """
     found: dict[str, Value] = {}
     wrong = []
@@ -95,18 +95,19 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
 
 
 def check_names(file: str, known: Iterable[str], command_line: Sequence[str]) -> None:
-    """Refuse arguments that were given to the launch file ``file`` and that it does not know.
+    """Refuse unknown arguments of the launch file ``file``.
 
-    ``ros2 launch`` takes any name, and a misspelt one would do nothing. Where another launch file
-    includes this one, the command line has the arguments of that one, and nothing is checked.
+    ``ros2 launch`` accepts any name and ignores a misspelt one. If another launch file includes
+    this one, the command line belongs to the other file, and nothing is checked.
 
     Args:
         file: path of the launch file.
-        known: names of its arguments and of those of the launch files that it includes.
-        command_line: of the process, such as ros2 launch cardbox_tracker live.launch.py loop:=true.
+        known: names of the arguments of this launch file and of those that it includes.
+        command_line: command line of the process, such as
+            ros2 launch cardbox_tracker live.launch.py loop:=true.
 
     Raises:
-        CardboxError: some are unknown; the text names them, and those there are.
+        CardboxError: arguments are unknown; the text names them and the known ones.
     """
     names = sorted(known)
     given = [word.partition(":=")[0] for word in _arguments_of(file, command_line) if ":=" in word]
@@ -122,7 +123,7 @@ def check_names(file: str, known: Iterable[str], command_line: Sequence[str]) ->
 
 
 def _arguments_of(file: str, command_line: Sequence[str]) -> Sequence[str]:
-    """Return the words after the launch file ``file``; none if another one was started."""
+    """Return the words after the launch file ``file``, or none if another file was started."""
     for place, (before, word) in enumerate(zip(["", *command_line], command_line, strict=False)):
         by_package = before == _PACKAGE and word == Path(file).name
         if by_package or (Path(word).is_file() and Path(word).samefile(file)):
@@ -151,7 +152,7 @@ def _parsed(kind: type, text: str) -> Value | None:
 
 
 def _names(text: str) -> list[str]:
-    """Return the names in a list such as [left, right]; raise ValueError if it is none."""
+    """Return the names in a list such as [left, right]; raise ValueError if it is not a list."""
     words = text.strip().removeprefix("[").removesuffix("]").split(",")
     names = [word.strip().strip("/") for word in words if word.strip()]
     wrong = [name for name in names if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII)]

@@ -1,4 +1,4 @@
-"""A limit on repeated log messages, so that no input can fill a disk."""
+"""Rate limit of repeated log messages, so that no input can fill a disk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _LONGEST_PAUSE_S = 600.0
 
 @dataclass
 class _Spell:
-    """One kind's messages since it was last quiet."""
+    """Messages of one kind since its last quiet period."""
 
     texts: set[str] = field(default_factory=set)
     pause_s: float = _FIRST_PAUSE_S
@@ -22,20 +22,20 @@ class _Spell:
 
 
 class LogLimit:
-    """Lets the first texts of a kind pass, then one after ever longer pauses.
+    """Allows the first texts of a kind, then one text after each of growing pauses.
 
-    A kind is what went wrong, whatever the numbers and names in its text: with the texts as kinds,
-    a sender of ever different nonsense would fill log and memory. A kind that was quiet for longer
-    than its pause starts anew.
+    The kind is the fault without the numbers and names of its text, because a sender of always
+    different nonsense would otherwise fill log and memory. A kind that was quiet for longer than
+    its pause starts anew.
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
-        """Measure time with ``now_s``, s."""
+        """Measure time with ``now_s``, which returns seconds."""
         self._now_s = now_s
         self._spells: dict[str, _Spell] = {}
 
     def allows(self, kind: str, text: str) -> bool:
-        """Return whether to log ``text``; takes note of it."""
+        """Return whether to log ``text``, and count it."""
         now_s = self._now_s()
         spell = self._spells.get(kind)
         if spell is None or now_s - spell.seen_s > 2 * spell.pause_s:

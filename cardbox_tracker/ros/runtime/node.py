@@ -27,11 +27,11 @@ from cardbox_tracker.ros.runtime.intra_process import IntraProcess, IntraProcess
 from cardbox_tracker.ros.runtime.topic_types import TopicTypes
 
 Callback = Callable[[Any, int], None]
-"""Takes a message and when it left its sender, ns since the epoch."""
+"""Callback that receives a message and its send time, ns since the epoch."""
 
 
 class Closable(Protocol):
-    """A node or several that hold something to release."""
+    """One or several nodes with resources to release."""
 
     def close(self) -> None:
         """Release it."""
@@ -41,7 +41,7 @@ N = TypeVar("N", bound=Closable)
 
 
 class CardboxNode(Node):
-    """A node that reports what it does, what it waits for, and what is wrong."""
+    """A node with diagnostics of its state, its missing inputs and its errors."""
 
     def __init__(
         self, name: str, intra_process: IntraProcess | None = None, **options: Any
@@ -49,9 +49,9 @@ class CardboxNode(Node):
         """Create the node.
 
         Args:
-            name: of the node.
-            intra_process: shared by the nodes of one process, those that offer a topic first.
-            options: those of :class:`rclpy.node.Node`.
+            name: name of the node.
+            intra_process: shared by the nodes of one process; publishers must be created first.
+            options: options of :class:`rclpy.node.Node`.
         """
         super().__init__(name, **options)
         self._intra_process = intra_process
@@ -63,12 +63,12 @@ class CardboxNode(Node):
         """Return the full name of ``topic`` after namespace and remapping.
 
         Raises:
-            CardboxError: ``topic``, which may be a recording's, is no name that ROS allows.
+            CardboxError: ROS does not allow the name, which may come from a recording.
         """
         try:
             return self.resolve_topic_name(topic)
         except Exception as error:
-            # Another class in each release of rclpy.
+            # The class of this error depends on the release of rclpy.
             raise CardboxError(
                 f"ROS does not allow a topic named {quoted(topic)}: {cut(str(error))}; give it "
                 "another name, or play others of the recording with --topics"
@@ -88,7 +88,7 @@ class CardboxNode(Node):
     def advertise_inside(
         self, kind: Any, topic: str, profile: QoSProfile
     ) -> Publisher | IntraProcessPublisher:
-        """As :meth:`advertise`, but nodes of this process are handed the messages themselves."""
+        """Create a publisher like :meth:`advertise` that bypasses DDS inside this process."""
         publisher = self.advertise(kind, topic, profile)
         if self._intra_process is None:
             return publisher
@@ -97,7 +97,7 @@ class CardboxNode(Node):
     def subscribe(
         self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
     ) -> None:
-        """Take the messages of a topic, handed over where a node of this process offers it.
+        """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
         An exception in ``callback`` is reported, and the node continues.
         """
@@ -129,7 +129,7 @@ class CardboxNode(Node):
     def offer(
         self, name: str, action: Callable[[], str], group: CallbackGroup | None = None
     ) -> None:
-        """Offer a Trigger service that answers with the text of ``action`` or of its error."""
+        """Offer a Trigger service that returns the text of ``action`` or of its error."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             response.success, response.message = self.outcome(name, action)
@@ -138,7 +138,7 @@ class CardboxNode(Node):
         self.create_service(Trigger, name, answer, qos_profile=qos.SERVICE, callback_group=group)
 
     def outcome(self, name: str, action: Callable[[], str]) -> tuple[bool, str]:
-        """Run ``action``; return whether it succeeded, and its text or that of its error."""
+        """Run ``action``; return its success, and its text or that of its error."""
         try:
             text = action()
         except CardboxError as error:
@@ -151,7 +151,7 @@ class CardboxNode(Node):
         return True, text
 
     def close(self) -> None:
-        """Release what the node holds besides its ROS entities."""
+        """Release the resources of the node besides its ROS entities."""
 
     def _unexpected(self, where: str, error: Exception) -> None:
         if not self.context.ok():
@@ -162,33 +162,33 @@ class CardboxNode(Node):
 
 
 def spin(node: CardboxNode) -> None:
-    """Serve the node until it is told to stop."""
+    """Spin the node until it is told to stop."""
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     executor.spin()
 
 
 def own_arguments(command_line: list[str]) -> list[str]:
-    """Return a command line without the program and what ``--ros-args`` says.
+    """Return a command line without the program and the ROS arguments.
 
     Raises:
-        SystemExit: ROS does not understand it (code 2); it was told in words.
+        SystemExit: the ROS arguments are invalid (code 2); an error was printed.
     """
     try:
         return remove_ros_args(command_line)[1:]
     except Exception as error:
-        # Another class in each release of rclpy.
+        # The class of this error depends on the release of rclpy.
         print(f"cannot start: {error}", file=sys.stderr)
         raise SystemExit(2) from None
 
 
 def run_node(create: Callable[[], CardboxNode], args: list[str] | None = None) -> int:
-    """Create a node and serve it until it is told to stop; return the process's exit code."""
+    """Create a node and spin it until it is told to stop; return the process's exit code."""
     return run(create, args, spin)
 
 
 def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], None]) -> int:
-    """Create one node or several, serve them until ROS ends; return the process's exit code."""
+    """Create nodes with ``create`` and run ``work`` until ROS ends; return the exit code."""
     try:
         rclpy.init(args=args)
     except Exception as error:
@@ -196,8 +196,8 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
         return 2
     try:
         node = create()
-        # Objects made so far, compiled code above all, live as long as the process; a garbage
-        # collection that visits them takes a tenth of a second.
+        # Existing objects, mainly compiled code, live as long as the process; without freezing
+        # them, each garbage collection would delay an image.
         gc.collect()
         gc.freeze()
         with interrupts.only_noted():

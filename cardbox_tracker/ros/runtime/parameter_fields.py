@@ -1,7 +1,7 @@
 """Dataclass fields that become parameters of a node, and how ROS describes them.
 
-A field made by :func:`parameter` carries its description, unit, range or choices, and what a change
-does while the node runs; one made by :func:`shared` takes most of that from a setting of the core.
+A field of :func:`parameter` has a description, a unit, a range or choices, and the effect of a
+change while the node runs. A field of :func:`shared` takes most of these from a core setting.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from cardbox_tracker.settings import Setting, settings_of
 
 NEXT_IMAGE, RESTARTS = "next image", "restarts tracking"
 """Effects of a live change: it holds from the next image on, or tracking starts again."""
+AT_START = "only at the start"
+"""Effect of a parameter that cannot be changed while the node runs."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +26,17 @@ class ParameterSpec(Setting):
     """Description, range and behaviour of one parameter.
 
     Attributes:
-        read_only: True if it can only be given at the start.
-        effect: when a live change takes effect.
+        effect: when a change takes effect.
         was: former name, which still works; empty if it was not renamed.
     """
 
-    read_only: bool = False
     effect: str = NEXT_IMAGE
     was: str = ""
+
+    @property
+    def read_only(self) -> bool:
+        """True if the parameter can only be given at the start."""
+        return self.effect == AT_START
 
 
 def parameter(
@@ -41,15 +46,13 @@ def parameter(
     unit: str = "",
     limits: tuple[float, float] | None = None,
     choices: tuple[str, ...] = (),
-    read_only: bool = False,
     effect: str = NEXT_IMAGE,
     was: str = "",
 ) -> Any:
     """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
     lowest, highest = limits or (None, None)
     spec = ParameterSpec(
-        *(description, unit, lowest, highest, choices, effect == RESTARTS),
-        *(read_only, effect, was),
+        *(description, unit, lowest, highest, choices, effect == RESTARTS), effect=effect, was=was
     )
     if isinstance(default, list):
         return field(default_factory=list, metadata={"setting": spec})
@@ -79,13 +82,13 @@ class NodeParameters:
     """Base of the parameter dataclasses; every field is made by :func:`parameter`.
 
     Attributes:
-        retired: names of former versions, and what to do instead of giving each.
+        retired: removed names, and the instruction for each.
     """
 
     retired: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def check(self) -> None:
-        """Raise ValueError where values do not go together; ranges are checked before."""
+        """Raise ValueError if values contradict each other; ranges are checked before."""
 
     @classmethod
     def specs(cls) -> dict[str, ParameterSpec]:

@@ -1,7 +1,7 @@
-"""Parameters of a node declared from one dataclass: the single source of types and defaults.
+"""Parameters of a node, declared from a dataclass that defines types and defaults.
 
 :class:`LiveParameters` declares the fields of :mod:`.parameter_fields` on a node and keeps a
-validated instance: a wrong value is refused with the reason and the old one stays.
+validated instance. A wrong value is refused with the reason, and the old value stays.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class LiveParameters(Generic[T]):
     """The declared parameters of one node; :attr:`value` is always a valid set.
 
     Raises:
-        CardboxError: a value given at the start is refused; the text says which and why.
+        CardboxError: a value given at the start is refused; the text has its name and the reason.
     """
 
     def __init__(
         self, node: Node, kind: type[T], on_change: Callable[[T], None] | None = None
     ) -> None:
-        """Declare every field of ``kind`` on ``node``; ``on_change`` gets each accepted new set."""
+        """Declare the fields of ``kind`` on ``node``; call ``on_change`` after each change."""
         self._node = node
         self._kind = kind
         self._on_change = on_change
@@ -96,7 +96,7 @@ class LiveParameters(Generic[T]):
             raise self._refusal(f"{error}. {name} is {spec.description}") from None
 
     def _check_limits(self, name: str, given: Any) -> None:
-        """Refuse what is out of range in our words, which rclpy would refuse in its own."""
+        """Refuse a value out of range with a clearer text than rclpy's."""
         try:
             self._specs[name].check(name, given)
         except ValueError as error:
@@ -104,16 +104,16 @@ class LiveParameters(Generic[T]):
             raise self._refusal(text) from None
 
     def _given(self, name: str) -> Any:
-        """Return what the command line or a file gives for ``name``; None if nothing does."""
+        """Return the value of ``name`` from the command line or a file; None without one."""
         any_type = ParameterDescriptor(dynamic_typing=True)
         value = self._node.declare_parameter(name, None, any_type).value
         self._node.undeclare_parameter(name)
         return value
 
     def _given_before(self, name: str, was: str, given: Any) -> Any:
-        """Return the value given under the old or the new name, and keep the old one settable."""
+        """Return the value given under the old or the new name, and declare the old name too."""
         old = self._given(was)
-        # So 'ros2 param dump' writes the old name, which has no value.
+        # The old name has no value, but 'ros2 param dump' writes it.
         old = None if old == "null" else old
         any_type = ParameterDescriptor(dynamic_typing=True, description=f"renamed to {name}")
         self._node.declare_parameter(was, None, any_type, ignore_override=True)
@@ -126,15 +126,17 @@ class LiveParameters(Generic[T]):
 
     def _warn_of(self, was: str, name: str) -> None:
         self._node.get_logger().warning(
-            f"the parameter '{was}' is now called '{name}'; the old name works in this version only"
+            f"the parameter '{was}' is now called '{name}'; use the new name, because the next "
+            "version drops the old one"
         )
 
     def _warn_of_unknown(self) -> None:
-        """Warn of names given at the start that are no parameters, which ROS ignores in silence.
+        """Warn of unknown names given at the start, which ROS ignores silently.
 
-        It is no error, since a file may be for several nodes; only a removed parameter is refused.
+        They are not errors, because a file may serve several nodes. Only a removed parameter is
+        refused.
         """
-        # rclpy has no public name for what was given.
+        # rclpy has no public interface to the given values.
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:
             if name in self._kind.retired:
@@ -143,27 +145,27 @@ class LiveParameters(Generic[T]):
                 continue
             near = difflib.get_close_matches(name, self._specs, 1)
             self._node.get_logger().warning(
-                f"'{cut(name)}' is no parameter of node '{self._node.get_name()}' and has no "
+                f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
                 "effect; "
                 + (f"did you mean '{near[0]}'? " if near else "")
-                + "'ros2 param list' and docs/parameters.md have all names"
+                + "see 'ros2 param list' or docs/parameters.md for all names"
             )
 
     def _refusal(self, problem: str) -> CardboxError:
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
 
     def _translate(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Before anything is checked: old names become new ones, integers numbers where asked."""
+        """Replace old names by new ones, and integers by floats where these are expected."""
         names = {p.name for p in parameters}
         translated = []
         for given in parameters:
             name = self._new_names.get(given.name, given.name)
             if name != given.name and name in names:
-                name = given.name  # both names: left for the check, which can refuse
+                name = given.name  # the validation refuses both names together
             elif name != given.name:
                 self._warn_of(given.name, name)
             value = _as_type(self._types.get(name), given.value)
-            # An empty list keeps its type only in the original.
+            # Only the original parameter has the type of an empty list.
             same = name == given.name and value is given.value
             translated.append(given if same else Parameter(name, value=value))
         return translated
@@ -203,7 +205,7 @@ def _both_names(was: str, name: str) -> str:
 
 
 def _as_type(type_: Any, value: Any) -> Any:
-    """Return whole numbers as floats or texts where these are asked for; all else as it is."""
+    """Return an integer as a float or text if ``type_`` is one; return other values unchanged."""
     if type_ in (float, str) and _is_integer(value):
         # ROS reads -p device:=0 as a number.
         return type_(value)
@@ -225,5 +227,5 @@ def _is_integer(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """Arrays of parameters arrive as ``array.array``; everything else as it is."""
+    """Return an ``array.array`` of a parameter as a list; return other values unchanged."""
     return value if isinstance(value, bool | int | float | str) else list(value)

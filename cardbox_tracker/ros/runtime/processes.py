@@ -1,4 +1,4 @@
-"""Nodes as child processes, on a DDS domain of their own."""
+"""Nodes as child processes in a separate DDS domain."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _STOP_S = 10.0
 
 
 def isolate() -> None:
-    """Keep this process and its children off other people's graphs; let large images through.
+    """Set a separate DDS domain and a profile for large images for this process and its children.
 
-    A domain or profile that is set already is kept.
+    A domain or profile that is already set is kept.
     """
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.SystemRandom().randint(1, 100)))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -39,19 +39,19 @@ def share_file(name: str) -> Path | None:
 
 
 class Nodes:
-    """The running nodes; their output goes to one log file each."""
+    """Running nodes, each with its own log file."""
 
     def __init__(self, logs: Path) -> None:
-        """Use the folder ``logs`` for what the nodes print."""
+        """Write the log files into the folder ``logs``."""
         self._logs = logs
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, *arguments: str, called: str = "") -> None:
         """Start the executable ``name`` of this package, see ``start.NODES``.
 
-        Several of one name need different names here, which ``called`` gives them.
+        ``called`` distinguishes several processes of one executable.
         """
-        # -P: in a checkout, too, the installed package is run, whose kernels are compiled already.
+        # With -P the installed package runs, whose kernels are compiled, even in a checkout.
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(
@@ -64,7 +64,7 @@ class Nodes:
         """Raise if a node died.
 
         Raises:
-            CardboxError: with the node's last words.
+            CardboxError: a node died; the text has the end of its log.
         """
         for name, process in self._processes.items():
             if process.poll() not in (None, 0):
@@ -72,15 +72,15 @@ class Nodes:
                 raise CardboxError(f"the node {name} ended with {process.returncode}:\n{words}")
 
     def pid(self, name: str) -> int:
-        """Return the number of the node's process."""
+        """Return the process ID of the node."""
         return self._processes[name].pid
 
     def text(self, name: str) -> str:
-        """Return what the node has printed so far."""
+        """Return the node's output so far."""
         return (self._logs / f"{name}.log").read_text(errors="replace")
 
     def is_running(self, name: str) -> bool:
-        """Return whether the node is still there."""
+        """Return whether the node's process is still running."""
         return self._processes[name].poll() is None
 
     def stop(self) -> None:
@@ -98,7 +98,7 @@ class Nodes:
 
 @contextmanager
 def running_nodes(logs: Path) -> Iterator[Nodes]:
-    """Context of nodes that are stopped at its end, whatever happens."""
+    """Context of nodes that are always stopped at its end."""
     nodes = Nodes(logs)
     try:
         yield nodes

@@ -1,4 +1,4 @@
-"""Quality of service of every topic (REP-2003), overridable; mismatches in plain words.
+"""Overridable quality of service of every topic (REP-2003), and texts about mismatches.
 
 Drivers publish reliable or best effort; subscribers of sensor data ask for best effort. Topics that
 describe a state (models, background) are latched: a late subscriber gets the last message.
@@ -24,23 +24,23 @@ SENSOR_DATA = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Reliable publishers match subscribers of either kind (REP-2003).
 CAMERA = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-# A queue of five lets the subscriber be late by some images; the publisher keeps only the latest.
+# With a queue of five, a subscriber may fall behind by some images.
 SILHOUETTE_INPUT = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 RESULT = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# As tf2's own broadcasters and listeners have it.
+# tf2's broadcasters and listeners use the same profile.
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# A recording may wait for a slow subscriber; no image is lost while 100 are queued.
+# A player can wait for a slow subscriber, and the queue holds 100 images.
 PLAYED = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# Calls wait while a node is busy; with ROS's default of ten, the oldest of more would be lost.
+# Calls wait while a node is busy, and ROS's default queue of ten could lose some.
 SERVICE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# For a subscriber that records a replay and must not miss a message.
+# A subscriber that records a replay must not lose a message.
 REPLAY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-# As tf2 listens: several programs publish, each of them latched.
+# tf2's listener uses the same profile, because several programs publish latched messages.
 STATIC_TRANSFORMS = QoSProfile(
     depth=100,
     reliability=ReliabilityPolicy.RELIABLE,
@@ -65,7 +65,7 @@ def overridable(profile: QoSProfile) -> QoSOverridingOptions:
 
 
 def copy_of(profile: QoSProfile) -> QoSProfile:
-    """Return a profile of the same policies; overriding one changes the object it is given."""
+    """Return a profile with the same policies, because an override changes the given object."""
     return QoSProfile(
         history=profile.history,
         depth=profile.depth,
@@ -75,7 +75,7 @@ def copy_of(profile: QoSProfile) -> QoSProfile:
 
 
 def mismatch_text(topic: str, kind: QoSPolicyKind, *, subscribing: bool) -> str:
-    """Say in plain words why a publisher and a subscriber of ``topic`` do not talk.
+    """Return an explanation of a QoS mismatch between publisher and subscriber of ``topic``.
 
     Args:
         topic: the resolved topic name.

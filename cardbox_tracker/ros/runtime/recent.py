@@ -1,4 +1,4 @@
-"""The latest messages, limited in number and in memory, whatever their size."""
+"""The latest images, limited in number and memory."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from collections.abc import Iterator
 from sensor_msgs.msg import Image
 
 MOST_BYTES = 64_000_000
-"""Memory for the images of one kind: all that is asked for up to 1920x1080 in grey."""
+"""Memory for the images of one topic; it suffices for grey images of up to 1920x1080."""
 
 
 class RecentImages:
-    """The latest images, the oldest first; older ones make room for a new one."""
+    """Queue of the latest images, the oldest first, which drops old images for new ones."""
 
     def __init__(self, count: int, most_bytes: int = MOST_BYTES) -> None:
-        """Keep at most ``count``, of ``most_bytes`` together; the latest is always kept."""
+        """Keep at most ``count`` images of ``most_bytes`` in total, and always the latest."""
         self._count, self._most_bytes = count, most_bytes
         self._images: deque[Image] = deque()
         self._bytes = 0
 
     def append(self, image: Image) -> None:
-        """Keep an image as the latest."""
+        """Add the latest image."""
         self._images.append(image)
         self._bytes += len(image.data)
         while len(self._images) > 1 and (
@@ -30,7 +30,7 @@ class RecentImages:
             self.popleft()
 
     def popleft(self) -> Image:
-        """Forget the oldest and return it."""
+        """Remove the oldest image and return it."""
         image = self._images.popleft()
         self._bytes -= len(image.data)
         return image

@@ -1,7 +1,7 @@
-"""Other nodes that use one of our topics with another message type, which nothing else reports.
+"""Detection of other nodes that use a topic with another message type.
 
-Between such nodes nothing passes. DDS has an event for it that Fast DDS does not raise, so the
-graph is asked.
+Such nodes exchange nothing. Fast DDS does not raise the DDS event for it, so the ROS graph is
+queried.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from rclpy.node import Node
 
 
 class TopicTypes:
-    """Compares the types of a node's topics with those that others give them."""
+    """Compares the message types of a node's topics with those of other nodes."""
 
     def __init__(self, node: Node) -> None:
-        """Compare for ``node``; :meth:`add` says which topics."""
+        """Begin without topics of ``node``; :meth:`add` adds one."""
         self._node = node
         self._types: dict[str, str] = {}
         self._said: set[str] = set()
 
     def add(self, topic: str, kind: Any) -> None:
-        """Compare the resolved name ``topic``, which this node uses for messages ``kind``."""
+        """Compare the resolved name ``topic``, on which this node uses messages ``kind``."""
         self._types[topic] = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
     def remarks(self) -> list[str]:
-        """Return a text for each topic that has several types now; log what is new."""
+        """Return a warning for each topic with several types, and log new ones."""
         found = []
         for topic, types in self._node.get_topic_names_and_types():
             own = self._types.get(topic)
@@ -46,8 +46,8 @@ class TopicTypes:
         )
         return [
             f"another node ({end.node_namespace.rstrip('/')}/{end.node_name}) {verb} {topic} as "
-            f"{end.topic_type}, this one as {own}: with a different message type, so nothing "
-            "passes between the two; give one of them another topic"
+            f"{end.topic_type}, this one as {own}; with a different message type, nothing passes "
+            "between the two: give one of them another topic"
             for verb, ends in asked
             for end in ends(topic)
             if end.topic_type != own

@@ -14,7 +14,7 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.evaluation.recorded.evaluate import evaluate_session, evaluate_sessions
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
-from cardbox_tracker.evaluation.recorded.tracking import track_session
+from cardbox_tracker.evaluation.recorded.tracking import InputSelection, track_session
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.session import synthesize_session
@@ -27,7 +27,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A synthetic session, laid out as the recorded ones are, with figures of MediaPipe beside."""
     folder = tmp_path_factory.mktemp("sessions") / "waves"
     folder.mkdir()
-    synthesize_session(folder / "bag", motion="wave", seed=1)
+    synthesize_session(folder / "bag", "wave", 1)
     (folder / "bag" / "ground_truth.json").rename(folder / "ground_truth.json")
     peer = {"ms_median": 12.5, "mean": {"motions": {"aligned": 9.9, "pa": 5.0, "joints": {}}}}
     (folder / "peer_mediapipe.json").write_text(json.dumps(peer))
@@ -81,7 +81,7 @@ def test_a_session_with_depth_images_is_tracked_with_them_too(
     results = evaluate_sessions([folder], tmp_path / "out", "default", (0,), jobs=1)
     alone, ranged = results["sessions"]
     with pytest.raises(CardboxError, match=r"ranged .*left; .*camera"):
-        track_session(load_session(folder), default_preset(), (0,), only="left")
+        track_session(load_session(folder), default_preset(), (0,), InputSelection("left"))
     assert (alone["name"], ranged["name"]) == ("ranged", "ranged, with depth")
     assert alone["runs"][0]["aligned"] != ranged["runs"][0]["aligned"] < LARGEST_ERROR_CM
 

@@ -11,7 +11,7 @@ from cardbox_tracker.evaluation.recorded.figures import lengths
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import SessionRun
-from cardbox_tracker.simulation.session import synthesize_session
+from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 BODY = BodyModel.of(hip_height_m=-0.6, camera_pitch_rad=np.radians(8.0))
 
@@ -19,7 +19,7 @@ BODY = BodyModel.of(hip_height_m=-0.6, camera_pitch_rad=np.radians(8.0))
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> RecordedSession:
     folder = tmp_path_factory.mktemp("lengths") / "bow"
-    synthesize_session(folder, "bow", fps=2.0, width=160, height=120, body=BODY)
+    synthesize_session(folder, "bow", form=SessionFormat(2.0, 160, 120), body=BODY)
     return load_session(folder)
 
 

@@ -1,4 +1,4 @@
-"""The outcome of an initialization, for programs."""
+"""Messages about the outcome of an initialization."""
 
 from __future__ import annotations
 

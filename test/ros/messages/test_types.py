@@ -1,4 +1,4 @@
-"""The types of a recording's topics, which anybody may have written."""
+"""Message types of a recording's topics, which are untrusted input."""
 
 from __future__ import annotations
 
@@ -58,5 +58,5 @@ def test_any_type_is_refused_in_words_unless_it_is_installed(topic: str, kind: s
         found = message_class(topic, kind)
     except BagError:
         return
-    # Hypothesis takes texts from the sources, too, where real types stand.
+    # Hypothesis also uses texts from the source code, which has real types.
     assert kind.endswith(f"_msgs/msg/{found.__name__}")

@@ -1,4 +1,4 @@
-"""A bus in place of DDS, on which tests talk to a node, and messages for it."""
+"""A bus that replaces DDS in tests of a node, and messages for it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cardbox_tracker.body.posture import JOINT_NAMES
 
 
 class Bus:
-    """Hands messages to the subscriptions of nodes, and keeps what they publish.
+    """Passes messages to the nodes' subscriptions, and records published messages.
 
     Attributes:
-        sent: the messages that were published, by the topic's full name.
+        sent: published messages by the topic's full name.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,25 +50,25 @@ class Bus:
         return node
 
     def send(self, topic: str, message: Any) -> None:
-        """Hand a message to the node that subscribes to ``topic``."""
+        """Pass a message to the node that subscribes to ``topic``."""
         self._subscribers[topic](message, {"source_timestamp": 0})
 
     def tick(self) -> Any:
-        """Run every timer once; return the status that a node has published of itself."""
+        """Run every timer once, and return the last published status of a node."""
         for callback in self._timers:
             callback()
         return self.sent["/diagnostics"][-1].status[0]
 
     def texts(self, topic: str) -> list[Any]:
-        """Return what the messages on ``topic`` hold."""
+        """Return the data of the messages on ``topic``."""
         return [message.data for message in self.sent[topic]]
 
     def advertise(self, publisher: Any) -> Any:
-        """As of IntraProcess; the publisher keeps the messages here already."""
+        """Replace the method of IntraProcess; the publisher already records messages."""
         return publisher
 
     def subscribe(self, topic: str, subscriber: Callable[..., None]) -> bool:
-        """As of IntraProcess: every subscription is this bus's."""
+        """Replace the method of IntraProcess; every subscription belongs to this bus."""
         self._subscribers[topic] = subscriber
         return True
 
@@ -91,7 +91,7 @@ def bus(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bus]:
 
 @pytest.fixture
 def joints() -> Callable[..., Any]:
-    """Make joint states of the tracker, with a stamp in tenths of a second."""
+    """Return a function that makes joint states with a stamp in tenths of a second."""
     from sensor_msgs.msg import JointState
 
     def make(tenth: int, values: dict[str, float], other: float = 0.0) -> Any:
@@ -104,7 +104,7 @@ def joints() -> Callable[..., Any]:
 
 
 class Hands:
-    """Stands for the nodes of one process: messages are handed over, not sent."""
+    """Replaces the intra-process topics of one process."""
 
     def __init__(self) -> None:
         self.takers: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""The cameras of the tracker, one or several: where they stand, and what they see at one time."""
+"""The tracker's cameras: their poses, and the synchronization of their messages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ S = 1_000_000_000
 
 
 class Ears:
-    """Stands for a node: hands messages to whoever subscribed."""
+    """Replaces a node: passes messages to its subscriptions."""
 
     def __init__(self) -> None:
         self.callbacks: dict[str, Any] = {}
@@ -53,7 +53,7 @@ def header(stamp_ns: int = 0, frame: str = "left_frame") -> Header:
 
 
 def info(name: str, baseline_m: float = 0.0) -> CameraInfo:
-    """What the background node sends for a camera at twice the working size."""
+    """Return the background node's CameraInfo for a camera at twice the working size."""
     large = camera_info_message(header(), CAMERA.scaled(128, 96))
     large.p[3] = -baseline_m * large.p[0]
     return camera_info_message(header(frame=f"{name}_frame"), CAMERA, large)
@@ -69,7 +69,7 @@ def transform(x_m: float, parent: str = "left_frame", child: str = "right_frame"
 
 
 class Listening:
-    """The poses of two cameras, and how often they were found."""
+    """The poses of two cameras, and the number of their changes."""
 
     def __init__(self, file: str = "") -> None:
         self.node = Ears()
@@ -98,7 +98,7 @@ def test_a_rectified_pair_says_itself_where_it_stands(listening: Listening) -> N
     assert listening.changes == 1
     assert poses.first == CAMERA
     np.testing.assert_allclose(poses.others[0].extrinsics.centre_m, [0.12, 0, 0], atol=1e-9)
-    # It is moved: tracking has to know.
+    # The camera has moved, and the tracker must learn it.
     listening.hear("right", 0.24)
     assert listening.changes == 2
     np.testing.assert_allclose(poses.others[0].extrinsics.centre_m, [0.24, 0, 0], atol=1e-9)
@@ -138,7 +138,7 @@ def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPat
 
 
 class Watching:
-    """What two cameras and a depth image showed together, or one camera alone."""
+    """Records the sets of two cameras and a depth image, or of one camera."""
 
     def __init__(self, depth: str = "depth", cameras: tuple[str, ...] = ("left", "right")) -> None:
         self.node = Ears()
@@ -197,12 +197,12 @@ def test_packed_depth_is_read_too() -> None:
     depth_m = watching.views[0].observations[0].depth_m
     assert depth_m is not None
     assert np.allclose(depth_m, 1.7)
-    # The camera is that of the topic without the plugin's name.
+    # The CameraInfo belongs to the topic without the plugin's name.
     assert "/depth/camera_info" in watching.node.callbacks
 
 
 def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:
-    # The same place, twice the size, and the principal point 10 px further to the right.
+    # The depth camera has twice the size, and its principal point is 10 px further to the right.
     own = Camera(128, 96, 120.0, 120.0, 73.5, 47.5)
     watching.node.hear("/depth/camera_info", camera_info_message(header(), own))
     depth = np.zeros((96, 128))
@@ -212,7 +212,7 @@ def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watchin
     watching.show("left", S)
     found = watching.views[0].observations[0].depth_m
     assert found is not None
-    # Right of the optical axis in one is right of it in the other.
+    # A point to the right of one optical axis is to the right of the other.
     assert np.all(found[:, :31] == 0)
     assert np.all(found[:, 33:58] == 3.0)
 
@@ -223,7 +223,7 @@ def test_without_the_first_camera_the_earliest_image_gives_the_stamp(watching: W
     assert watching.views[-1].header.frame_id == "left_frame"
     assert watching.views[-1].observations[0].silhouette is None
     assert not watching.views[-1].picture().any()
-    # Depth alone is nothing to track.
+    # A set with only a depth image is not delivered.
     count = len(watching.views)
     for number in range(20, 30):
         watching.show_depth(number * S // 10, np.ones((48, 64)))
@@ -286,7 +286,7 @@ def test_one_camera_is_a_list_of_one() -> None:
     alone.source.wait_for_images(False)
     pixels = np.zeros((48, 64), np.uint8)
     alone.node.hear("/silhouette/image", image_message(header(S), pixels, "mono8"))
-    # Every message is handed on: the node counts those that come twice or too late.
+    # Every message is delivered, because the node counts repeated and late ones.
     for stamp_ns in (S, S, 3 * S, 2 * S):
         alone.show("", stamp_ns)
     assert [view.observations[0].stamp_ns for view in alone.views] == [S, S, 3 * S, 2 * S]

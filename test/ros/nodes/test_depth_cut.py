@@ -1,4 +1,4 @@
-"""Images are cut out by the depth image of their time, and what is wrong with it is said."""
+"""Silhouettes are cut out by the depth image of the same time, and faults are reported."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
 
 class Node:
-    """Stands for the background node: keeps who hears what, and what it waits for."""
+    """Replaces the background node: records subscriptions and missing inputs."""
 
     def __init__(self) -> None:
         self.heard: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""The initializer takes the distance from depth images, and says what is missing for it."""
+"""The initializer measures the distance with depth images, and reports missing ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SECOND = 1_000_000_000
 
 
 class Node:
-    """Stands for the initializer: keeps who hears what."""
+    """Replaces the initializer: records subscriptions."""
 
     def __init__(self) -> None:
         self.heard: dict[str, Callable[[Any, int], None]] = {}
@@ -47,7 +47,7 @@ class Node:
         self.heard[topic] = callback
 
     def see(self, second: int, depth_m: float) -> None:
-        """Receive a depth image of twice the working resolution, of the same depth everywhere."""
+        """Receive a depth image of uniform depth at twice the working resolution."""
         pixels = np.full((240, 320), 1000 * depth_m, np.uint16)
         header = Header(frame_id="eye", stamp=Time(sec=second))
         self.heard["depth"](image_message(header, pixels, "16UC1"), 1)
@@ -74,7 +74,7 @@ def distance(node: Node) -> DepthDistance:
 
 
 def measure(at: InitializationConfig, _: bool) -> InitializationResult:
-    """Stands for the camera's measurement: any distance gives the same outlines."""
+    """Replace the camera's measurement; any distance gives the same silhouettes."""
     body = scaled(BODY, at.distance_m / BODY.placement.distance_m)
     return InitializationResult(body, {"front": 0.9}, {}, {})
 

@@ -1,4 +1,4 @@
-"""The tables of docs/topics.md are what the nodes have; the layouts show what is published."""
+"""The nodes have the topics of docs/topics.md, and the layouts show published topics."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ ARM = {
     "robot_file": str(ROOT / "config" / "example_arm.urdf"),
     "joint_map_file": str(ROOT / "config" / "example_joint_map.yaml"),
 }
-# What rclpy adds to every node.
+# rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
 ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 BAG_TOPIC = "/of_the_bag/camera_info"
@@ -62,7 +62,7 @@ class Topic(NamedTuple):
 
 
 def table(node: str) -> tuple[set[Topic], set[str]]:
-    """Topics and services that the document gives to a node; full names in the root namespace."""
+    """Return the documented topics and services of a node by full name."""
     text = (ROOT / "docs" / "topics.md").read_text(encoding="utf-8")
     section = text.split(f"\n## {node}\n")[1].split("\n## ")[0]
     rows = re.findall(r"(?m)^\| `(\S+)` \| (in|out) \| (\S+) \| ([^|]+) \|", section)
@@ -240,7 +240,7 @@ def test_foxglove_shows_what_is_published() -> None:
 
 
 def test_foxgloves_person_moves_with_the_transforms_of_a_recording() -> None:
-    """A URDF layer without a control mode follows the transforms: those of the bag's /tf."""
+    """A URDF layer without a control mode follows the transforms of the bag's /tf."""
     layout = json.loads((ROOT / "config" / "cardbox_foxglove.json").read_text(encoding="utf-8"))
     panel = layout["configById"]["3D!person"]
     layer = panel["layers"]["person"]
@@ -255,7 +255,7 @@ REMAPPED = re.compile(r"-r ([\w/]+):=")
 
 
 def lines_that_start(node: str) -> list[str]:
-    """Command lines of that node in the documents, ``ros2 run`` or not."""
+    """Return the command lines of a node in the documents, with or without ``ros2 run``."""
     text = "\n".join(
         path.read_text(encoding="utf-8").replace("\\\n", " ")
         for path in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]

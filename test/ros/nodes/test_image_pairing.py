@@ -1,4 +1,4 @@
-"""Silhouettes and their images find each other by stamp, alone and between nodes over DDS."""
+"""Silhouettes and images are paired by stamp, inside one process and over DDS."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def message(number: int) -> Image:
 
 
 class Delivered:
-    """What a pairing handed on: numbers of silhouette and image."""
+    """Records the delivered numbers of silhouette and image."""
 
     def __init__(self) -> None:
         self.pairs: list[tuple[int, int | None]] = []
@@ -97,7 +97,7 @@ def test_nobody_waits_for_images_that_never_came_or_ceased() -> None:
     assert delivered.pairs == [(1, None), (2, None)]
     delivered.image(3)
     delivered.silhouette(3, *range(10, 20))
-    # After five in vain the rest is handed on at once.
+    # After five silhouettes without an image, the next ones do not wait.
     assert delivered.pairs[2:] == [(3, 3), *((number, None) for number in range(10, 20))]
 
 
@@ -161,7 +161,7 @@ def test_captures_keep_the_images_of_their_silhouettes() -> None:
 def graph(
     tmp_path: Path, make_node: Callable[..., Any]
 ) -> Iterator[Callable[[bool, bool], tuple[Any, Any]]]:
-    """Return a function that starts background and tracker, in one hand or over DDS."""
+    """Return a function that starts background and tracker, in one process or over DDS."""
     probe = make_node(name="probe")
     executor = SingleThreadedExecutor(context=probe.context)
     executor.add_node(probe)
@@ -221,7 +221,7 @@ def test_the_tracker_gets_silhouette_and_image_of_one_stamp(
         number += 1
         image = np.clip(90 + rng.normal(0, 2, (240, 320, 3)), 0, 255).astype(np.uint8)
         if number > 12:
-            # Its colour is its number.
+            # The colour of the image encodes its number.
             image[person] = (200, 30, number % 200)
         header = Header(frame_id="camera", stamp=Time(sec=number))
         infos.publish(conversions.camera_info_message(header, CAMERA))

@@ -1,4 +1,4 @@
-"""What the initializer says and shows while it guides, without other nodes."""
+"""The outputs of the initializer's guidance, without other nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SILHOUETTE = image_message(Header(), np.zeros((60, 80), np.uint8), "mono8")
 
 
 class Node:
-    """Keeps what is published, and has a subscriber of each topic or none."""
+    """Records published messages, and has one subscriber per topic or none."""
 
     def __init__(self, subscribers: int = 1) -> None:
         self.subscribers = subscribers
@@ -87,7 +87,7 @@ def test_an_image_is_drawn_on_for_a_subscriber_only() -> None:
         guide.draw(SILHOUETTE, seen, CAMERA, settings)
         (image,) = node.sent["overlay"]
         corners.append(list(image.data[-3:]))
-    # Darker, since nobody is there; an image of another size is not this one's.
+    # The image is darkened without a person, and an image of another size is not used.
     assert corners == [[0, 0, 0], [10, 20, 30], [0, 0, 0]]
     node = Node(subscribers=0)
     guide = outputs(node)

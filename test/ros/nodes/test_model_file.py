@@ -1,4 +1,4 @@
-"""``model_file``: checked at the start, and no measurement is lost where it cannot be written."""
+"""``model_file`` is checked at the start, and a failed write does not lose the measurement."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BODY = BodyModel.of(distance_m=2.3)
 
 @pytest.fixture
 def context(ros_domain: int) -> Iterator[Context]:
-    # Nodes whose construction fails live on for a while; here nobody meets them.
+    # Nodes whose construction fails live on for a while, so they get their own context.
     context = Context()
     rclpy.init(context=context, domain_id=ros_domain)
     yield context

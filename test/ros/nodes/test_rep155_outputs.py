@@ -1,4 +1,4 @@
-"""What libhri reads of a body: its URDF, and in a list of hri_msgs that it is there."""
+"""The topics that libhri reads: a body's URDF, and the list of bodies from hri_msgs."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ PLACE = "/humans/bodies/p1"
 
 
 class IdsList(SimpleNamespace):
-    """As hri_msgs has it."""
+    """Replaces the message of hri_msgs."""
 
 
 class Recorder:
-    """A node that keeps what is published."""
+    """A node that records published messages."""
 
     def __init__(self) -> None:
         self.sent: dict[str, list[Any]] = {}

@@ -1,4 +1,4 @@
-"""The node ``retarget`` commands a robot only while the tracker is sure."""
+"""The node ``retarget`` commands a robot only while the posture is certain."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COMMANDS, SAID = "/retarget/commands", "/retarget/status"
 
 @pytest.fixture
 def robot(bus: Any) -> Any:
-    """The bus of a node that moves an arm."""
+    """Return the bus of a node that moves an arm."""
     joint_map = str(CONFIG / "example_joint_map.yaml")
     bus.start(RetargetNode, robot_file=str(CONFIG / "example_arm.urdf"), joint_map_file=joint_map)
     bus.send("/body_model", MODEL)
@@ -35,7 +35,7 @@ def robot(bus: Any) -> Any:
 
 @pytest.fixture
 def send(robot: Any, joints: Any) -> Callable[..., None]:
-    """Hand the node what the tracker sends of one image."""
+    """Return a function that sends the tracker's messages of one image."""
 
     def hand_over(tenth: int, state: str = "tracking", deviation: float = 0.1) -> None:
         robot.send("/tracking_state", String(data=state))
@@ -53,7 +53,7 @@ def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(robot: Any,
     robot.send("/tracking_state", String(data="lost"))
     robot.send("/tracking_state", String(data="lost"))
     assert robot.texts(SAID) == ["moving", "frozen: lost"]
-    assert len(robot.sent[COMMANDS]) == 4  # standing still is said once
+    assert len(robot.sent[COMMANDS]) == 4  # the command to stand still is sent once
     assert robot.texts(COMMANDS)[-1].tolist() == pytest.approx([-0.2, 0, 0])
     last = robot.sent["/retarget/joint_trajectory"][-1]
     assert last.joint_names == ["shoulder_roll", "shoulder_pitch", "elbow_pitch"]

@@ -1,4 +1,4 @@
-"""What arrives is kept within bounds, whatever its size, and what is no silhouette is not kept."""
+"""The memory for received images is limited, and only silhouettes are kept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The node ``rula`` scores what the tracker publishes, and says nothing of half a pair."""
+"""The node ``rula`` scores postures, and publishes nothing without their deviations."""
 
 from __future__ import annotations
 

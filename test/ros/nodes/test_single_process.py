@@ -1,4 +1,4 @@
-"""What all nodes in one process cannot do."""
+"""Limits of all nodes in one process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cardbox_tracker.ros.nodes import single_process
 
 
 class Node:
-    """Stands in for a node of any kind; the tracker has several cameras."""
+    """Replaces a node of any kind; the tracker has several cameras."""
 
     closed: list[str] = []  # noqa: RUF012
 

@@ -1,4 +1,4 @@
-"""Stamps that are zero, repeat or jump, as the tracker and the pairing take them."""
+"""Tracker and pairing with stamps that are zero, repeat or jump."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ S = 10**9
 
 
 class Fed:
-    """A tracker node that is handed silhouettes; what it tracked, and how often it began."""
+    """A tracker node with its tracked stamps and its number of starts."""
 
     def __init__(self, node: TrackerNode, hands: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.node, self._hands = node, hands

@@ -1,4 +1,4 @@
-"""What the node stereo_depth publishes, of pairs that are handed to it."""
+"""The depth images of the node stereo_depth."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_depth_of_a_wall(bus: Any) -> None:
     assert info.k[0] == CAMERA.fx
     metres = np.frombuffer(depth.data, np.float32).reshape(240, 320)
     assert np.nanmedian(metres) == pytest.approx(DEPTH_M, rel=0.02)
-    # Left of what the right camera sees nothing is known.
+    # At the left border, depth is unknown because the right camera does not see it.
     assert np.isnan(metres[:, : DISPARITY - 4]).all()
     assert np.isfinite(metres[20:-20, 60:-20]).mean() > 0.9
 
@@ -81,7 +81,7 @@ def test_what_is_no_rectified_pair_is_said(bus: Any) -> None:
     bus.send("/left/image_raw", left)
     bus.send("/right/image_raw", right)
     assert bus.sent["/depth"] == []
-    for stamp_ms, p03, text in ((80, 0.0, "no rectified pair"), (120, 30.0, "left camera the")):
+    for stamp_ms, p03, text in ((80, 0.0, "not a rectified pair"), (120, 30.0, "left camera the")):
         give_infos(bus, p03)
         left, right = pair(stamp_ms, stamp_ms)
         bus.send("/left/image_raw", left)

@@ -1,4 +1,4 @@
-"""With publish_tf the tracker says on /tf what robot_state_publisher would."""
+"""With publish_tf the tracker publishes the transforms of robot_state_publisher."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FOUND = Estimate(TRACKING, reference_posture("arms"), offset_m=np.array([0.25, -
 
 
 class TFMessage(SimpleNamespace):
-    """As tf2_msgs has it, which PyPI has not."""
+    """Replaces the message of tf2_msgs, which is not on PyPI."""
 
 
 def published(*estimates: Estimate, **settings: bool) -> list[Any]:
@@ -60,7 +60,7 @@ def test_every_link_is_sent_in_the_posture_of_its_image() -> None:
     joints = joint_values(FOUND)
     assert joints is not None
     expected = LinkTransforms(urdf_from_body(BODY, "eye")).at(positions_of(joints))
-    # 14 joints, hips, neck, two wrists, and the camera's optical frame.
+    # There are 14 joints, hips, neck, two wrists, and the camera's optical frame.
     assert len(message.transforms) == len(expected) == 19
     for sent, link in zip(message.transforms, expected, strict=True):
         assert (sent.header.frame_id, sent.child_frame_id) == (link.parent, link.child)

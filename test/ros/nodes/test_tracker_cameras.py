@@ -1,4 +1,4 @@
-"""The tracker node with two cameras: both count, any may be silent, and the fit of each is told."""
+"""The tracker node with two cameras: either may be silent, and the fit of each is reported."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_each_fit_is_told_and_a_camera_may_be_silent(node: TrackerNode, hands: A
     both = show(0, ("left", "right"))
     assert (both["images tracking"], both["left late"], both["right late"]) == ("10", "0", "0")
     assert min(float(both[f"{name} iou"]) for name in ("left", "right")) > 0.6
-    # The other one is waited for a little, so the last images are not yet tracked.
+    # The node waits for the other camera, so the last images are not yet tracked.
     alone = show(10, ("right",))
     assert int(alone["images tracking"]) > 14
     assert alone["left iou"] == "sees nobody"

@@ -1,4 +1,4 @@
-"""What the tracker node publishes of place and state, with a tracker that is told what to find."""
+"""The place and the state on the tracker node's topics, with a fake tracker."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ WAIT_S = 30.0
 
 
 def found(state: str) -> Estimate:
-    """An estimate 0.25 m nearer and 0.05 m lower than the person was measured."""
+    """Return an estimate 0.25 m nearer and 0.05 m lower than the measured person."""
     body = Estimate(state, offset_m=PLACE).placed(BODY)
     points_m = CAMERA.reference_to_optical(keypoints_m(body, POSTURE))
     return Estimate(
@@ -53,7 +53,7 @@ def found(state: str) -> Estimate:
 
 
 class Told(Tracker):
-    """Finds what ``says`` holds."""
+    """Returns the estimate in ``says``."""
 
     says = Estimate(LOST)
 
@@ -62,7 +62,7 @@ class Told(Tracker):
 
 
 class Graph:
-    """A tracker node, and a node that shows it silhouettes and listens."""
+    """A tracker node, and a node that sends silhouettes and receives the results."""
 
     def __init__(self, **parameters: Any) -> None:
         self._context = Context()
@@ -90,7 +90,7 @@ class Graph:
     def wait(self, condition: Callable[[], Any]) -> Any:
         end = time.monotonic() + WAIT_S
         while not (value := condition()):
-            # An image is several messages: those in and those out.
+            # Each image needs several input and output messages.
             for _ in range(10):
                 self._executor.spin_once(timeout_sec=0.02)
             assert time.monotonic() < end, "it did not come"
@@ -113,7 +113,7 @@ class Graph:
         condition: Callable[[], Any],
         seen: np.ndarray | None = None,
     ) -> None:
-        """Show images until ``condition`` holds: subscribers are found one by one."""
+        """Show images until ``condition`` holds, because DDS matches topics one by one."""
 
         def is_there() -> Any:
             value = condition()
@@ -133,7 +133,7 @@ class Graph:
 
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Graph]]:
-    """Start a tracker node with parameters; its person is measured already."""
+    """Return a function that starts a tracker node with a measured person."""
     monkeypatch.setattr(tracker_node, "Tracker", Told)
     save_body_model(BODY, tmp_path / "person.yaml")
     made: list[Graph] = []
@@ -222,5 +222,5 @@ def test_the_overlay_is_drawn_on_the_image_or_else_on_the_silhouette(
 
     graph.show_until(found(TRACKING), lambda: corner() == [0, 0, 0])
     graph.show_until(found(TRACKING), lambda: corner() == [30, 60, 90], wall)
-    # Without images again, as when the background node is another's.
+    # A different background node may not publish images.
     graph.show_until(found(TRACKING), lambda: corner() == [0, 0, 0])

@@ -1,4 +1,4 @@
-"""A whole number in a YAML file is a number: ``threshold: 3`` where the default is 3.5."""
+"""A float parameter accepts an integer of a YAML file, such as ``threshold: 3``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GIVEN = {"play_bag": {"bag": "bag"}}
 
 
 def whole(default: float, lowest: float | None, highest: float | None) -> int | None:
-    """The whole number of the range nearest to the default; None if there is none."""
+    """Return the integer of the range nearest to the default, or None."""
     number = round(default) if lowest is None else max(round(default), math.ceil(lowest))
     return number if highest is None or number <= highest else None
 

@@ -1,4 +1,4 @@
-"""Nodes explain themselves, and do not start with words that mean nothing to them."""
+"""Nodes print help, and refuse unknown arguments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Losses are seen by the stamps, and what a node says of itself changes with its state."""
+"""Losses are detected by the stamps, and the status follows the state of the node."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_a_result_that_takes_longer_than_a_period_is_late(make_node: Callable) -
 
 
 class Logged:
-    """What a node logs, in place of its logger."""
+    """Replaces a node's logger and records its lines."""
 
     def __init__(self, node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         self.lines: list[str] = []
@@ -137,7 +137,7 @@ class Logged:
 def clocked(
     node: Any, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[NodeDiagnostics, Logged, list[float]]:
-    """Diagnostics of images, what ``node`` logs, and the time, in seconds, to be set."""
+    """Return diagnostics, the log of ``node``, and a settable time in seconds."""
     diagnostics = NodeDiagnostics(node)
     logged = Logged(node, monkeypatch)
     now = [time.monotonic()]

@@ -1,4 +1,4 @@
-"""Nodes of one process are handed the message itself; everybody else gets it by DDS."""
+"""Nodes of one process get the message object itself; other nodes get it over DDS."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_an_error_of_one_taker_is_its_own(make: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_what_is_not_handed_over_goes_by_dds(make: Callable[..., Any], shared: bool) -> None:
-    """A topic that is only advertised, or nodes that share nothing."""
+    """Topics without intra-process subscription, and nodes without shared process."""
     intra_process = IntraProcess() if shared else None
     giver, taker = make("giver", intra_process), make("taker", intra_process)
     offer = giver.advertise if shared else giver.advertise_inside
@@ -101,7 +101,7 @@ def test_other_processes_get_it_too(make: Callable[..., Any]) -> None:
 
 
 def hear(node: Any, publisher: Any, taken: list[str]) -> None:
-    """Publish until ``node`` took it by DDS, never within the call."""
+    """Publish until ``node`` got a message over DDS, which never happens within the call."""
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     end = time.monotonic() + 30

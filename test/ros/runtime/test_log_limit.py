@@ -1,4 +1,4 @@
-"""No input can fill a log: texts are limited by their kind."""
+"""No input can fill a log, because texts are limited by their kind."""
 
 from __future__ import annotations
 

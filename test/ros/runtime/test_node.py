@@ -1,4 +1,4 @@
-"""What all nodes share while they run."""
+"""Common behaviour of running nodes."""
 
 from __future__ import annotations
 

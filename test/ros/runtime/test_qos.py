@@ -1,4 +1,4 @@
-"""A mismatch of QoS is told in plain words, with what to do."""
+"""The text about a mismatch of QoS has the cause and the remedy."""
 
 from __future__ import annotations
 
