@@ -1,7 +1,7 @@
 """Settings of the core: what each does, its unit, its range, declared once with its default.
 
-A field of a settings dataclass is made by :func:`setting`; the parameters of the nodes and their
-documentation take all of it from there.
+A field of a settings dataclass, a :class:`Settings`, is made by :func:`setting`; the parameters of
+the nodes and their documentation take all of it from there.
 """
 
 from __future__ import annotations
@@ -120,6 +120,18 @@ def check(instance: Any) -> None:
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
+
+
+class Settings:
+    """Base of settings dataclasses: the ranges are checked when one is made.
+
+    Raises:
+        ValueError: a value is not allowed; the text names it.
+    """
+
+    def __post_init__(self) -> None:
+        """Check every setting."""
+        check(self)
 
 
 def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:

@@ -163,15 +163,13 @@ def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thick
             cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
 
 
-def draw_text(
-    canvas: ImageArray, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
-) -> None:
-    """Write ``text`` into the upper left corner of ``canvas``, in place; lines count downwards."""
+def draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:
+    """Write ``text`` into the upper left corner of ``canvas``, in place."""
     scale = canvas.shape[1] / 700
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
     (width, height), below = cv2.getTextSize(text, font, size, thickness)
     margin = round(8 * scale)
-    left, bottom = margin, margin + height + line * (height + below + margin)
+    left, bottom = margin, margin + height
     # A dark background makes the text readable before any wall.
     corner = (left + width + margin // 2, bottom + below)
     cv2.rectangle(

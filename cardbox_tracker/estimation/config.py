@@ -12,7 +12,7 @@ from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
-from cardbox_tracker.settings import NoEffectError, changed, check, setting
+from cardbox_tracker.settings import NoEffectError, Settings, changed, setting
 
 FILTERS = ("hierarchical", "whole_body")
 """Every name that ``filter`` may have."""
@@ -39,7 +39,7 @@ _OF_WHOLE_BODY = MappingProxyType({"survivors": "torso.survival_rate", "average"
 
 
 @dataclass(frozen=True)
-class FilterConfig:
+class FilterConfig(Settings):
     """One particle filter, as one column of the paper's Table I."""
 
     particles: int = setting(
@@ -72,17 +72,9 @@ class FilterConfig:
         restarts=True,
     )
 
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
-
 
 @dataclass(frozen=True)
-class TrackerConfig:
+class TrackerConfig(Settings):
     """The hierarchy of filters and what goes beyond the paper; the defaults are the paper's.
 
     Attributes:
@@ -154,7 +146,7 @@ class TrackerConfig:
         Raises:
             ValueError: a value is out of range; the text names it.
         """
-        check(self)
+        super().__post_init__()
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")

@@ -164,13 +164,11 @@ class BagWriter:
         )
         self.write(topic, message, stamp_ns)
 
-    def write_compressed(
-        self, topic: str, stamp_ns: int, frame_id: str, data: bytes, kind: str = "jpeg"
-    ) -> None:
-        """Write JPEG or PNG bytes as a CompressedImage."""
+    def write_compressed(self, topic: str, stamp_ns: int, frame_id: str, data: bytes) -> None:
+        """Write JPEG bytes as a CompressedImage."""
         message = self.type("sensor_msgs/msg/CompressedImage")(
             header=self.header(stamp_ns, frame_id),
-            format=kind,
+            format="jpeg",
             data=np.frombuffer(data, np.uint8),
         )
         self.write(topic, message, stamp_ns)

@@ -29,19 +29,12 @@ class Within(NamedTuple):
 class DepthSilhouetteSource(SilhouetteSource):
     """The images of one bag that have a depth image, and whoever is near in it."""
 
-    def __init__(
-        self,
-        bag: BagReader,
-        within: Within,
-        size: tuple[int, int] = WORKING_SIZE,
-        camera: str | None = None,
-    ) -> None:
+    def __init__(self, bag: BagReader, within: Within, camera: str | None = None) -> None:
         """Prepare to read.
 
         Args:
             bag: an open recording.
             within: what is cut out.
-            size: working resolution (width, height), px.
             camera: namespace of the camera; without it, the recording has only one.
 
         Raises:
@@ -55,7 +48,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "
                 f"{most_m:g} m, between the person and the wall"
             )
-        self._open(bag, size, camera)
+        self._open(bag, WORKING_SIZE, camera)
         self._within, self.depth_topic = within, within.topic
         self._without = 0
 

@@ -209,18 +209,6 @@ class WholeBodyCost:
             ratings += self._scale * term.postures(states)
         return ratings, costs_px, areas_px
 
-    def share_silhouette(self, other: WholeBodyCost) -> None:
-        """Take over the silhouette of ``other``, of another body before the same camera."""
-        self._seen, self.anchor = other._seen, other.anchor
-        self.silhouette_px, self._scale = other.silhouette_px, other._scale
-
-    def outline_rating(self, state: FloatArray) -> float:
-        """Return the rating of a state (14,) without further terms."""
-        terms, self.terms = self.terms, ()
-        rating = float(self.bodies(state[None])[0][0])
-        self.terms = terms
-        return rating
-
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
         points = np.empty((6, 3))

@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cardbox_tracker.estimation.cost.pose_prior import FLOOR_NATS
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class WholeBodyCostConfig:
+class WholeBodyCostConfig(Settings):
     """The drawn model, the part of the image that counts, and the priors.
 
     A prior is a sum of squares, each of a value in its unit and none above its cap, so that an
@@ -143,11 +143,3 @@ class WholeBodyCostConfig:
         limits=(0.1, 50.0),
         restarts=True,
     )
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)

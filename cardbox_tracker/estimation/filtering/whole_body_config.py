@@ -11,7 +11,7 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 # Numbers of states that `effort` scales, and the least that the search needs of each.
 _LEAST_TOTALS = MappingProxyType(
@@ -33,7 +33,7 @@ _LEAST_PARTS = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class WholeBodyConfig:
+class WholeBodyConfig(Settings):
     """Numbers of states, noise, and thresholds; see ``docs/architecture.md`` for the steps.
 
     Attributes:
@@ -250,7 +250,7 @@ class WholeBodyConfig:
         Raises:
             ValueError: a value is out of range, or values do not go together; the text says which.
         """
-        check(self)
+        super().__post_init__()
         special = self.arm_mirrors + self.arm_tips + self.banked_arms
         if special >= self.arms:
             raise ValueError(f"arms is {self.arms}; expected more than the {special} special ones")

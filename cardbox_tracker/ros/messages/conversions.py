@@ -44,7 +44,7 @@ def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS)
             more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, None, most_pixels)
+        return decode_compressed(message.data, most_pixels)
     return decode_as_sent(*image_parts(message), most_pixels)
 
 
