@@ -45,18 +45,12 @@ class SilhouetteTerm(ABC):
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
 
-    def frame(
-        self,
-        silhouette: Silhouette,
-        image: Image | None = None,
-        posture: FloatArray | None = None,
-    ) -> Frame:
+    def frame(self, silhouette: Silhouette, image: Image | None = None) -> Frame:
         """Return a frame for this and all other terms.
 
         Args:
             silhouette: (H, W), 0 or 255.
             image: (H, W) grey or (H, W, 3) bgr of the same moment, or None.
-            posture: of the frame before, or None.
 
         Raises:
             ValueError: ``silhouette`` or ``image`` has not the camera's size.
@@ -68,7 +62,7 @@ class SilhouetteTerm(ABC):
             ):
                 raise ValueError(f"{name} has shape {pixels.shape}; the camera's is {size}")
         upper = np.ascontiguousarray(silhouette[: self.rows])
-        return Frame(silhouette, self.rows, cv2.countNonZero(upper), image, posture)
+        return Frame(silhouette, self.rows, cv2.countNonZero(upper), image)
 
     @abstractmethod
     def observe(self, frame: Frame) -> SilhouetteObservation:

@@ -195,6 +195,14 @@ def _info(
     )
 
 
+def is_same_info(one: CameraInfo, other: CameraInfo) -> bool:
+    """Return whether two CameraInfo describe the same camera, at any times."""
+    return one.header.frame_id == other.header.frame_id and all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in ("width", "height", "k", "d", "r", "p")
+    )
+
+
 def camera_of(message: CameraInfo) -> Camera:
     """Return the pinhole camera of a ``silhouette/camera_info``.
 
