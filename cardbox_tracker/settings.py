@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -101,6 +102,10 @@ def setting(
     lowest, highest = limits or (None, None)
     made = Setting(description, unit, lowest, highest, choices, restarts)
     return field(default=default, metadata={"setting": made})
+
+
+restarting = partial(setting, restarts=True)
+"""A :func:`setting` with which tracking has to start again when it changes."""
 
 
 def settings_of(kind: Any) -> dict[str, Setting]:
