@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,16 +108,11 @@ class BagReader:
                 f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
             ) from None
         if self._reader.message_count == 0:
-            self.__exit__(None, None, None)
+            self.__exit__()
             raise BagError(f"the recording {self.path} has no messages; record it again")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the recording."""
         if self._reader is not None:
             with suppress(AnyReaderError):

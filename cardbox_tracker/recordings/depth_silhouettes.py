@@ -9,8 +9,8 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
-from cardbox_tracker.vision.background import brightness_of
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
+from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
 
 

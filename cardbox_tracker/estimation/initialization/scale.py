@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import TORSO_Y, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BodyModelError, CameraError, InitializationError
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
@@ -189,7 +188,7 @@ def _share(
     cost = WholeBodyCost(view.body, view.camera, WholeBodyCostConfig(weight=0.0))
     shares = []
     for name, silhouette in references.items():
-        state = _held(name, there)
+        state = there.reference_state(name)
         seen = view.states(state)
         cost.see(view.upright(silhouette, is_mask=True), seen)
         shares.append(float(cost.bodies(seen[None])[0][0]) if cost.silhouette_px else 1.0)
@@ -200,14 +199,7 @@ def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -
     """Return the mean share of the visible surface that differs from the depth images."""
     term = DepthTerm(_TERM, body, camera)
     shares = [
-        float(term.observe(frame).postures(_held(name, body)[None])[0]) / term.body_px
+        float(term.observe(frame).postures(body.reference_state(name)[None])[0]) / term.body_px
         for name, frame in frames.items()
     ]
     return float(np.mean(shares)) + _TERM.expected
-
-
-def _held(name: str, body: BodyModel) -> FloatArray:
-    """Return the state (14,) of a reference posture at the measured place."""
-    state = np.append(reference_posture(name), [0.0, 0.0])
-    state[TORSO_Y] = body.placement.lateral_m
-    return state

@@ -27,7 +27,7 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import check, settings_of
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from tools import parameter_docs
 from tools.parameter_docs import NODES
 
