@@ -25,11 +25,11 @@ from benchmarks.tools import (
 )
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.posture import N_JOINTS, clip_to_limits, reference_posture
-from cardbox_tracker.body.volumetric import volumetric_faces
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset, paper_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.tracker import Tracker
 from experiments.models import make_silhouette_term
+from experiments.volumetric import volumetric_faces
 
 RESOLUTIONS = ((160, 120), (320, 240), (640, 480), (1280, 960))
 PARTICLES = (60, 300, 600, 3000, 6000, 12_000, 20_001, 30_000, 60_000)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scene import BenchmarkScene
-from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 
 WARM_UP = 5
 """Number of first images that do not count, as they allocate memory and compile code."""

@@ -40,13 +40,10 @@ if TYPE_CHECKING:
     from cardbox_tracker.estimation.initialization.measure import initialize_body
     from cardbox_tracker.estimation.observation import Observation
     from cardbox_tracker.estimation.tracker import Tracker
-    from cardbox_tracker.vision.background import (
-        BackgroundConfig,
-        BackgroundLearner,
-        BackgroundModel,
-        SilhouetteExtractor,
-    )
+    from cardbox_tracker.vision.background import SilhouetteExtractor
+    from cardbox_tracker.vision.background_config import BackgroundConfig
     from cardbox_tracker.vision.camera import Calibration, Camera, load_calibration
+    from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
     from cardbox_tracker.vision.extrinsics import Extrinsics
     from cardbox_tracker.vision.extrinsics_files import load_extrinsics
 
@@ -114,13 +111,10 @@ _MODULES = {
     "estimation.estimate": ("Estimate",),
     "estimation.observation": ("Observation",),
     "estimation.tracker": ("Tracker",),
-    "vision.background": (
-        "BackgroundConfig",
-        "BackgroundLearner",
-        "BackgroundModel",
-        "SilhouetteExtractor",
-    ),
+    "vision.background": ("SilhouetteExtractor",),
+    "vision.background_config": ("BackgroundConfig",),
     "vision.camera": ("Calibration", "Camera", "load_calibration"),
+    "vision.empty_scene": ("BackgroundLearner", "BackgroundModel"),
     "vision.extrinsics": ("Extrinsics",),
     "vision.extrinsics_files": ("load_extrinsics",),
 }

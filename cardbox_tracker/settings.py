@@ -1,7 +1,7 @@
 """Settings of the core: what each does, its unit, its range, declared once with its default.
 
-A field of a settings dataclass is made by :func:`setting`; the parameters of the nodes and their
-documentation take all of it from there.
+A field of a settings dataclass, a :class:`Settings`, is made by :func:`setting`; the parameters of
+the nodes and their documentation take all of it from there.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -103,6 +104,10 @@ def setting(
     return field(default=default, metadata={"setting": made})
 
 
+restarting = partial(setting, restarts=True)
+"""A :func:`setting` with which tracking has to start again when it changes."""
+
+
 def settings_of(kind: Any) -> dict[str, Setting]:
     """Return the settings of a dataclass or an instance of one, by name, in order."""
     return {
@@ -120,6 +125,18 @@ def check(instance: Any) -> None:
     """
     for name, one in settings_of(instance).items():
         one.check(name, getattr(instance, name))
+
+
+class Settings:
+    """Base of settings dataclasses: the ranges are checked when one is made.
+
+    Raises:
+        ValueError: a value is not allowed; the text names it.
+    """
+
+    def __post_init__(self) -> None:
+        """Check every setting."""
+        check(self)
 
 
 def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:

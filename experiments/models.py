@@ -25,18 +25,18 @@ from cardbox_tracker.body.cardbox import (
 )
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, TORSO, clip_to_limits, reference_posture
-from cardbox_tracker.body.volumetric import (
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
+from cardbox_tracker.estimation.cost.terms import ARMS, ArmCosts, Frame, Silhouette, TorsoCosts
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near, in_front
+from experiments.volumetric import (
     LEFT_ARM_FACES,
     N_FACES,
     RIGHT_ARM_FACES,
     TRUNK_FACES,
     volumetric_faces,
 )
-from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import ARMS, ArmCosts, Frame, Silhouette, TorsoCosts
-from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import NEAR_PLANE_M, clip_near, in_front
 
 FloatArray = NDArray[np.float64]
 

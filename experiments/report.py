@@ -10,9 +10,9 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES
-from cardbox_tracker.evaluation.metrics import AXES
 from cardbox_tracker.files import atomic_path
 from experiments.results import motions_in, recorded_results
+from experiments.tracking import AXES
 
 Results = Mapping[str, Any]
 

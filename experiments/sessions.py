@@ -24,7 +24,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]

@@ -17,18 +17,15 @@ from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS, TURNS
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.evaluation.metrics import (
-    align,
-    angle_errors_deg,
-    distances_m,
-    errors_along_axes_m,
-    stddev_over_runs,
-)
+from cardbox_tracker.evaluation.metrics import align, angle_errors_deg, distances_m
 from experiments.models import make_silhouette_term
 from experiments.parallel import Call
 from experiments.sessions import Session
 
 FloatArray = NDArray[np.float64]
+
+AXES = ("lateral", "vertical", "depth")
+"""The axes x, y and z of the camera optical frame."""
 
 RUNS_A_CALL = 10
 
@@ -160,6 +157,18 @@ def summarize(motion: MotionRuns) -> dict[str, Any]:
         "runs": len(runs.costs_px),
         "frames": runs.costs_px.shape[1],
     }
+
+
+def errors_along_axes_m(estimates_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
+    """Return the mean absolute error along each of ``AXES`` of joints (..., k, 3), metres."""
+    along = np.abs(estimates_m - truth_m).mean(axis=tuple(range(np.ndim(estimates_m) - 1)))
+    return dict(zip(AXES, along.tolist(), strict=True))
+
+
+def stddev_over_runs(values: FloatArray) -> FloatArray:
+    """Return the sample standard deviation (...) of ``values`` (runs, ...) over the runs."""
+    stddev: FloatArray = np.std(values, axis=0, ddof=1)
+    return stddev
 
 
 def brief(motion: MotionRuns) -> dict[str, float]:

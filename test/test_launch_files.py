@@ -389,7 +389,7 @@ def test_another_launch_file_has_arguments_of_its_own(
 
 def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
     pytest.importorskip("rclpy", reason="rclpy is not installed")
-    from cardbox_tracker.ros.nodes.node_parameters import NODES as PARAMETERS
+    from tools.parameter_docs import NODES as PARAMETERS
 
     compared = 0
     for name, of in (("live", "camera"), ("replay", "play_bag"), ("nodes", "")):

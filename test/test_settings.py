@@ -16,7 +16,7 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.settings import Setting, setting
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 
 CORE = (
     BackgroundConfig,

@@ -15,13 +15,31 @@ from typing import Any
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
-from cardbox_tracker.ros.nodes.node_parameters import NODES
+from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
+from cardbox_tracker.ros.nodes.camera_node import CameraParameters
+from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
+from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
+from cardbox_tracker.ros.nodes.retarget_node import RetargetParameters
+from cardbox_tracker.ros.nodes.rula_node import RulaParameters
+from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, ParameterSpec
 from cardbox_tracker.settings import settings_of
 
 _GENERATED = (
     "made by 'python -m tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"
 )
+NODES: dict[str, type[NodeParameters]] = {
+    "background": BackgroundParameters,
+    "initializer": InitializerParameters,
+    "tracker": TrackerParameters,
+    "camera": CameraParameters,
+    "play_bag": PlayBagParameters,
+    "stereo_depth": StereoDepthParameters,
+    "rula": RulaParameters,
+    "retarget": RetargetParameters,
+}
+"""Node name to its parameters."""
 APART = ("rula", "retarget")
 """Nodes that are no part of ``cardbox_nodes``."""
 

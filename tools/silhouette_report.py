@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 Image = NDArray[np.uint8]

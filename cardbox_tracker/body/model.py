@@ -10,10 +10,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from cardbox_tracker.body.appearance import Appearance
 from cardbox_tracker.body.person import Person
 from cardbox_tracker.body.placement import CAMERA_POSE, PLACEMENT, CameraPose, Placement
-from cardbox_tracker.body.posture import SIDE_TURNS
+from cardbox_tracker.body.posture import N_STATE, POSTURE, SIDE_TURNS, TORSO_Y, reference_posture
 from cardbox_tracker.body.sizes import SIZE_NAMES, FloatArray
 from cardbox_tracker.errors import BodyModelError, quoted
 
@@ -112,6 +114,13 @@ class BodyModel:
     def size(self, name: str) -> float:
         """Return the person's size of that name in metres."""
         return self.person.size(name)
+
+    def reference_state(self, name: str = "front", side_turn: str = "left") -> FloatArray:
+        """Return the state (14,) of a reference posture at the measured place, rad and metres."""
+        state = np.zeros(N_STATE)
+        state[POSTURE] = reference_posture(name, side_turn)
+        state[TORSO_Y] = self.placement.lateral_m
+        return state
 
     def __str__(self) -> str:
         """Return a line per size, in centimetres, and a remark if they were not measured."""

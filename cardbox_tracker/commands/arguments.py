@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -157,7 +157,7 @@ def add_preset(parser: argparse.ArgumentParser, default: str) -> None:
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     """Add ``--seed``; ``what`` names the random numbers that it determines."""
-    parser.add_argument("--seed", type=seed, default=0, help=f"random seed of {what}")
+    parser.add_argument("--seed", type=at_least(0), default=0, help=f"random seed of {what}")
 
 
 def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
@@ -217,38 +217,18 @@ def time(text: str) -> float:
     return value
 
 
-def seed(text: str) -> int:
-    """Parse a seed, an integer of 0 or more."""
-    return _integer(text, 0)
+def at_least(lowest: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers of ``lowest`` or more, which raises ArgumentTypeError."""
 
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = lowest - 1
+        if value < lowest:
+            raise argparse.ArgumentTypeError(
+                f"expected a whole number of {lowest} or more, got {text!r}"
+            )
+        return value
 
-def particle_count(text: str) -> int:
-    """Parse a number of particles, 2 or more."""
-    return _integer(text, 2)
-
-
-def run_count(text: str) -> int:
-    """Parse a number of runs, 2 or more, so that their deviation is defined."""
-    return _integer(text, 2)
-
-
-def seed_count(text: str) -> int:
-    """Parse a number of seeds, 1 or more."""
-    return _integer(text, 1)
-
-
-def process_count(text: str) -> int:
-    """Parse a number of processes, 1 or more."""
-    return _integer(text, 1)
-
-
-def _integer(text: str, lowest: int) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = lowest - 1
-    if value < lowest:
-        raise argparse.ArgumentTypeError(
-            f"expected a whole number of {lowest} or more, got {text!r}"
-        )
-    return value
+    return parse

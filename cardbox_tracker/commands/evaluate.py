@@ -9,13 +9,7 @@ import argparse
 import os
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import (
-    add_preset,
-    add_seed,
-    process_count,
-    run_count,
-    seed_count,
-)
+from cardbox_tracker.commands.arguments import add_preset, add_seed, at_least
 from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
@@ -29,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox evaluate``."""
     parser.add_argument(
         "--runs",
-        type=run_count,
+        type=at_least(2),
         default=100,
         metavar="N",
         help="runs of each strategy and motion",
@@ -56,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seeds",
-        type=seed_count,
+        type=at_least(1),
         default=3,
         metavar="N",
         help="with --sessions: number of runs, with consecutive seeds from --seed on",
@@ -69,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_preset(parser, "default")
     parser.add_argument(
         "--jobs",
-        type=process_count,
+        type=at_least(1),
         default=None,
         metavar="N",
         help="number of processes; one per core by default",

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from cardbox_tracker.commands.arguments import particle_count
+from cardbox_tracker.commands.arguments import at_least
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.settings import NoEffectError, nested, settings_of
 
@@ -44,7 +44,7 @@ def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--particles",
-        type=particle_count,
+        type=at_least(2),
         default=None,
         metavar="N",
         help="particles of each of the three filters of the preset paper; 200 by default",

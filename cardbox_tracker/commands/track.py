@@ -123,7 +123,7 @@ def track_inputs(
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.recording import open_recording
-    from cardbox_tracker.recordings.result_bag import ResultBag
+    from cardbox_tracker.recordings.result_bag import result_bag
     from cardbox_tracker.recordings.track import TrackFiles, track_recording
 
     body = load_body_model(options.model)
@@ -145,7 +145,7 @@ def track_inputs(
     ) as source:
         total_s = max(1e-9, source.first.duration_s - options.start)
         with (
-            ResultBag(bag, source.first.frame_id, force) as results,
+            result_bag(bag, source.first.frame_id, force) as record,
             progress_bar("track") as show,
         ):
             summary = track_recording(
@@ -156,7 +156,7 @@ def track_inputs(
                 options.start,
                 TrackFiles(csv, video),
                 observers=(
-                    results.add,
+                    record,
                     *observers,
                     lambda frame, *_: show((frame.time_s - options.start) / total_s),
                 ),

@@ -47,7 +47,6 @@ _LIMITS = dict(
 def urdf_from_body(
     body: BodyModel,
     optical_frame: str | None = None,
-    name: str = "cardbox_person",
     torso_place: bool = True,
 ) -> str:
     """Return the URDF of ``body`` as XML text.
@@ -56,11 +55,10 @@ def urdf_from_body(
         body: the measured person.
         optical_frame: name of the camera's optical frame; if given, it is added with the camera's
             pitch, so that markers and keypoints are in the same tree.
-        name: name of the robot.
         torso_place: add the joints ``torso_x`` and ``torso_z``; the joint states then must contain
             them, or the transforms beyond the hips are missing.
     """
-    robot = add_robot(name)
+    robot = add_robot("cardbox_person")
     add_link(robot, ROOT_LINK)
     if optical_frame:
         add_link(robot, optical_frame)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.body.kinematics import BodyFrames
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, in_front
 
@@ -38,35 +41,8 @@ _SHIFT = 4
 OUTLINE_SHIFT = 1
 
 
-class Drawable(Protocol):
-    """The attributes of an estimate that an overlay shows."""
-
-    @property
-    def state(self) -> str:
-        """Tracking state."""
-
-    @property
-    def posture(self) -> FloatArray | None:
-        """d1..d12, or None."""
-
-    @property
-    def keypoints_m(self) -> FloatArray | None:
-        """Keypoints (6, 3), metres in the optical frame, or None."""
-
-    @property
-    def cost_px(self) -> int | None:
-        """Cost of equation (2), px, or None."""
-
-    @property
-    def iou(self) -> float | None:
-        """Fit (intersection over union), or None."""
-
-    def placed(self, body: BodyModel) -> BodyModel:
-        """Return ``body`` at the estimated place."""
-
-
 def draw_overlay(
-    image: ImageArray, body: BodyModel, camera: Camera, estimate: Drawable, scale: int = 1
+    image: ImageArray, body: BodyModel, camera: Camera, estimate: Estimate, scale: int = 1
 ) -> ImageArray:
     """Return a colour image with the model of ``estimate`` drawn over it.
 
@@ -91,6 +67,33 @@ def draw_overlay(
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
+
+
+def draw_camera_overlay(
+    picture: ImageArray, number: int, estimate: Estimate, tracker: Tracker
+) -> ImageArray:
+    """Return a picture with the model over it; that of a further camera is turned upright.
+
+    Args:
+        picture: (H, W) grey or (H, W, 3) bgr, of the camera.
+        number: of the camera; 0 is the first one.
+        estimate: what ``tracker`` found at that time.
+        tracker: it knows the person and the cameras.
+    """
+    if number == 0:
+        return draw_overlay(picture, tracker.body, tracker.camera, estimate)
+    view = tracker.views[number - 1]
+    if estimate.posture is not None and estimate.keypoints_m is not None:
+        place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
+        state = view.states(np.concatenate([estimate.posture, place_m]))
+        points_m = view.points(tracker.camera.optical_to_reference(estimate.keypoints_m))
+        estimate = replace(
+            estimate,
+            posture=state[:N_JOINTS],
+            offset_m=state[N_JOINTS:],
+            keypoints_m=view.camera.reference_to_optical(points_m),
+        )
+    return draw_overlay(view.upright(picture), view.body, view.camera, estimate)
 
 
 def draw_message(image: ImageArray, text: str) -> ImageArray:
@@ -163,15 +166,13 @@ def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thick
             cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
 
 
-def draw_text(
-    canvas: ImageArray, text: str, line: int = 0, colour: tuple[int, int, int] = TEXT_BGR
-) -> None:
-    """Write ``text`` into the upper left corner of ``canvas``, in place; lines count downwards."""
+def draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:
+    """Write ``text`` into the upper left corner of ``canvas``, in place."""
     scale = canvas.shape[1] / 700
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.75 * scale, max(1, round(1.5 * scale))
     (width, height), below = cv2.getTextSize(text, font, size, thickness)
     margin = round(8 * scale)
-    left, bottom = margin, margin + height + line * (height + below + margin)
+    left, bottom = margin, margin + height
     # A dark background makes the text readable before any wall.
     corner = (left + width + margin // 2, bottom + below)
     cv2.rectangle(

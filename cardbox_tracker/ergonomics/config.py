@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 _DECLARED = "declared, since it is not measured"
 
 
 @dataclass(frozen=True)
-class RulaConfig:
+class RulaConfig(Settings):
     """Settings of the score: inputs that describe the task, then limits of angles.
 
     Raises:
@@ -81,7 +81,3 @@ class RulaConfig:
         unit="deg",
         limits=(0.0, 20.0),
     )
-
-    def __post_init__(self) -> None:
-        """Check every value."""
-        check(self)

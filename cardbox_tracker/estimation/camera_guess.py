@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import TORSO_X, TORSO_Y, TORSO_Z, reference_posture
+from cardbox_tracker.body.posture import (
+    REFERENCE_NAMES,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    reference_posture,
+)
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CameraError, InitializationError
 from cardbox_tracker.estimation.camera_pose import PoseProblem, Sighting
@@ -42,11 +48,7 @@ _LEAST_IOU = 0.5
 
 def reference_states(body: BodyModel, side_turn: str) -> dict[str, FloatArray]:
     """Return the states (14,) of the reference postures at the measured place of ``body``."""
-    states = {}
-    for name in ("front", "side", "arms"):
-        states[name] = np.append(reference_posture(name, side_turn), [0.0, 0.0])
-        states[name][0] = body.placement.lateral_m
-    return states
+    return {name: body.reference_state(name, side_turn) for name in REFERENCE_NAMES}
 
 
 def guessed_extrinsics(

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.outline_distances import (
     HALF_PX,
@@ -138,7 +138,7 @@ class PoseProblem:
         self._seen: list[tuple[SeenOutline, SeenOutline]] = []
         self._stddevs: list[FloatArray] = []
         for state, seen, seen_there, stddev in sightings:
-            hips_m = self._hips(state)
+            hips_m = self._cost.hips(state, self._first)
             there_m = extrinsics.rotation @ hips_m + extrinsics.translation_m
             pair = (
                 SeenOutline(seen, self._first, hips_m),
@@ -253,11 +253,6 @@ class PoseProblem:
         view = View.of(self._body, self._first, OtherCamera(self._other, extrinsics))
         axes = extrinsics.rotation @ self._first.reference_to_optical_rotation()
         return _Drawer(self._cost, view, axes)
-
-    def _hips(self, state: FloatArray) -> FloatArray:
-        place = self._body.placement
-        x_m, z_m = state[TORSO_X] - place.distance_m, place.hip_height_m + state[TORSO_Z]
-        return self._first.reference_to_optical(np.array([x_m, state[TORSO_Y], z_m]))
 
 
 class _Drawer:

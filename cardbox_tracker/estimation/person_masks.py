@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, POSTURE, reference_posture
+from cardbox_tracker.body.posture import N_JOINTS, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
 
@@ -83,9 +83,7 @@ class PersonDrawer:
             cy=(camera.cy + 0.5) / cell - 0.5,
         )
         self.cells_per_m = self._camera.fx / body.placement.distance_m
-        self.front: FloatArray = np.zeros(N_JOINTS + 2)
-        self.front[POSTURE] = reference_posture("front")
-        self.front[0] = body.placement.lateral_m
+        self.front = body.reference_state()
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
         """Return the masks of a person for their last posture.

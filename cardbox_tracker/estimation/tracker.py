@@ -201,14 +201,9 @@ class Tracker:
         fitted = self._fitting.before(silhouette, image)
         if fitted is not None:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
-            again = self._silhouette.frame(silhouette, image)
-            first = frames[0]
-            frames[0] = replace(
-                again,
-                depth_m=first.depth_m,
-                interval_s=first.interval_s,
-                stamp_ns=first.stamp_ns,
-            )
+            again = self._silhouette.frame(silhouette)
+            counted = again.rows, again.foreground_px
+            frames[0] = replace(frames[0], rows=counted[0], foreground_px=counted[1], posture=None)
         estimate = self._follow(frames)
         iou = None if estimate.iou is None else self._seen_iou
         self._fitting.after(estimate.state != NO_PERSON, iou)

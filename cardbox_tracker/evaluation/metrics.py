@@ -15,9 +15,6 @@ FloatArray = NDArray[np.float64]
 SHOULDERS = (0, 3)
 """Their places among the keypoints."""
 
-AXES = ("lateral", "vertical", "depth")
-"""The axes x, y and z of the camera optical frame."""
-
 
 def distances_m(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
     """Return the distance of each joint (..., k) of ``estimates_m`` (..., k, 3) from the truth."""
@@ -28,11 +25,6 @@ def distances_m(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
 def mpjpe_m(estimates_m: FloatArray, truth_m: FloatArray) -> float:
     """Return the mean distance of all joints (..., k, 3), metres."""
     return float(distances_m(estimates_m, truth_m).mean())
-
-
-def pa_mpjpe_m(estimates_m: FloatArray, truth_m: FloatArray) -> float:
-    """Return the mean distance of joints (..., k, 3) after :func:`align`, metres."""
-    return mpjpe_m(align(estimates_m, truth_m), truth_m)
 
 
 def align(estimates_m: FloatArray, truth_m: FloatArray) -> FloatArray:
@@ -82,20 +74,8 @@ def acceleration_error(difference_m: FloatArray, stamps_ns: NDArray[np.int64]) -
     return float(np.nanmean(norms)) if np.isfinite(norms).any() else float("nan")
 
 
-def errors_along_axes_m(estimates_m: FloatArray, truth_m: FloatArray) -> dict[str, float]:
-    """Return the mean absolute error along each of ``AXES`` of joints (..., k, 3), metres."""
-    along = np.abs(estimates_m - truth_m).mean(axis=tuple(range(np.ndim(estimates_m) - 1)))
-    return dict(zip(AXES, along.tolist(), strict=True))
-
-
 def angle_errors_deg(estimates_rad: FloatArray, truth_rad: FloatArray) -> FloatArray:
     """Return how far angles (...) are apart, the shorter way round, 0 to 180 degrees."""
     turns = (np.asarray(estimates_rad) - truth_rad + np.pi) % (2.0 * np.pi) - np.pi
     errors: FloatArray = np.abs(np.degrees(turns))
     return errors
-
-
-def stddev_over_runs(values: FloatArray) -> FloatArray:
-    """Return the sample standard deviation (...) of ``values`` (runs, ...) over the runs."""
-    stddev: FloatArray = np.std(values, axis=0, ddof=1)
-    return stddev

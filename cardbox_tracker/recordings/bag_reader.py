@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +21,7 @@ from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.encodings import (
     decode_as_sent,
-    decode_bgr,
     decode_compressed,
-    decode_grey,
     image_parts,
 )
 
@@ -55,22 +53,12 @@ class BagImage:
     stamp_ns: int
     frame_id: str
     time_ns: int
-    _decode: Callable[[bool | None], NDArray[np.uint8]]
-
-    @property
-    def grey(self) -> NDArray[np.uint8]:
-        """Brightness (H, W) uint8."""
-        return self._decode(True)
-
-    @property
-    def color(self) -> NDArray[np.uint8]:
-        """BGR colours (H, W, 3) uint8."""
-        return self._decode(False)
+    _decode: Callable[[], NDArray[np.uint8]]
 
     @property
     def as_sent(self) -> NDArray[np.uint8]:
         """BGR colours (H, W, 3) of a colour camera, else brightness (H, W), uint8."""
-        return self._decode(None)
+        return self._decode()
 
 
 class BagReader:
@@ -120,16 +108,11 @@ class BagReader:
                 f"recording (mcap or sqlite3) that was closed properly: {_REPAIR}"
             ) from None
         if self._reader.message_count == 0:
-            self.__exit__(None, None, None)
+            self.__exit__()
             raise BagError(f"the recording {self.path} has no messages; record it again")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the recording."""
         if self._reader is not None:
             with suppress(AnyReaderError):
@@ -288,10 +271,7 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def _decoder(image: Any) -> Callable[[bool | None], NDArray[np.uint8]]:
-    decoders = {True: decode_grey, False: decode_bgr, None: decode_as_sent}
+def _decoder(image: Any) -> Callable[[], NDArray[np.uint8]]:
     if hasattr(image, "encoding"):
-        parts = image_parts(image)
-        return lambda grey: decoders[grey](*parts)
-    data = image.data
-    return lambda grey: decode_compressed(data, grey)
+        return partial(decode_as_sent, *image_parts(image))
+    return partial(decode_compressed, image.data)

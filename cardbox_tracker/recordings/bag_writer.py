@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -107,12 +106,7 @@ class BagWriter:
         """Temporary folder of the recording; a file put here appears in the final folder."""
         return self._folder / self.path.name
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Move the recording to its place, or remove it after an error."""
         with self._resources:
             self._writer.close()
@@ -164,13 +158,11 @@ class BagWriter:
         )
         self.write(topic, message, stamp_ns)
 
-    def write_compressed(
-        self, topic: str, stamp_ns: int, frame_id: str, data: bytes, kind: str = "jpeg"
-    ) -> None:
-        """Write JPEG or PNG bytes as a CompressedImage."""
+    def write_compressed(self, topic: str, stamp_ns: int, frame_id: str, data: bytes) -> None:
+        """Write JPEG bytes as a CompressedImage."""
         message = self.type("sensor_msgs/msg/CompressedImage")(
             header=self.header(stamp_ns, frame_id),
-            format=kind,
+            format="jpeg",
             data=np.frombuffer(data, np.uint8),
         )
         self.write(topic, message, stamp_ns)

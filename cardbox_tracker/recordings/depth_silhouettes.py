@@ -9,8 +9,8 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
-from cardbox_tracker.vision.background import brightness_of
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
+from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
 
 
@@ -29,19 +29,12 @@ class Within(NamedTuple):
 class DepthSilhouetteSource(SilhouetteSource):
     """One camera of a recording whose silhouettes are cut out by depth images."""
 
-    def __init__(
-        self,
-        bag: BagReader,
-        within: Within,
-        size: tuple[int, int] = WORKING_SIZE,
-        camera: str | None = None,
-    ) -> None:
+    def __init__(self, bag: BagReader, within: Within, camera: str | None = None) -> None:
         """Prepare to read.
 
         Args:
             bag: an open recording.
             within: depth topic and limit.
-            size: working resolution (width, height), px.
             camera: namespace of the camera; without it, the recording has only one.
 
         Raises:
@@ -55,7 +48,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "
                 f"{most_m:g} m, between the person and the wall"
             )
-        self._open(bag, size, camera)
+        self._open(bag, WORKING_SIZE, camera)
         self._within, self.depth_topic = within, within.topic
         self._without = 0
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.initialization.config import (
     InitializationConfig,
@@ -15,11 +17,13 @@ from cardbox_tracker.estimation.initialization.references import average_silhoue
 from cardbox_tracker.estimation.initialization.scale import (
     SCALE_REFERENCES,
     DepthReference,
-    measured_with_depth,
-    measured_with_second,
+    depth_scale,
+    measured_at_scale,
+    measured_scale,
 )
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import median_depth
 
 # Further images of one posture add no information.
@@ -63,16 +67,13 @@ def initialize_from_cameras(
         InitializationError: see :func:`initialize_from_recording`; or the silhouettes of the
             second camera do not fit the person.
     """
-    first, second = recording.sources[:2]
+    second = recording.sources[1]
     references = {
         name: average_silhouette([frame.silhouette for frame in second.held(spans[name], name)])
         for name in SCALE_REFERENCES
     }
-
-    def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        return initialize_from_recording(first, spans, at, progress if is_last else None)
-
-    return measured_with_second(measure, config, first.camera, recording.others[0], references)
+    scale = partial(measured_scale, other=recording.others[0], references=references)
+    return _measured_at_scale(recording.first, spans, config, progress, scale)
 
 
 def initialize_with_depth(
@@ -91,11 +92,21 @@ def initialize_with_depth(
             the person.
     """
     references = {name: _depth_reference(recording, spans[name], name) for name in SCALE_REFERENCES}
+    scale = partial(depth_scale, references=references)
+    return _measured_at_scale(recording.first, spans, config, progress, scale)
 
+
+def _measured_at_scale(
+    first: SilhouetteSource,
+    spans: Mapping[str, TimeSpan],
+    config: InitializationConfig,
+    progress: Callable[[float], None] | None,
+    scale: Callable[[BodyModel, Camera], float],
+) -> InitializationResult:
     def measure(at: InitializationConfig, is_last: bool) -> InitializationResult:
-        return initialize_from_recording(recording.first, spans, at, progress if is_last else None)
+        return initialize_from_recording(first, spans, at, progress if is_last else None)
 
-    return measured_with_depth(measure, config, recording.first.camera, references)
+    return measured_at_scale(measure, config, first.camera, scale)
 
 
 def _depth_reference(recording: Recording, span: TimeSpan, name: str) -> DepthReference:

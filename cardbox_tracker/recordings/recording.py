@@ -17,13 +17,7 @@ from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
-from cardbox_tracker.recordings.silhouettes import (
-    WORKING_SIZE,
-    RecordedFrame,
-    SilhouetteSource,
-    TimeSpan,
-)
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -159,8 +153,6 @@ def open_recording(
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
     depth: str | None = None,
-    config: BackgroundConfig | None = None,
-    size: tuple[int, int] = WORKING_SIZE,
 ) -> Iterator[Recording]:
     """Open a recording, find the extrinsics of its cameras and learn their backgrounds.
 
@@ -171,8 +163,6 @@ def open_recording(
         cameras: namespaces, the first camera's first; empty if the recording has one camera.
         extrinsics: file of the poses, see :func:`load_extrinsics`.
         depth: see :class:`Recording`.
-        config: settings of the background models.
-        size: working resolution (width, height), px.
 
     Raises:
         BagError: the recording cannot be read, or lacks a camera.
@@ -192,9 +182,9 @@ def open_recording(
         bags = [stack.enter_context(BagReader(path)) for _ in names or ("",)]
         found = extrinsics_of(bags[0], names, extrinsics)
         sources = [
-            DepthSilhouetteSource(bag, background, size, name)
+            DepthSilhouetteSource(bag, background, name)
             if isinstance(background, Within)
-            else SilhouetteSource(bag, background, config, size, name)
+            else SilhouetteSource(bag, background, camera=name)
             for bag, name in zip(bags, names or (None,), strict=True)
         ]
         yield Recording(names or ("",), sources, found, depth)

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
@@ -28,6 +29,7 @@ from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.track import Observer
 
 _LATCHED = ("/body_model", "/robot_description")
 
@@ -43,50 +45,32 @@ def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
     return BagWriter(path, "mcap", overwrite, compress=True, latched=_LATCHED)
 
 
-class ResultBag:
-    """Context that writes estimates to a bag, or does nothing if it has no path."""
+@contextmanager
+def result_bag(path: Path | None, frame_id: str, overwrite: bool = False) -> Iterator[Observer]:
+    """Context of an observer that writes the outputs of each image to a bag, if it has a path.
 
-    def __init__(self, path: Path | None, frame_id: str, overwrite: bool = False) -> None:
-        """Prepare the bag, which is opened on entry and appears on exit.
+    The bag appears on exit; after an error there is none. With ``overwrite`` a recording of that
+    name is replaced.
 
-        With ``overwrite`` a recording of that name is replaced.
-        """
-        self._writer = None if path is None else result_writer(path, overwrite)
-        self._transforms = None if self._writer is None else BagTransforms(self._writer)
-        self._frame_id = frame_id
+    Raises:
+        BagError: ``path`` exists and may not be replaced.
+    """
+    if path is None:
+        yield lambda *_: None
+        return
+    with result_writer(path, overwrite) as writer:
+        yield _ResultBag(writer, frame_id)
+
+
+class _ResultBag:
+    def __init__(self, bag: BagWriter, frame_id: str) -> None:
+        self._bag, self._frame_id = bag, frame_id
+        self._transforms = BagTransforms(bag)
         self._described: BodyModel | None = None
         self._outputs = OutputStream()
 
-    def __enter__(self) -> ResultBag:
-        """Open the bag."""
-        if self._writer is not None:
-            self._writer.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the bag, or remove it after an error."""
-        if self._writer is not None:
-            self._writer.__exit__(kind, error, trace)
-
-    def add(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
-        """Write the outputs of one image."""
-        if self._writer is None or self._transforms is None:
-            return
-        self._write(self._writer, self._transforms, frame, estimate, tracker)
-
-    def _write(
-        self,
-        bag: BagWriter,
-        transforms: BagTransforms,
-        frame: RecordedFrame,
-        estimate: Estimate,
-        tracker: Tracker,
-    ) -> None:
+    def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
+        bag, transforms = self._bag, self._transforms
         stamp, optical = frame.stamp_ns, self._frame_id
         body, camera = tracker.body, tracker.camera
         if body is not self._described:

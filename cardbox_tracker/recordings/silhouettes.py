@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.vision.background import BackgroundConfig, brightness_of
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.depth_image import DepthImage
+from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 WORKING_SIZE = (320, 240)

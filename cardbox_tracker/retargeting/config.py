@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class RetargetConfig:
+class RetargetConfig(Settings):
     """Settings of how a robot follows a person and when it stands still.
 
     Raises:
@@ -45,7 +45,3 @@ class RetargetConfig:
     )
     mount_pitch_deg: float = setting(0.0, "see mount_roll_deg", unit="deg", limits=(-180, 180))
     mount_yaw_deg: float = setting(0.0, "see mount_roll_deg", unit="deg", limits=(-180, 180))
-
-    def __post_init__(self) -> None:
-        """Check every value."""
-        check(self)

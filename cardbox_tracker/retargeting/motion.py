@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.errors import CardboxError
 
 
 class Limits(NamedTuple):
@@ -25,21 +24,11 @@ class SafeMotion:
         positions: current joint positions, rad or m.
     """
 
-    def __init__(self, limits: Limits, start: FloatArray | None = None) -> None:
-        """Begin at ``start``; the default is 0 or the limit nearest to 0.
-
-        Raises:
-            CardboxError: ``start`` is not within the limits.
-        """
+    def __init__(self, limits: Limits) -> None:
+        """Begin at 0 or the limit nearest to 0."""
         self._limits = limits
-        lower, upper = limits.lower, limits.upper
-        if start is None:
-            start = np.clip(np.zeros(len(lower)), lower, upper)
-        if not ((start >= lower) & (start <= upper)).all():  # also true if start has nan
-            raise CardboxError(
-                f"the robot cannot start at {start}; expected {lower} to {upper}, its joint limits"
-            )
-        self.positions: FloatArray = start
+        zero = np.zeros(len(limits.lower))
+        self.positions: FloatArray = np.clip(zero, limits.lower, limits.upper)
 
     def move(self, target: FloatArray, duration_s: float) -> FloatArray:
         """Move towards ``target`` (n,) for ``duration_s`` and return the new positions (n,).

@@ -16,8 +16,6 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.pairing import MOST_CAMERAS
 
-IMAGE_TOPIC = "/camera/image_raw"
-CAMERA_INFO_TOPIC = "/camera/camera_info"
 FRAME_ID = "camera_optical_frame"
 
 # Azimuths of the cameras towards the person's left, degrees; all have the same distance.

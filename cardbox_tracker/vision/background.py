@@ -31,16 +31,6 @@ from cardbox_tracker.vision.regions import clean_silhouette
 from cardbox_tracker.vision.shadows import decide_shadows
 from cardbox_tracker.vision.window import Window, window_of
 
-__all__ = [
-    "BackgroundConfig",
-    "BackgroundLearner",
-    "BackgroundModel",
-    "SilhouetteExtractor",
-    "brightness_of",
-    "clean_silhouette",
-    "warm_up",
-]
-
 ImageArray = NDArray[np.uint8]
 
 # Number of pixels whose median estimates the brightness of the scene.

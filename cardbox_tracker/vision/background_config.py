@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 
 @dataclass(frozen=True)
-class BackgroundConfig:
+class BackgroundConfig(Settings):
     """Settings of the background model and of the silhouette extraction."""
 
     learn_images: int = setting(30, "images of the empty scene to learn from", limits=(2, 10000))
@@ -108,11 +108,3 @@ class BackgroundConfig:
         "all count; 0: never",
         limits=(0, 1000000),
     )
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)

@@ -110,11 +110,6 @@ class Calibration:
     frame_id: str = "camera_optical_frame"
 
     @property
-    def is_calibrated(self) -> bool:
-        """Whether K is a possible matrix; it is all zero for an uncalibrated camera."""
-        return not matrix_problem(self.k, self.width, self.height)
-
-    @property
     def is_distorted(self) -> bool:
         """Whether any distortion coefficient is not zero."""
         return bool(np.any(self.distortion != 0))

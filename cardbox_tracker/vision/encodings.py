@@ -116,14 +116,11 @@ def decode_as_sent(
     return decode(data, height, width, step, encoding, is_bigendian)
 
 
-def decode_compressed(
-    data: Any, grey: bool | None = True, most_pixels: float = MOST_PIXELS
-) -> ImageArray:
+def decode_compressed(data: Any, most_pixels: float = MOST_PIXELS) -> ImageArray:
     """Return a JPEG or PNG image as (H, W) grey or (H, W, 3) bgr, uint8.
 
     Args:
         data: the bytes of the file.
-        grey: True for brightness, False for colours, None for the channels of the image.
         most_pixels: larger images are refused before memory is allocated.
 
     Raises:
@@ -131,9 +128,8 @@ def decode_compressed(
     """
     raw = np.frombuffer(data, np.uint8)
     check_pixels(*compressed_size(raw.tobytes()), most_pixels)
-    flag = {True: cv2.IMREAD_GRAYSCALE, False: cv2.IMREAD_COLOR, None: cv2.IMREAD_ANYCOLOR}[grey]
     try:
-        image = None if _is_cut_off(raw) else cv2.imdecode(raw, flag)
+        image = None if _is_cut_off(raw) else cv2.imdecode(raw, cv2.IMREAD_ANYCOLOR)
     except cv2.error:
         image = None
     if image is None:

@@ -9,13 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundModel,
-    SilhouetteExtractor,
-    brightness_of,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.empty_scene import BackgroundModel, brightness_of
 from cardbox_tracker.vision.learning import Learning
 from cardbox_tracker.vision.resize import to_working_size
 

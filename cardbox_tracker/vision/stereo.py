@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CameraError
-from cardbox_tracker.vision.background import brightness_of
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 DepthImage = NDArray[np.float32]

@@ -12,7 +12,7 @@ from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts, parts_of_bodies
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
-from cardbox_tracker.body.volumetric import volumetric_faces
+from experiments.volumetric import volumetric_faces
 
 REST = np.zeros(12)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -14,7 +14,7 @@ from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.vision.camera import Camera
 
@@ -29,9 +29,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tracker = Tracker(BodyModel.of(hip_height_m=-0.51), Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
     grey, posture = np.zeros((48, 64), np.uint8), reference_posture("arms")
     seen = Estimate(TRACKING, posture, np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
-    with ResultBag(path, "camera") as bag:
+    with result_bag(path, "camera") as bag:
         for i, estimate in enumerate((seen, seen, Estimate(LOST), seen, seen)):
-            bag.add(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+            bag(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
     return path
 
 

@@ -18,7 +18,6 @@ from cardbox_tracker.drawing.overlay import (
     UNCERTAIN_BGR,
     draw_model,
     draw_overlay,
-    draw_text,
 )
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -119,16 +118,6 @@ def test_without_a_posture_there_is_only_text(state: str) -> None:
 def test_the_text_tells_the_state() -> None:
     overlays = [draw_overlay(GREY, BODY, CAMERA, Estimate(s)) for s in ("lost", "no_person")]
     assert np.any(overlays[0] != overlays[1])
-
-
-def test_lines_of_text_go_down() -> None:
-    def rows(line: int) -> np.ndarray:
-        canvas = np.full((240, 320, 3), 90, np.uint8)
-        draw_text(canvas, "lost", line)
-        return np.nonzero(np.any(canvas != 90, axis=(1, 2)))[0]
-
-    assert rows(0).max() < rows(1).min() + 3
-    assert rows(1).max() < rows(3).min()
 
 
 def test_a_person_behind_the_camera_is_not_drawn() -> None:

@@ -42,8 +42,9 @@ from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision import chroma, light, regions, shadows, window
 from cardbox_tracker.vision import foreground as contrast
-from cardbox_tracker.vision.background import BackgroundLearner, SilhouetteExtractor
+from cardbox_tracker.vision.background import SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 

@@ -20,7 +20,6 @@ from cardbox_tracker.estimation.config import (
     paper_preset,
 )
 from cardbox_tracker.estimation.cost.compiled import CompiledObservation, CompiledSilhouette
-from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame, TorsoCosts
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -32,6 +31,7 @@ from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
+from experiments.reference import ReferenceSilhouette
 
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)

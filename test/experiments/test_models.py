@@ -7,7 +7,6 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, TORSO, clip_to_limits, reference_posture
-from cardbox_tracker.estimation.cost.silhouette import ReferenceSilhouette
 from cardbox_tracker.estimation.cost.terms import ARMS
 from cardbox_tracker.vision.camera import Camera
 from experiments.models import (
@@ -16,6 +15,7 @@ from experiments.models import (
     make_silhouette_term,
     microseconds_a_particle,
 )
+from experiments.reference import ReferenceSilhouette
 from experiments.sessions import Session
 
 

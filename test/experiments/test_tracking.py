@@ -20,10 +20,12 @@ from experiments.tracking import (
     brief,
     calls_of,
     comparable,
+    errors_along_axes_m,
     mean_brief,
     per_frame,
     select_motion,
     stacked,
+    stddev_over_runs,
     summarize,
 )
 
@@ -121,3 +123,16 @@ def test_runs_are_those_of_the_tracker(session: Session) -> None:
         np.testing.assert_array_equal(estimate.posture, posture)
         assert estimate.cost_px == cost
     assert not np.array_equal(runs.postures[0], runs.postures[1])
+
+
+def test_errors_along_axes_by_hand() -> None:
+    truth = np.ones((2, 1, 3))
+    estimates = truth + np.array([[[0.1, -0.2, 0.0]], [[-0.3, 0.0, 0.8]]])
+    assert errors_along_axes_m(estimates, truth) == pytest.approx(
+        {"lateral": 0.2, "vertical": 0.1, "depth": 0.4}
+    )
+
+
+def test_standard_deviation_is_that_of_a_sample_of_runs() -> None:
+    values = np.array([[1.0, 5.0], [3.0, 5.0], [5.0, 5.0]])
+    np.testing.assert_allclose(stddev_over_runs(values), [2.0, 0.0])

@@ -12,7 +12,7 @@ import yaml
 
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.recordings.recording import Recording
-from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
 from cardbox_tracker.recordings.track import TrackFiles, TrackSummary, track_recording
 
@@ -37,7 +37,7 @@ def results(
     recording: Any, source: SilhouetteSource, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, TrackSummary]:
     folder = tmp_path_factory.mktemp("results")
-    with ResultBag(folder / "bag", source.frame_id) as bag:
+    with result_bag(folder / "bag", source.frame_id) as bag:
         summary = track_recording(
             *(
                 Recording([""], [source]),
@@ -47,7 +47,7 @@ def results(
                 0.0,
                 TrackFiles(folder / "person.csv"),
             ),
-            observers=(bag.add,),
+            observers=(bag,),
         )
     return folder / "bag", summary
 

@@ -12,7 +12,7 @@ from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.camera import Camera
 
 

@@ -24,7 +24,7 @@ from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
-from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import (
     CSV_HEADER,
@@ -288,8 +288,8 @@ def test_a_video_that_cannot_be_written_is_refused_and_leaves_nothing(
 def test_the_bag_of_results_holds_what_the_tracker_would_publish(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    with ResultBag(tmp_path / "results", source.frame_id) as results:
-        track(recording, source, tmp_path / "person.csv", observers=(results.add,))
+    with result_bag(tmp_path / "results", source.frame_id) as results:
+        track(recording, source, tmp_path / "person.csv", observers=(results,))
     rows = rows_of(tmp_path / "person.csv")
     with BagReader(tmp_path / "results") as bag:
         assert {
@@ -331,9 +331,9 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
 def test_images_without_a_person_have_no_results(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    with ResultBag(tmp_path / "results", source.frame_id) as results:
+    with result_bag(tmp_path / "results", source.frame_id) as results:
         summary = track(
-            recording, source, tmp_path / "person.csv", start_s=0.0, observers=(results.add,)
+            recording, source, tmp_path / "person.csv", start_s=0.0, observers=(results,)
         )
     with BagReader(tmp_path / "results") as bag:
         states = [name for name in bag.topics if name.endswith("joint_states")]
@@ -344,7 +344,7 @@ def test_a_recording_of_that_name_is_kept(recording: Any, tmp_path: Path) -> Non
     before = sorted(os.listdir(recording.folder))
     with (
         pytest.raises(BagError, match="exists and is a recording"),
-        ResultBag(recording.folder, "camera"),
+        result_bag(recording.folder, "camera"),
     ):
         pytest.fail("it must not be opened")
     assert sorted(os.listdir(recording.folder)) == before
@@ -353,7 +353,7 @@ def test_a_recording_of_that_name_is_kept(recording: Any, tmp_path: Path) -> Non
 def test_after_an_error_no_bag_is_left(recording: Any, tmp_path: Path) -> None:
     with (
         pytest.raises(RuntimeError),
-        ResultBag(tmp_path / "results", "camera"),
+        result_bag(tmp_path / "results", "camera"),
     ):
         raise RuntimeError("half way")
     assert os.listdir(tmp_path) == []
@@ -362,6 +362,6 @@ def test_after_an_error_no_bag_is_left(recording: Any, tmp_path: Path) -> None:
 def test_without_a_path_there_is_no_bag(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
-    with ResultBag(None, source.frame_id) as results:
-        track(recording, source, tmp_path / "person.csv", observers=(results.add,))
+    with result_bag(None, source.frame_id) as results:
+        track(recording, source, tmp_path / "person.csv", observers=(results,))
     assert os.listdir(tmp_path) == ["person.csv"]

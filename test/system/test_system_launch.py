@@ -28,7 +28,7 @@ pytest.importorskip("ros2launch", reason="ros2launch is not installed (not on Py
 from sensor_msgs.msg import JointState  # noqa: E402
 
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
-from cardbox_tracker.vision.background import BackgroundConfig  # noqa: E402
+from cardbox_tracker.vision.background_config import BackgroundConfig  # noqa: E402
 
 EMPTY = BackgroundConfig().learn_images + 30
 FRONT = 120

@@ -18,7 +18,7 @@ from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_writer import BagWriter
-from cardbox_tracker.recordings.result_bag import ResultBag
+from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
@@ -34,13 +34,13 @@ def results(tmp_path: Path) -> Path:
     """A bag as 'cardbox track --bag' writes it, and a true frame for each image."""
     tracker = Tracker(BODY, CAMERA)
     grey = np.zeros((48, 64), np.uint8)
-    with ResultBag(tmp_path / "results", "camera") as bag:
+    with result_bag(tmp_path / "results", "camera") as bag:
         for i in range(IMAGES):
             posture = wave(i / 5.0)
             points = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
             estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
-            bag.add(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
-        bag.add(RecordedFrame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
+            bag(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+        bag(RecordedFrame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
     return tmp_path / "results"
 
 

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.vision.absorption import STILL, StillRegions
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 
 AFTER = 60
 # The absorber sees a thing at the end of fifteen images, and learns it from the next fifteen.

@@ -9,13 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    BackgroundModel,
-    SilhouetteExtractor,
-    clean_silhouette,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
+from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
+from cardbox_tracker.vision.regions import clean_silhouette
 from cardbox_tracker.vision.window import window_of
 
 PLAIN = BackgroundConfig(clean_up=False)

@@ -8,12 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, bgr_of, chroma_planes
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.window import Window
 
 H, W = 120, 160

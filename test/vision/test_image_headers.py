@@ -54,7 +54,8 @@ def test_an_image_too_large_is_refused_before_memory_is_taken(
     with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
         decode_compressed(data)
     monkeypatch.undo()
-    assert decode_compressed(make(64, 48) if make is png_of else data_of(".jpg")).shape == (48, 64)
+    small = make(64, 48) if make is png_of else data_of(".jpg")
+    assert decode_compressed(small).shape[:2] == (48, 64)
     with pytest.raises(EncodingError, match=r"0\.003 million"):
         decode_compressed(make(64, 48), most_pixels=3000)
 
@@ -96,4 +97,4 @@ def test_the_size_in_the_header_is_that_of_the_pixels(
     image = np.zeros((height, width, 3), np.uint8)
     data = cv2.imencode(extension, image, options)[1].tobytes()
     assert compressed_size(data) == (width, height)
-    assert decode_compressed(data, None).shape[:2] == (height, width)
+    assert decode_compressed(data).shape[:2] == (height, width)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.errors import BackgroundFileError
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.kept_background import KeptBackground
 from cardbox_tracker.vision.learning import StillLearning

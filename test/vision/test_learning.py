@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.vision.background import BackgroundConfig, SilhouetteExtractor
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.learning import (
     WAYS,
     Learning,

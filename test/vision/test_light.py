@@ -9,11 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.light import LightFollower
 from cardbox_tracker.vision.light_samples import collect_ratios, sum_cells
 

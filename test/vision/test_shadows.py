@@ -8,11 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundModel,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
+from cardbox_tracker.vision.empty_scene import BackgroundModel
 from cardbox_tracker.vision.shadows import decide_shadows
 
 H, W = 120, 160

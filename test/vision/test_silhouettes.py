@@ -10,12 +10,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.errors import CameraError
-from cardbox_tracker.vision.background import (
-    BackgroundConfig,
-    BackgroundLearner,
-    SilhouetteExtractor,
-)
+from cardbox_tracker.vision.background import SilhouetteExtractor
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 
 K = np.array([(600.0, 0, 31.5), (0, 600.0, 23.5), (0, 0, 1)])

@@ -1,6 +1,6 @@
 """The silhouette's term, compiled: equal results, a fraction of the time.
 
-:mod:`cardbox_tracker.estimation.cost.silhouette` is the reference;
+``experiments/reference.py`` is the reference;
 :mod:`cardbox_tracker.estimation.cost.cardbox_kernels` explains the method.
 """
 

@@ -42,14 +42,14 @@ from cardbox_tracker.estimation.cost.terms import (
 )
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
 
 _SILENCE = Silence()
 
 
 @dataclass(frozen=True)
-class Depth:
+class Depth(Settings):
     """Settings of the term of a measured depth."""
 
     weight: float = setting(
@@ -67,14 +67,6 @@ class Depth:
     expected: float = setting(
         0.3, "what points cost on average, which is subtracted", limits=(0.0, 1.0)
     )
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
         """Return the term for a measured person before a working camera."""

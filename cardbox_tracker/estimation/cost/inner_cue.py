@@ -49,7 +49,7 @@ from cardbox_tracker.estimation.cost.terms import (
     TermObservation,
     TorsoCosts,
 )
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
 
 # One pixel says no more than this: histograms of a few hundred pixels are not that certain.
@@ -65,7 +65,7 @@ _OTHER = {"left": "right", "right": "left"}
 
 
 @dataclass(frozen=True)
-class InnerCue:
+class InnerCue(Settings):
     """Settings of the cue inside the outline."""
 
     hand: float = setting(
@@ -86,14 +86,6 @@ class InnerCue:
         "shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as in "
         "the filter hierarchical",
     )
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
         """Return the term, which is zero for a body without an appearance."""

@@ -230,14 +230,6 @@ def angles_of_arm(directions: Floats, side: float, limits: Floats, angles: Float
 
 
 @kernel
-def directions_of_arm(angles: Floats, side: float) -> Floats:
-    """Return the directions (6,) of upper arm and forearm in the torso's frame for angles (4,)."""
-    directions = np.empty(6)
-    limb_directions(angles, side, directions)
-    return directions
-
-
-@kernel
 def angles_of_arms(directions: Floats, side: float, limits: Floats) -> Floats:
     """Return the angles (N, 4) of arms with ``directions`` (N, 6), within ``limits`` (4, 2)."""
     angles = np.empty((directions.shape[0], 4))

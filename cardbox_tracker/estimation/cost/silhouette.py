@@ -5,43 +5,22 @@
 Only the rows above the hips count: a model of the upper body has no legs. The middle of
 the hips never moves up or down, so the first row below it is a constant of body and camera.
 
-:class:`SilhouetteTerm` is what all its implementations share; :class:`ReferenceSilhouette` does
-just what the equation says. The tracker uses the compiled one in
-:mod:`cardbox_tracker.estimation.cost.compiled`.
+:class:`SilhouetteTerm` is what all its implementations share. The tracker uses the compiled one in
+:mod:`cardbox_tracker.estimation.cost.compiled`; ``experiments/reference.py`` does just what the
+equation says.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from cardbox_tracker.body.cardbox import (
-    LEFT_ARM_PATCHES,
-    RIGHT_ARM_PATCHES,
-    TORSO_PATCHES,
-    cardbox_patches,
-)
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, TORSO
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import (
-    ARMS,
-    ArmCosts,
-    Frame,
-    Image,
-    Silhouette,
-    TermObservation,
-    TorsoCosts,
-)
+from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette, TermObservation
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.rasterisation import render
-
-_ARM_PATCHES = {"left": LEFT_ARM_PATCHES, "right": RIGHT_ARM_PATCHES}
-_BOTH_ARMS = slice(LEFT_ARM_PATCHES.start, RIGHT_ARM_PATCHES.stop)
 
 
 class SilhouetteObservation(TermObservation):
@@ -66,18 +45,12 @@ class SilhouetteTerm(ABC):
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
 
-    def frame(
-        self,
-        silhouette: Silhouette,
-        image: Image | None = None,
-        posture: FloatArray | None = None,
-    ) -> Frame:
+    def frame(self, silhouette: Silhouette, image: Image | None = None) -> Frame:
         """Return a frame for this and all other terms.
 
         Args:
             silhouette: (H, W), 0 or 255.
             image: (H, W) grey or (H, W, 3) bgr of the same moment, or None.
-            posture: of the frame before, or None.
 
         Raises:
             ValueError: ``silhouette`` or ``image`` has not the camera's size.
@@ -89,7 +62,7 @@ class SilhouetteTerm(ABC):
             ):
                 raise ValueError(f"{name} has shape {pixels.shape}; the camera's is {size}")
         upper = np.ascontiguousarray(silhouette[: self.rows])
-        return Frame(silhouette, self.rows, cv2.countNonZero(upper), image, posture)
+        return Frame(silhouette, self.rows, cv2.countNonZero(upper), image)
 
     @abstractmethod
     def observe(self, frame: Frame) -> SilhouetteObservation:
@@ -117,75 +90,3 @@ def rows_above_hips(body: BodyModel, camera: Camera) -> int:
     if hip[2] <= 0:
         return camera.height
     return int(np.clip(np.ceil(camera.project(hip)[1]), 1, camera.height))
-
-
-class ReferenceSilhouette(SilhouetteTerm):
-    """Equation (2) as it reads: draw the model, XOR with the silhouette, count."""
-
-    def observe(self, frame: Frame) -> ReferenceObservation:
-        """See :class:`SilhouetteTerm`."""
-        return ReferenceObservation(frame, self.body, self.camera)
-
-    def draw(self, posture: FloatArray) -> NDArray[np.uint8]:
-        """Return the model (rows, W) in ``posture`` (12,) as the camera sees it, 0 or 255."""
-        return render(cardbox_patches(self.body, posture), self.camera, self.rows)
-
-
-@dataclass(frozen=True)
-class ReferenceObservation(SilhouetteObservation):
-    """One silhouette, compared with drawn models pixel by pixel."""
-
-    frame: Frame
-    body: BodyModel
-    camera: Camera
-
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """See :class:`SilhouetteObservation`."""
-        fixed = np.zeros((0, 4, 3))
-        if arms is not None:
-            fixed = cardbox_patches(self.body, arms)[_BOTH_ARMS]
-
-        def costs(torsos: FloatArray) -> FloatArray:
-            postures = np.zeros((len(torsos), N_JOINTS))
-            postures[:, TORSO] = torsos
-            return self._costs(postures, (TORSO_PATCHES,), fixed)
-
-        return costs
-
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """See :class:`SilhouetteObservation`."""
-
-        def costs(side: str, arms: FloatArray) -> FloatArray:
-            postures = np.zeros((len(arms), N_JOINTS))
-            postures[:, TORSO] = torso
-            postures[:, ARMS[side]] = arms
-            return self._costs(postures, (TORSO_PATCHES, _ARM_PATCHES[side]))
-
-        return costs
-
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """See :class:`SilhouetteObservation`."""
-        return self._costs(np.asarray(postures), (slice(None),))
-
-    def overlap(self, posture: FloatArray) -> tuple[int, float]:
-        """See :class:`SilhouetteObservation`."""
-        drawn = render(cardbox_patches(self.body, posture), self.camera, self.frame.rows)
-        cost = cv2.countNonZero(cv2.bitwise_xor(drawn, self._upper))
-        union = cv2.countNonZero(cv2.bitwise_or(drawn, self._upper))
-        return cost, (union - cost) / union if union else 0.0
-
-    @property
-    def _upper(self) -> Silhouette:
-        return np.ascontiguousarray(self.frame.silhouette[: self.frame.rows])
-
-    def _costs(
-        self, postures: FloatArray, parts: tuple[slice, ...], beside: FloatArray | None = None
-    ) -> FloatArray:
-        fixed = np.zeros((0, 4, 3)) if beside is None else beside
-        costs = np.empty(len(postures))
-        upper = self._upper
-        for i, patches in enumerate(cardbox_patches(self.body, postures)):
-            drawn = np.concatenate([fixed, *(patches[part] for part in parts)])
-            model = render(drawn, self.camera, self.frame.rows)
-            costs[i] = cv2.countNonZero(cv2.bitwise_xor(model, upper))
-        return costs

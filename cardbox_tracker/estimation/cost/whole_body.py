@@ -13,15 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
+from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
 from cardbox_tracker.body.posture import (
-    N_STATE,
-    POSTURE,
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
-    reference_posture,
 )
-from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import body_priors as priors
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
@@ -99,16 +96,14 @@ class WholeBodyCost:
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
-        front = np.zeros((1, N_STATE))
-        front[0, POSTURE] = reference_posture("front")
-        front[0, TORSO_Y] = body.placement.lateral_m
+        front = body.reference_state()[None]
         self.see(np.zeros((camera.height, camera.width), np.uint8), front[0])
         self.frontal_px = max(1, int(self.bodies(front)[2][0]))
 
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
         """Take a silhouette (H, W) of a person whose hips are about where ``state`` (14,) says."""
         config, camera = self._config, self._camera
-        hip = self._hips(state, camera)
+        hip = self.hips(state, camera)
         depth_m = max(float(hip[2]), 1e-3)
         column, row = camera.fx * hip[0] / depth_m + camera.cx, camera.fy * hip[1] / depth_m
         row += camera.cy
@@ -126,14 +121,15 @@ class WholeBodyCost:
             self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
 
-    def _hips(self, state: FloatArray, camera: Camera) -> FloatArray:
+    def hips(self, state: FloatArray, camera: Camera) -> FloatArray:
+        """Return the middle of the hips (3,) of a state (14,), metres in the optical frame."""
         x_m = self._model.placement.distance_m - state[TORSO_X]
         z_m = self._model.placement.hip_height_m + state[TORSO_Z]
         return camera.reference_to_optical(np.array([-x_m, state[TORSO_Y], z_m]))
 
     def hip_row(self, state: FloatArray, camera: Camera) -> float:
         """Return the row of the hips of a state (14,) in the image of ``camera``, at any size."""
-        _, down_m, ahead_m = self._hips(state, camera).tolist()
+        _, down_m, ahead_m = self.hips(state, camera).tolist()
         return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
 
     def see_nothing(self) -> None:
@@ -208,18 +204,6 @@ class WholeBodyCost:
         for term in self.terms:
             ratings += self._scale * term.postures(states)
         return ratings, costs_px, areas_px
-
-    def share_silhouette(self, other: WholeBodyCost) -> None:
-        """Take over the silhouette of ``other``, of another body before the same camera."""
-        self._seen, self.anchor = other._seen, other.anchor
-        self.silhouette_px, self._scale = other.silhouette_px, other._scale
-
-    def outline_rating(self, state: FloatArray) -> float:
-        """Return the rating of a state (14,) without further terms."""
-        terms, self.terms = self.terms, ()
-        rating = float(self.bodies(state[None])[0][0])
-        self.terms = terms
-        return rating
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from cardbox_tracker.body.posture import LEFT_ARM, STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
+from cardbox_tracker.estimation.cost.pose_prior import sample_bank
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering import arm_proposals
-from cardbox_tracker.estimation.filtering.arm_bank import bank_of_arms
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[LEFT_ARM])
 """Lowest and highest angles of an arm, shape (4, 2)."""
+
+
+@cache
+def bank_of_arms() -> FloatArray:
+    """Return angles (3000, 4), rad, of an arm; they serve for both sides."""
+    arms: FloatArray = angles_of_arms(sample_bank(), 1.0, ARM_LIMITS)
+    arms.setflags(write=False)
+    return arms
 
 
 def propose_arms(

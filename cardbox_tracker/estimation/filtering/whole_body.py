@@ -15,11 +15,9 @@ import numpy as np
 
 from cardbox_tracker.body.posture import (
     N_JOINTS,
-    N_STATE,
     STATE_LIMITS,
     TORSO_X,
     TORSO_Z,
-    reference_posture,
 )
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
@@ -82,9 +80,7 @@ class WholeBodyFilter:
         self._sigma = c.noise()
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[4:12] = 0.0
-        self._reference = np.zeros(N_STATE)
-        self._reference[:N_JOINTS] = reference_posture("front")
-        self._reference[0] = self._body.placement.lateral_m
+        self._reference = self._body.reference_state()
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, restarting
 
 # Numbers of states that `effort` scales, and the least that the search needs of each.
 _LEAST_TOTALS = MappingProxyType(
@@ -33,7 +33,7 @@ _LEAST_PARTS = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class WholeBodyConfig:
+class WholeBodyConfig(Settings):
     """Numbers of states, noise, and thresholds; see ``docs/architecture.md`` for the steps.
 
     Attributes:
@@ -41,180 +41,133 @@ class WholeBodyConfig:
     """
 
     cost: WholeBodyCostConfig = WholeBodyCostConfig()
-    effort: float = setting(
-        1.0,
-        "factor on all numbers of states: time against accuracy",
-        limits=(0.25, 4.0),
-        restarts=True,
+    effort: float = restarting(
+        1.0, "factor on all numbers of states: time against accuracy", limits=(0.25, 4.0)
     )
-    survivors: int = setting(32, "states kept from frame to frame", limits=(4, 1000), restarts=True)
-    alike: int = setting(
-        12,
-        "survivors that may be alike; the others differ from all better ones",
-        limits=(1, 1000),
-        restarts=True,
+    survivors: int = restarting(32, "states kept from frame to frame", limits=(4, 1000))
+    alike: int = restarting(
+        12, "survivors that may be alike; the others differ from all better ones", limits=(1, 1000)
     )
-    apart_m: float = setting(
-        0.12, "how far apart survivors are to differ", unit="m", limits=(0.0, 10.0), restarts=True
+    apart_m: float = restarting(
+        0.12, "how far apart survivors are to differ", unit="m", limits=(0.0, 10.0)
     )
-    torsos: int = setting(70, "torsos tried", limits=(2, 100_000), restarts=True)
-    torso_explorers: int = setting(
-        16, "of these, those that bow or turn anywhere", limits=(0, 100_000), restarts=True
+    torsos: int = restarting(70, "torsos tried", limits=(2, 100_000))
+    torso_explorers: int = restarting(
+        16, "of these, those that bow or turn anywhere", limits=(0, 100_000)
     )
-    fresh_torsos: int = setting(
+    fresh_torsos: int = restarting(
         8,
         "of these, those that stand upright where the silhouette is; all of them at first",
         limits=(0, 100_000),
-        restarts=True,
     )
-    best_torsos: int = setting(
+    best_torsos: int = restarting(
         12,
         "best torsos that are rated with arms: carried along, and fixed in space",
         limits=(1, 1000),
-        restarts=True,
     )
-    arms: int = setting(90, "arms tried on either side", limits=(2, 100_000), restarts=True)
-    arm_mirrors: int = setting(
-        8, "of these, survivors mirrored in depth", limits=(0, 100_000), restarts=True
-    )
-    arm_tips: int = setting(
+    arms: int = restarting(90, "arms tried on either side", limits=(2, 100_000))
+    arm_mirrors: int = restarting(8, "of these, survivors mirrored in depth", limits=(0, 100_000))
+    arm_tips: int = restarting(
         10,
         "of these, those that reach for foreground that the model leaves uncovered",
         limits=(0, 100_000),
-        restarts=True,
     )
-    banked_arms: int = setting(
-        20, "of these, those drawn from the learned prior", limits=(0, 100_000), restarts=True
+    banked_arms: int = restarting(
+        20, "of these, those drawn from the learned prior", limits=(0, 100_000)
     )
-    best_arms: int = setting(
-        20, "best arms around which others are tried", limits=(1, 100_000), restarts=True
+    best_arms: int = restarting(20, "best arms around which others are tried", limits=(1, 100_000))
+    arms_again: int = restarting(50, "arms tried around the best ones", limits=(1, 100_000))
+    paired_arms: int = restarting(
+        12, "best arms of either side that are paired", limits=(1, 100_000)
     )
-    arms_again: int = setting(
-        50, "arms tried around the best ones", limits=(1, 100_000), restarts=True
-    )
-    paired_arms: int = setting(
-        12, "best arms of either side that are paired", limits=(1, 100_000), restarts=True
-    )
-    rounds: int = setting(
-        2, "rounds in which all joints move together", limits=(0, 100), restarts=True
-    )
-    together: int = setting(36, "states of such a round", limits=(2, 100_000), restarts=True)
+    rounds: int = restarting(2, "rounds in which all joints move together", limits=(0, 100))
+    together: int = restarting(36, "states of such a round", limits=(2, 100_000))
     # Differences of survivors follow the directions in which the fit is flat (Storn & Price,
     # "Differential Evolution", 1997).
-    differing: float = setting(
-        0.4,
-        "of these, the fraction that moves by the difference of two others",
-        limits=(0.0, 1.0),
-        restarts=True,
+    differing: float = restarting(
+        0.4, "of these, the fraction that moves by the difference of two others", limits=(0.0, 1.0)
     )
-    difference_scale: float = setting(
-        0.6, "factor on such a difference", limits=(0.0, 2.0), restarts=True
+    difference_scale: float = restarting(0.6, "factor on such a difference", limits=(0.0, 2.0))
+    y_noise_m: float = restarting(0.02, "noise of the torso's y", unit="m", limits=(0.0, 1.0))
+    roll_noise_rad: float = restarting(
+        0.08, "noise of the torso's roll", unit="rad", limits=(0.0, 3.2)
     )
-    y_noise_m: float = setting(
-        0.02, "noise of the torso's y", unit="m", limits=(0.0, 1.0), restarts=True
+    pitch_noise_rad: float = restarting(
+        0.08, "noise of the torso's pitch", unit="rad", limits=(0.0, 3.2)
     )
-    roll_noise_rad: float = setting(
-        0.08, "noise of the torso's roll", unit="rad", limits=(0.0, 3.2), restarts=True
+    yaw_noise_rad: float = restarting(
+        0.10, "noise of the torso's yaw", unit="rad", limits=(0.0, 3.2)
     )
-    pitch_noise_rad: float = setting(
-        0.08, "noise of the torso's pitch", unit="rad", limits=(0.0, 3.2), restarts=True
+    x_noise_m: float = restarting(0.02, "noise of the torso's x", unit="m", limits=(0.0, 1.0))
+    z_noise_m: float = restarting(0.01, "noise of the torso's z", unit="m", limits=(0.0, 1.0))
+    arm_noise_rad: float = restarting(
+        0.22, "noise of an arm's angles", unit="rad", limits=(0.0, 3.2)
     )
-    yaw_noise_rad: float = setting(
-        0.10, "noise of the torso's yaw", unit="rad", limits=(0.0, 3.2), restarts=True
+    together_noise: float = restarting(
+        0.3, "factor on the noise of the first round of all joints", limits=(0.0, 1.0)
     )
-    x_noise_m: float = setting(
-        0.02, "noise of the torso's x", unit="m", limits=(0.0, 1.0), restarts=True
+    round_decay: float = restarting(
+        0.6, "factor on the noise from one round to the next", limits=(0.0, 1.0)
     )
-    z_noise_m: float = setting(
-        0.01, "noise of the torso's z", unit="m", limits=(0.0, 1.0), restarts=True
+    home_rate: float = restarting(
+        0.02, "how fast the home of the torso's x follows it, a frame", limits=(0.0, 1.0)
     )
-    arm_noise_rad: float = setting(
-        0.22, "noise of an arm's angles", unit="rad", limits=(0.0, 3.2), restarts=True
+    average: int = restarting(
+        150, "best states whose weighted mean is the result", limits=(1, 1_000_000)
     )
-    together_noise: float = setting(
-        0.3,
-        "factor on the noise of the first round of all joints",
-        limits=(0.0, 1.0),
-        restarts=True,
-    )
-    round_decay: float = setting(
-        0.6, "factor on the noise from one round to the next", limits=(0.0, 1.0), restarts=True
-    )
-    home_rate: float = setting(
-        0.02,
-        "how fast the home of the torso's x follows it, a frame",
-        limits=(0.0, 1.0),
-        restarts=True,
-    )
-    average: int = setting(
-        150, "best states whose weighted mean is the result", limits=(1, 1_000_000), restarts=True
-    )
-    spread: float = setting(
+    spread: float = restarting(
         0.02,
         "states this much worse than the best, as a share of the silhouette's pixels, weigh 1/e "
         "in mean and deviation",
         limits=(1e-6, 10.0),
-        restarts=True,
     )
     # With 0.6 hands that move fast lagged behind.
-    smoothing: float = setting(
-        0.3,
-        "share of the last result in the next one",
-        limits=(0.0, 0.99),
-        restarts=True,
+    smoothing: float = restarting(
+        0.3, "share of the last result in the next one", limits=(0.0, 0.99)
     )
-    outline_steps: int = setting(
+    outline_steps: int = restarting(
         2,
         "Gauss-Newton steps that fit the result to the outlines of silhouettes; without "
         "depth images",
         limits=(0, 20),
-        restarts=True,
     )
-    corrector: str = setting(
+    corrector: str = restarting(
         "learned",
         "corrects the result. learned: the package's network; none: nothing; FILE.npz: a network "
         "of the same kind; MODULE:FUNCTION: Python code, see docs/extending.md",
-        restarts=True,
     )
-    learned_deviations: bool = setting(
+    learned_deviations: bool = restarting(
         True,
         "deviations of the angles are those that the corrector knows, if it knows any; false: "
         "those of the particles",
-        restarts=True,
     )
-    output_smoothing_s: float = setting(
+    output_smoothing_s: float = restarting(
         0.08,
         "time constant of a low-pass filter on corrected results, which delays them by about as "
         "much; 0: none",
         unit="s",
         limits=(0.0, 10.0),
-        restarts=True,
     )
-    start_passes: int = setting(
-        3, "searches on the first silhouette of a person", limits=(1, 100), restarts=True
+    start_passes: int = restarting(
+        3, "searches on the first silhouette of a person", limits=(1, 100)
     )
     # Somebody sideways shows about half the area of the front view, a step away less.
-    smallest_person: float = setting(
+    smallest_person: float = restarting(
         0.12,
         "less foreground is nobody, as a fraction of the model's in the front posture",
         limits=(0.0, 1.0),
-        restarts=True,
     )
     # Beyond it the light has changed, or several people are there.
-    largest_person: float = setting(
-        2.5,
-        "more foreground is not one person, as a fraction of the same",
-        limits=(1.0, 1000.0),
-        restarts=True,
+    largest_person: float = restarting(
+        2.5, "more foreground is not one person, as a fraction of the same", limits=(1.0, 1000.0)
     )
-    uncertain_from: float = setting(
-        0.55, "chance of loss above which the state is uncertain", limits=(0.0, 1.0), restarts=True
+    uncertain_from: float = restarting(
+        0.55, "chance of loss above which the state is uncertain", limits=(0.0, 1.0)
     )
-    lost_from: float = setting(
+    lost_from: float = restarting(
         0.95,
         "chance of loss above which a frame counts for lost_frames; 1: never",
         limits=(0.0, 1.0),
-        restarts=True,
     )
 
     def noise(self) -> FloatArray:
@@ -250,7 +203,7 @@ class WholeBodyConfig:
         Raises:
             ValueError: a value is out of range, or values do not go together; the text says which.
         """
-        check(self)
+        super().__post_init__()
         special = self.arm_mirrors + self.arm_tips + self.banked_arms
         if special >= self.arms:
             raise ValueError(f"arms is {self.arms}; expected more than the {special} special ones")

@@ -10,14 +10,14 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, SIDE_TURNS
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation.initialization.wording import rounded_down
-from cardbox_tracker.settings import check, setting
+from cardbox_tracker.settings import Settings, setting
 
 MAX_PITCH_RAD = float(np.radians(80.0))
 """Limit of the camera's pitch, beyond which an upright person's outline is not visible."""
 
 
 @dataclass(frozen=True)
-class InitializationConfig:
+class InitializationConfig(Settings):
     """Settings of the initialization."""
 
     distance_m: float = setting(
@@ -65,14 +65,6 @@ class InitializationConfig:
         True, "refuse references whose outline shows another posture than was asked for"
     )
     seed: int = setting(0, "seed of the random draws", limits=(0, 2**31 - 1))
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            ValueError: a value is out of range; the text names it.
-        """
-        check(self)
 
 
 @dataclass(frozen=True)

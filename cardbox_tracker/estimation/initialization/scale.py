@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import TORSO_Y, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BodyModelError, CameraError, InitializationError
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
@@ -58,58 +57,27 @@ class DepthReference(NamedTuple):
     depth_m: DepthImage
 
 
-def measured_with_second(
+def measured_at_scale(
     measure: Measure,
     config: InitializationConfig,
     camera: Camera,
-    other: OtherCamera,
-    references: Mapping[str, NDArray[np.uint8]],
+    scale: Callable[[BodyModel, Camera], float],
 ) -> InitializationResult:
-    """Measure a person with the first camera, and the distance with the second camera.
+    """Measure a person with the first camera, and the distance with a second one or depth images.
 
     Args:
         measure: measurement with the first camera.
         config: settings; the search starts at their distance.
         camera: the first camera; its pitch is replaced by that of ``config``.
-        other: the second camera.
-        references: its silhouettes, see :func:`measured_scale`.
+        scale: :func:`measured_scale` or :func:`depth_scale`, given its references.
 
     Raises:
-        InitializationError: see ``measure``; or the second camera does not show that person.
+        InitializationError: see ``measure`` and ``scale``.
     """
-    pitched = camera.with_pitch(config.camera_pitch_rad)
     guessed = measure(config, False).body
-    scale = measured_scale(guessed, pitched, other, references)
-    return _measured_again(measure, config, scale)
-
-
-def measured_with_depth(
-    measure: Measure,
-    config: InitializationConfig,
-    camera: Camera,
-    references: Mapping[str, DepthReference],
-) -> InitializationResult:
-    """Measure a person with one camera, and the distance with depth images.
-
-    Args:
-        measure: measurement with the camera.
-        config: settings; the search starts at their distance.
-        camera: camera of silhouettes and depth; its pitch is replaced by that of ``config``.
-        references: see :func:`depth_scale`.
-
-    Raises:
-        InitializationError: see ``measure``; or the depth images do not show that person.
-    """
-    pitched = camera.with_pitch(config.camera_pitch_rad)
-    guessed = measure(config, False).body
-    return _measured_again(measure, config, depth_scale(guessed, pitched, references))
-
-
-def _measured_again(
-    measure: Measure, config: InitializationConfig, scale: float
-) -> InitializationResult:
+    found = scale(guessed, camera.with_pitch(config.camera_pitch_rad))
     # The measurement is repeated because sizes that no outline shows depend on the scale.
-    return measure(replace(config, distance_m=scale * config.distance_m), True)
+    return measure(replace(config, distance_m=found * config.distance_m), True)
 
 
 def measured_scale(
@@ -220,7 +188,7 @@ def _share(
     cost = WholeBodyCost(view.body, view.camera, WholeBodyCostConfig(weight=0.0))
     shares = []
     for name, silhouette in references.items():
-        state = _held(name, there)
+        state = there.reference_state(name)
         seen = view.states(state)
         cost.see(view.upright(silhouette, is_mask=True), seen)
         shares.append(float(cost.bodies(seen[None])[0][0]) if cost.silhouette_px else 1.0)
@@ -231,14 +199,7 @@ def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -
     """Return the mean share of the visible surface that differs from the depth images."""
     term = DepthTerm(_TERM, body, camera)
     shares = [
-        float(term.observe(frame).postures(_held(name, body)[None])[0]) / term.body_px
+        float(term.observe(frame).postures(body.reference_state(name)[None])[0]) / term.body_px
         for name, frame in frames.items()
     ]
     return float(np.mean(shares)) + _TERM.expected
-
-
-def _held(name: str, body: BodyModel) -> FloatArray:
-    """Return the state (14,) of a reference posture at the measured place."""
-    state = np.append(reference_posture(name), [0.0, 0.0])
-    state[TORSO_Y] = body.placement.lateral_m
-    return state

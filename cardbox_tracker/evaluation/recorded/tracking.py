@@ -164,18 +164,6 @@ def recovery_of(
         return measure_recovery(session, frames, body, source.camera, config, seed)
 
 
-def measured_body(session: RecordedSession, source: SilhouetteSource, seed: int) -> BodyModel:
-    """Return the person of a session, measured by one camera.
-
-    Raises:
-        CardboxError: the person cannot be measured in the reference postures.
-    """
-    body, failure = _measure(session, source, seed)
-    if body is None:
-        raise CardboxError(f"nobody can be measured in {session.name}: {failure}")
-    return body
-
-
 def _measure(
     session: RecordedSession, source: SilhouetteSource, seed: int
 ) -> tuple[BodyModel | None, str]:

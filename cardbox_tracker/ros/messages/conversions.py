@@ -44,7 +44,7 @@ def image_of(message: Image | CompressedImage, most_pixels: float = MOST_PIXELS)
             more than ``most_pixels``.
     """
     if isinstance(message, CompressedImage):
-        return decode_compressed(message.data, None, most_pixels)
+        return decode_compressed(message.data, most_pixels)
     return decode_as_sent(*image_parts(message), most_pixels)
 
 
@@ -191,6 +191,14 @@ def _info(
         k=k,
         r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p=projection,
+    )
+
+
+def is_same_info(one: CameraInfo, other: CameraInfo) -> bool:
+    """Return whether two CameraInfo describe the same camera, at any times."""
+    return one.header.frame_id == other.header.frame_id and all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in ("width", "height", "k", "d", "r", "p")
     )
 
 

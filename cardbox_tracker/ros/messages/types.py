@@ -1,4 +1,4 @@
-"""Message classes of recorded topics."""
+"""Message classes of packages that may not be installed."""
 
 from __future__ import annotations
 
@@ -33,6 +33,14 @@ def message_class(topic: str, kind: str) -> Any:
             f"'{package}' (ros-jazzy-{package.replace('_', '-')}), or play other topics with "
             "--topics"
         ) from None
+
+
+def optional_class(package: str, name: str) -> Any:
+    """Return the message class ``name`` of a package, or None if it is not installed."""
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+    except ImportError:
+        return None
 
 
 def message_classes(

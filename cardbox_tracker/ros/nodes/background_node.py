@@ -24,8 +24,9 @@ from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.settings import settings_of
-from cardbox_tracker.vision.background import BackgroundConfig, warm_up
+from cardbox_tracker.vision.background import warm_up
 from cardbox_tracker.vision.background_advice import Findings, advice
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.background_file import background_path
 from cardbox_tracker.vision.calibration_watch import CalibrationWatch
 from cardbox_tracker.vision.camera import Camera

@@ -5,7 +5,6 @@ Without the package tf2_msgs, ``/tf_static`` is not read, and the error texts sa
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -16,6 +15,7 @@ from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.camera import Camera
@@ -70,7 +70,7 @@ class CameraPoses:
             node.subscribe(CameraInfo, topic, partial(self._on_info, number), qos.SILHOUETTE_INPUT)
         self._reads_transforms = True
         if len(self.names) > 1:
-            kind = _transforms_message()
+            kind = optional_class("tf2_msgs", "TFMessage")
             self._reads_transforms = kind is not None
             if kind is not None:
                 node.subscribe(kind, _STATIC_TOPIC, self._on_transforms, qos.STATIC_TRANSFORMS)
@@ -99,7 +99,7 @@ class CameraPoses:
 
     def _on_info(self, number: int, message: CameraInfo, _: int) -> None:
         before = self._infos[number]
-        if before is not None and _is_same(before, message):
+        if before is not None and conversions.is_same_info(before, message):
             return
         self._cameras[number] = conversions.camera_of(message)
         self._infos[number] = message
@@ -145,25 +145,6 @@ class CameraPoses:
             ) from None
 
 
-def _is_same(one: CameraInfo, other: CameraInfo) -> bool:
-    """Return whether two CameraInfo are equal apart from their stamps."""
-    return (one.width, one.height, one.header.frame_id) == (
-        other.width,
-        other.height,
-        other.header.frame_id,
-    ) and all(
-        list(getattr(one, name)) == list(getattr(other, name)) for name in ("k", "d", "r", "p")
-    )
-
-
 def _are_same(one: Extrinsics, other: Extrinsics) -> bool:
     angle_rad, distance_m = one.difference(other)
     return angle_rad < _SAME_RAD and distance_m < _SAME_M
-
-
-def _transforms_message() -> Any:
-    """Return the message class of transforms, or None where it is not installed."""
-    try:
-        return importlib.import_module("tf2_msgs.msg").TFMessage
-    except ImportError:
-        return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from cardbox_tracker.errors import InitializationError
@@ -15,7 +16,8 @@ from cardbox_tracker.estimation.initialization.scale import (
     SCALE_REFERENCES,
     DepthReference,
     Measure,
-    measured_with_depth,
+    depth_scale,
+    measured_at_scale,
 )
 from cardbox_tracker.ros.messages.conversions import stamp_ns
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
@@ -116,4 +118,4 @@ class DepthDistance:
                 "the working resolution has changed since the references were captured; capture "
                 "them again"
             )
-        return measured_with_depth(measure, config, camera, seen)
+        return measured_at_scale(measure, config, camera, partial(depth_scale, references=seen))

@@ -5,7 +5,6 @@ Without the package hri_msgs, the list of tracked people is not published.
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import JointValues, place_of
 from cardbox_tracker.ros.messages import results
+from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -40,7 +40,7 @@ class Rep155Outputs:
             node.advertise(String, f"{place}/{name}", qos.LATCHED)
             for name in ("robot_description", "urdf")
         ]
-        self._ids_list = _ids_list()
+        self._ids_list = optional_class("hri_msgs", "IdsList")
         self._tracked = (
             None
             if self._ids_list is None
@@ -66,11 +66,3 @@ class Rep155Outputs:
             values = np.concatenate([values, place_of(estimate)])
         joints = JointValues(self._names, values)
         self._joints.publish(results.joint_state_message(header, joints))
-
-
-def _ids_list() -> Any:
-    """Return the message class of a list of people, or None where it is not installed."""
-    try:
-        return importlib.import_module("hri_msgs.msg").IdsList
-    except ImportError:
-        return None

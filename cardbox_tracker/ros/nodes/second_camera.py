@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from sensor_msgs.msg import Image
 
@@ -16,7 +17,8 @@ from cardbox_tracker.estimation.initialization.references import Silhouette, ave
 from cardbox_tracker.estimation.initialization.scale import (
     SCALE_REFERENCES,
     Measure,
-    measured_with_second,
+    measured_at_scale,
+    measured_scale,
 )
 from cardbox_tracker.ros.messages.conversions import silhouette_of, stamp_ns
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
@@ -113,7 +115,9 @@ class SecondCamera:
                 f"the second camera has no reference {', '.join(missing)}: it was captured while "
                 "measure_distance was false; capture it again"
             )
-        return measured_with_second(measure, config, first, self._poses.others[0], self._captured)
+        other = self._poses.others[0]
+        scale = partial(measured_scale, other=other, references=self._captured)
+        return measured_at_scale(measure, config, first, scale)
 
 
 def distance_source(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,8 +83,9 @@ class StereoDepthNode(CardboxNode):
         kind = CompressedImage if compressed else Image
         self._topics = {side: self.resolve(f"{side}/{topic}") for side in ("left", "right")}
         self._kept = {side: RecentImages(_KEPT) for side in ("left", "right")}
-        self.subscribe(CameraInfo, "left/camera_info", self._on_left_info, qos.SENSOR_DATA)
-        self.subscribe(CameraInfo, "right/camera_info", self._on_right_info, qos.SENSOR_DATA)
+        for side in self._topics:
+            heard = partial(self._on_info, side)
+            self.subscribe(CameraInfo, f"{side}/camera_info", heard, qos.SENSOR_DATA)
         self.subscribe(kind, f"left/{topic}", self._on_left, qos.SENSOR_DATA)
         self.subscribe(kind, f"right/{topic}", self._on_right, qos.SENSOR_DATA)
         self.diagnostics.extra = lambda: {"known (% of the image)": f"{100 * self._known:.1f}"}
@@ -96,19 +98,10 @@ class StereoDepthNode(CardboxNode):
     def _changed(self, _: StereoDepthParameters) -> None:
         self._pair = None
 
-    def _on_left_info(self, message: CameraInfo, _: int) -> None:
-        self._on_info("left", message)
-
-    def _on_right_info(self, message: CameraInfo, _: int) -> None:
-        self._on_info("right", message)
-
-    def _on_info(self, side: str, message: CameraInfo) -> None:
+    def _on_info(self, side: str, message: CameraInfo, _: int) -> None:
         before = self._infos.get(side)
         self._infos[side] = message
-        if before is None or any(
-            not np.array_equal(getattr(before, name), getattr(message, name))
-            for name in ("k", "r", "p", "d", "width", "height")
-        ):
+        if before is None or not conversions.is_same_info(before, message):
             self._pair = None
 
     def _on_left(self, message: Image | CompressedImage, sent_ns: int) -> None:

@@ -5,7 +5,6 @@ It needs the package tf2_msgs, which is part of ROS, but not available on PyPI.
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -17,6 +16,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_values, positions_of
+from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
@@ -31,7 +31,14 @@ class TfOutputs:
         Raises:
             CardboxError: the package tf2_msgs is not installed.
         """
-        self._kind = _tf_message()
+        self._kind = optional_class("tf2_msgs", "TFMessage")
+        if self._kind is None:
+            raise CardboxError(
+                "publish_tf needs the package tf2_msgs, which is not installed; install it (sudo "
+                "apt install ros-jazzy-tf2-msgs; PyPI has none), or leave publish_tf off: "
+                "robot_state_publisher makes /tf from robot_description and joint_states, and the "
+                "bag of 'cardbox track --bag' has it"
+            )
         self._publisher = node.advertise(self._kind, "/tf", qos.TF)
         self._settings = settings
         self._described: tuple[Any, str] | None = None
@@ -63,15 +70,3 @@ def _stamped(header: Header, link: LinkTransform) -> TransformStamped:
             translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
         ),
     )
-
-
-def _tf_message() -> Any:
-    try:
-        return importlib.import_module("tf2_msgs.msg").TFMessage
-    except ImportError:
-        raise CardboxError(
-            "publish_tf needs the package tf2_msgs, which is not installed; install it (sudo apt "
-            "install ros-jazzy-tf2-msgs; PyPI has none), or leave publish_tf off: "
-            "robot_state_publisher makes /tf from robot_description and joint_states, and the bag "
-            "of 'cardbox track --bag' has it"
-        ) from None

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 import rclpy
-from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -94,9 +93,7 @@ class CardboxNode(Node):
             return publisher
         return self._intra_process.advertise(publisher)
 
-    def subscribe(
-        self, kind: Any, topic: str, callback: Callback, profile: QoSProfile, *, raw: bool = False
-    ) -> None:
+    def subscribe(self, kind: Any, topic: str, callback: Callback, profile: QoSProfile) -> None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
         An exception in ``callback`` is reported, and the node continues.
@@ -123,19 +120,16 @@ class CardboxNode(Node):
             qos.copy_of(profile),
             event_callbacks=qos.subscription_events(self.resolve(topic), self.diagnostics.warn),
             qos_overriding_options=qos.overridable(profile),
-            raw=raw,
         )
 
-    def offer(
-        self, name: str, action: Callable[[], str], group: CallbackGroup | None = None
-    ) -> None:
+    def offer(self, name: str, action: Callable[[], str]) -> None:
         """Offer a Trigger service that returns the text of ``action`` or of its error."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             response.success, response.message = self.outcome(name, action)
             return response
 
-        self.create_service(Trigger, name, answer, qos_profile=qos.SERVICE, callback_group=group)
+        self.create_service(Trigger, name, answer, qos_profile=qos.SERVICE)
 
     def outcome(self, name: str, action: Callable[[], str]) -> tuple[bool, str]:
         """Run ``action``; return its success, and its text or that of its error."""

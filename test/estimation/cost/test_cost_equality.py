@@ -20,11 +20,7 @@ from cardbox_tracker.estimation.cost.cardbox_kernels import trunk_costs
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
 from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of, shape_of
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
-from cardbox_tracker.estimation.cost.silhouette import (
-    ReferenceSilhouette,
-    SilhouetteTerm,
-    rows_above_hips,
-)
+from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm, rows_above_hips
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import (
     NEAR_PLANE_M,
@@ -33,6 +29,7 @@ from cardbox_tracker.vision.rasterisation import (
     render,
     snap,
 )
+from experiments.reference import ReferenceSilhouette
 
 SMALL = ((33, 57), (57, 33), (64, 48), (97, 41), (160, 120))
 LARGE = ((320, 240), (321, 241), (640, 480))

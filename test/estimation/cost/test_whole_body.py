@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import arm_directions, forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX
@@ -25,7 +25,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TORSO,
     WAIST,
 )
-from cardbox_tracker.estimation.cost.kinematics import angles_of_arms, directions_of_arm
+from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.pose_prior import FLOOR_NATS, load_gmm, nats_of
 from cardbox_tracker.estimation.cost.terms import Silence
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
@@ -106,12 +106,12 @@ def test_below_the_start_the_shoulder_stays() -> None:
 def test_angles_and_directions_are_each_others_inverse(seed: int) -> None:
     for angles in random_states(5, seed)[:, 4:8]:
         for side in (1.0, -1.0):
-            directions = directions_of_arm(angles, side)
+            directions = np.concatenate(arm_directions(angles, side))
             assert np.linalg.norm(directions[:3]) == pytest.approx(1.0)
             assert np.linalg.norm(directions[3:]) == pytest.approx(1.0)
             wide = np.array([[-10.0, 10.0]] * 4)
             back = angles_of_arms(directions[None], side, wide)[0]
-            again = directions_of_arm(back, side)
+            again = np.concatenate(arm_directions(back, side))
             np.testing.assert_allclose(again, directions, atol=1e-6)
 
 

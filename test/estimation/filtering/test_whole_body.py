@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
-from cardbox_tracker.estimation.cost.kinematics import directions_of_arm
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering import arm_proposals, state_choice, torso_proposals
@@ -155,14 +155,14 @@ def test_a_mirrored_arm_points_to_the_other_side_in_depth(arm: int) -> None:
     state[first : first + 4] = 1.2, 0.5, 0.1, 0.4
     mirrored = arms_for(np.zeros((120, 160), np.uint8), state, arm, mirrors=20)[-20:]
     side = 1.0 - 2.0 * arm
-    before = directions_of_arm(state[first : first + 4], side)
+    before = np.concatenate(arm_directions(state[first : first + 4], side))
     shoulder = COST.keypoints(state)[3 * arm]
     sight = shoulder / np.linalg.norm(shoulder)
     # Optical to torso's frame of somebody upright: X towards the camera, Y right, Z up.
     sight = np.array([-sight[2], sight[0], -sight[1]])
     kinds = set()
     for angles in mirrored:
-        directions = directions_of_arm(angles, side)
+        directions = np.concatenate(arm_directions(angles, side))
         flips = []
         for half in (slice(0, 3), slice(3, 6)):
             turned = before[half] - 2 * (before[half] @ sight) * sight

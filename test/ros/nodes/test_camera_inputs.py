@@ -85,7 +85,7 @@ class Listening:
 
 @pytest.fixture
 def listening(monkeypatch: pytest.MonkeyPatch) -> Listening:
-    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: object)
+    monkeypatch.setattr(camera_poses, "optional_class", lambda *_: object)
     return Listening()
 
 
@@ -129,7 +129,7 @@ def test_sources_that_disagree_stop_it_and_say_so(listening: Listening) -> None:
 
 
 def test_it_is_said_that_transforms_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: None)
+    monkeypatch.setattr(camera_poses, "optional_class", lambda *_: None)
     blind = Listening()
     for name in ("left", "right"):
         blind.hear(name)
@@ -166,7 +166,7 @@ class Watching:
 
 @pytest.fixture
 def watching(monkeypatch: pytest.MonkeyPatch) -> Watching:
-    monkeypatch.setattr(camera_poses, "_transforms_message", lambda: None)
+    monkeypatch.setattr(camera_poses, "optional_class", lambda *_: None)
     return Watching()
 
 

@@ -12,8 +12,8 @@ import yaml
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-from cardbox_tracker.ros.nodes.node_parameters import NODES
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from tools.parameter_docs import NODES
 
 GIVEN = {"play_bag": {"bag": "bag"}}
 

@@ -17,7 +17,6 @@ from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
-from cardbox_tracker.ros.nodes.node_parameters import NODES
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import (
@@ -29,8 +28,9 @@ from cardbox_tracker.ros.runtime.parameter_fields import (
 )
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.settings import check, settings_of
-from cardbox_tracker.vision.background import BackgroundConfig
+from cardbox_tracker.vision.background_config import BackgroundConfig
 from tools import parameter_docs
+from tools.parameter_docs import NODES
 
 ROOT = Path(__file__).resolve().parents[3]
 

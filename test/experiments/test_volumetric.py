@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS
-from cardbox_tracker.body.volumetric import (
+from experiments.volumetric import (
     LEFT_ARM_FACES,
     N_FACES,
     PART_NAMES,
