@@ -45,7 +45,7 @@ def reference_states(body: BodyModel, side_turn: str) -> dict[str, FloatArray]:
     states = {}
     for name in ("front", "side", "arms"):
         states[name] = np.append(reference_posture(name, side_turn), [0.0, 0.0])
-        states[name][0] = body.placement.lateral_m
+        states[name][TORSO_Y] = body.placement.lateral_m
     return states
 
 

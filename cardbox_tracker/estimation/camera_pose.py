@@ -41,7 +41,7 @@ ROTATION = (0, 1, 2)
 """Indices of a change that rotate the camera."""
 
 WITHOUT_ROLL = (0, 1, 3, 4, 5)
-"""All indices of a change but the roll, which outlines hardly constrain."""
+"""All indices of a change except the roll, which outlines hardly constrain."""
 
 # Standard deviation of a distance, px.
 _POINT_PX = 4.0
@@ -155,8 +155,8 @@ class PoseProblem:
 
         Args:
             extrinsics: current pose.
-            free: indices of the change that are estimated; by default all, or all but the roll if
-                there are no tangents.
+            free: indices of the change that are estimated; by default all, or all except the roll
+                if there are no tangents.
 
         Raises:
             CameraError: the person is not in front of the further camera.

@@ -26,8 +26,8 @@ _ABSENT_FRAMES = 5
 # Frames over which the usual IoU is averaged; loss of IoU, and number of frames with it, that
 # count as clearly worse.
 _USUAL_FRAMES, _WORSE, _WORSE_FRAMES = 10, 0.08, 5
-# Frames between two comparisons of the torso's colours, Bhattacharyya distance of other clothes,
-# and number of such comparisons in a row that count as another person.
+# Frames between two comparisons of the torso's colours; Bhattacharyya distance that indicates other
+# clothes; consecutive comparisons with this result that indicate another person.
 _COMPARE_EVERY, _OTHER_CLOTHES, _OTHER_TIMES = 4, 0.2, 2
 # Shortest and longest pause between attempts in frames, and frames of tracking after which the
 # pause is the shortest again.
@@ -105,10 +105,10 @@ class Fitting:
         return float(np.mean(self._ious)) if self._ious else 1.0
 
     def after(self, is_somebody: bool, iou: float | None) -> None:
-        """Update with the result of the frame.
+        """Store the result of the frame.
 
         Args:
-            is_somebody: whether a person was in the image.
+            is_somebody: whether the image shows a person.
             iou: of model and silhouette before the learned correction; None if the person was
                 lost.
         """

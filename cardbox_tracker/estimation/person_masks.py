@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, POSTURE, reference_posture
+from cardbox_tracker.body.posture import N_STATE, PLACE, POSTURE, TORSO_Y, reference_posture
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
 
@@ -83,9 +83,9 @@ class PersonDrawer:
             cy=(camera.cy + 0.5) / cell - 0.5,
         )
         self.cells_per_m = self._camera.fx / body.placement.distance_m
-        self.front: FloatArray = np.zeros(N_JOINTS + 2)
+        self.front: FloatArray = np.zeros(N_STATE)
         self.front[POSTURE] = reference_posture("front")
-        self.front[0] = body.placement.lateral_m
+        self.front[TORSO_Y] = body.placement.lateral_m
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
         """Return the masks of a person for their last posture.
@@ -148,7 +148,7 @@ class PersonDrawer:
     def _points(self, posture: FloatArray) -> list[Point]:
         """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
         place, camera = self._body.placement, self._camera
-        x_m, z_m = posture[N_JOINTS:].tolist() or (0.0, 0.0)
+        x_m, z_m = posture[PLACE].tolist() or (0.0, 0.0)
         moved = self._body.with_values(
             distance_m=max(place.distance_m - x_m, _NEAREST_M),
             hip_height_m=place.hip_height_m + z_m,

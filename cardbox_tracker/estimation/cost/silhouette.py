@@ -2,11 +2,11 @@
 
     W(d, I_t) = sum over x, y of h(x, y, d) XOR f(x, y, I_t)
 
-Only the rows above the hips count: a model of the upper body has no legs. The middle of
-the hips never moves up or down, so the first row below it is a constant of body and camera.
+Only the rows above the hips count, because the model has no legs. Mid-hip has a constant height, so
+the first row below it depends only on body and camera.
 
-:class:`SilhouetteTerm` is what all its implementations share; :class:`ReferenceSilhouette` does
-just what the equation says. The tracker uses the compiled one in
+:class:`SilhouetteTerm` is the base of all implementations. :class:`ReferenceSilhouette` implements
+the equation literally. The tracker uses the compiled implementation,
 :mod:`cardbox_tracker.estimation.cost.compiled`.
 """
 
@@ -47,8 +47,8 @@ _BOTH_ARMS = slice(LEFT_ARM_PATCHES.start, RIGHT_ARM_PATCHES.stop)
 class SilhouetteObservation(TermObservation):
     """One silhouette.
 
-    Torsos are rated by the patches of torso, waist and head, drawn together with the given arms;
-    arms with the trunk and that one arm drawn; whole postures with all patches.
+    For torsos, the patches of torso, waist and head are drawn together with the given arms; for
+    arms, the trunk and this arm are drawn; for whole postures, all patches are drawn.
     """
 
     frame: Frame
@@ -62,7 +62,7 @@ class SilhouetteTerm(ABC):
     """Base of all implementations of the silhouette's term."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, pitched as it stands."""
+        """Prepare for one body and one camera, which gets the pitch of the body model."""
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
 
@@ -76,11 +76,11 @@ class SilhouetteTerm(ABC):
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: (H, W) grey or (H, W, 3) bgr of the same moment, or None.
-            posture: of the frame before, or None.
+            image: (H, W) grey or (H, W, 3) bgr of the same time, or None.
+            posture: state of the previous frame, or None.
 
         Raises:
-            ValueError: ``silhouette`` or ``image`` has not the camera's size.
+            ValueError: the size of ``silhouette`` or ``image`` is not the camera's.
         """
         for name, pixels in (("silhouette", silhouette), ("image", image)):
             size = (self.camera.height, self.camera.width)
@@ -96,19 +96,19 @@ class SilhouetteTerm(ABC):
         """See :class:`~cardbox_tracker.estimation.cost.terms.Term`."""
 
     def look(self, silhouette: Silhouette) -> SilhouetteObservation:
-        """Observe a silhouette (H, W) by itself.
+        """Observe a silhouette (H, W) without further data.
 
         Raises:
-            ValueError: it has not the camera's size.
+            ValueError: its size is not the camera's.
         """
         return self.observe(self.frame(silhouette))
 
 
 def rows_above_hips(body: BodyModel, camera: Camera) -> int:
-    """Return the number of rows of the image, from its top, above the hips.
+    """Return the number of image rows above the hips.
 
-    The hips' row is taken where the torso stands; at the image's edges a pitched camera would see
-    the same height in the same row as well, since it turns about the rows' direction only.
+    Points of one height and level depth lie in one row also for a pitched camera, because the pitch
+    is a rotation about the direction of the rows.
     """
     placement = body.placement
     hip = camera.reference_to_optical(
@@ -120,20 +120,20 @@ def rows_above_hips(body: BodyModel, camera: Camera) -> int:
 
 
 class ReferenceSilhouette(SilhouetteTerm):
-    """Equation (2) as it reads: draw the model, XOR with the silhouette, count."""
+    """Literal implementation of equation (2): draw the model, XOR with the silhouette, count."""
 
     def observe(self, frame: Frame) -> ReferenceObservation:
         """See :class:`SilhouetteTerm`."""
         return ReferenceObservation(frame, self.body, self.camera)
 
     def draw(self, posture: FloatArray) -> NDArray[np.uint8]:
-        """Return the model (rows, W) in ``posture`` (12,) as the camera sees it, 0 or 255."""
+        """Return the drawn model (rows, W) in ``posture`` (12,), 0 or 255."""
         return render(cardbox_patches(self.body, posture), self.camera, self.rows)
 
 
 @dataclass(frozen=True)
 class ReferenceObservation(SilhouetteObservation):
-    """One silhouette, compared with drawn models pixel by pixel."""
+    """One silhouette, which is compared with drawn models pixel by pixel."""
 
     frame: Frame
     body: BodyModel

@@ -1,7 +1,6 @@
-"""Settings of the whole-body rating: what is drawn, and which postures are usual.
+"""Settings of the whole-body rating: the drawn model and the priors.
 
-Unless a text names another source, values come from trials on recorded sessions with motion capture
-or scripted truth (``docs/research``).
+Values without a source were chosen on recorded sessions with ground truth (``docs/research``).
 """
 
 from __future__ import annotations
@@ -16,31 +15,31 @@ from cardbox_tracker.settings import check, setting
 class WholeBodyCostConfig:
     """The drawn model, the part of the image that counts, and the priors.
 
-    A prior is a sum of squares, each of a value in its unit and none above its cap, so that an
-    unusual posture that the image shows clearly is found all the same.
+    A prior is a sum of squared values, each divided by its unit and limited by a cap, so that a
+    clear image outweighs the prior of an unusual posture.
     """
 
     neck_to_head: float = setting(
         0.65, "width of the neck as a fraction of the head's", limits=(0.0, 1.0), restarts=True
     )
-    # Where a person bows or comes nearer, trousers and skirt fill the rows below the hips.
+    # If a person bows or comes nearer, trousers or skirt fill the rows below the hips.
     waist_extension_m: float = setting(
         0.35,
-        "how far below the middle of the hips the waist is drawn",
+        "distance by which the drawn waist extends below the middle of the hips",
         unit="m",
         limits=(0.0, 1.0),
         restarts=True,
     )
-    # Keypoint "hand" is the middle of a fist; recorded hands are mostly open.
+    # The keypoint "hand" is the middle of a fist, but hands are mostly open.
     fingers_m: float = setting(
         0.05,
-        "how far beyond the hand a forearm is drawn",
+        "distance by which the drawn forearm extends beyond the keypoint of the hand",
         unit="m",
         limits=(0.0, 0.3),
         restarts=True,
     )
-    # Clavicle and shoulder blade: about a third of an arm's elevation, of which part moves the
-    # joint; the gain is fitted to motion capture.
+    # Clavicle and shoulder blade contribute about a third of an arm's elevation, and a part of it
+    # moves the joint; the gain was fitted to motion capture.
     clavicle: float = setting(
         0.43,
         "radius of the circle on which the girdle lifts a shoulder joint, as a fraction of the "
@@ -49,7 +48,7 @@ class WholeBodyCostConfig:
         restarts=True,
     )
     lift_gain: float = setting(
-        0.18, "how far it is lifted, rad per rad of elevation", limits=(0.0, 1.0), restarts=True
+        0.18, "lift on this circle, rad per rad of elevation", limits=(0.0, 1.0), restarts=True
     )
     lift_from_deg: float = setting(
         30.0,
@@ -60,44 +59,43 @@ class WholeBodyCostConfig:
     )
     below_hips_m: float = setting(
         0.35,
-        "how far below the hips rows of the image count, so that hanging hands do",
+        "distance below the hips up to which rows of the image count, so that hanging hands count",
         unit="m",
         limits=(0.0, 1.0),
         restarts=True,
     )
     legs: float = setting(
         0.75,
-        "half width of what is left out below the hips, as a fraction of the waist's width",
+        "half width of the ignored columns below the hips, as a fraction of the waist's width",
         limits=(0.0, 3.0),
         restarts=True,
     )
     weight: float = setting(
         0.012,
-        "weight of a prior's unit, as a share of the silhouette's pixels",
+        "weight of the priors, as a fraction of the silhouette's pixels per unit",
         limits=(0.0, 1.0),
         restarts=True,
     )
     roll_deg: float = setting(
         20.0, "unit of the torso's roll", unit="deg", limits=(0.1, 180.0), restarts=True
     )
-    # Postures are measured against the front reference, which is where a person rests. With 3, the
-    # median of motion capture, a person at rest is found leaning 5 degrees forward and 5 cm too far
-    # away, for the two hardly change the outline together.
+    # Postures are relative to the front reference, in which a person rests. With a positive value,
+    # a person at rest would lean forward and be too far away, which hardly changes the outline.
     pitch_rest_deg: float = setting(
         0.0, "pitch of a person at rest", unit="deg", limits=(-30.0, 30.0), restarts=True
     )
-    # A bow and leaning back lower the head alike in the image, but people bow.
+    # Leaning forward and back lower the head alike in the image, but people lean forward.
     pitch_forward_deg: float = setting(
-        13.0, "unit of the pitch beyond it", unit="deg", limits=(0.1, 180.0), restarts=True
+        13.0, "unit of a pitch above this value", unit="deg", limits=(0.1, 180.0), restarts=True
     )
     pitch_back_deg: float = setting(
-        8.0, "unit of the pitch below it", unit="deg", limits=(0.1, 180.0), restarts=True
+        8.0, "unit of a pitch below this value", unit="deg", limits=(0.1, 180.0), restarts=True
     )
     yaw_deg: float = setting(
         14.0, "unit of the torso's yaw", unit="deg", limits=(0.1, 180.0), restarts=True
     )
     angle_cap: float = setting(
-        9.0, "most that one of the torso's angles costs", limits=(0.1, 1000.0), restarts=True
+        9.0, "largest cost of one of the torso's angles", limits=(0.1, 1000.0), restarts=True
     )
     x_step_m: float = setting(
         0.06,
@@ -113,10 +111,10 @@ class WholeBodyCostConfig:
         limits=(0.001, 10.0),
         restarts=True,
     )
-    step_cap: float = setting(2.0, "most that a motion costs", limits=(0.1, 1000.0), restarts=True)
+    step_cap: float = setting(2.0, "largest cost of a motion", limits=(0.1, 1000.0), restarts=True)
     x_home_m: float = setting(
         0.08,
-        "unit of the torso's distance from where it mostly was along the line of sight",
+        "unit of the torso's distance from its usual place along the line of sight",
         unit="m",
         limits=(0.001, 10.0),
         restarts=True,
@@ -129,17 +127,17 @@ class WholeBodyCostConfig:
         restarts=True,
     )
     home_cap: float = setting(
-        4.0, "most that such a distance costs", limits=(0.1, 1000.0), restarts=True
+        4.0, "largest cost of such a distance", limits=(0.1, 1000.0), restarts=True
     )
     penetration: float = setting(
         3.0,
-        "cost of hand, forearm or elbow on the axis of trunk or head; less towards the surface",
+        "cost of a hand, forearm or elbow on the axis of trunk or head; 0 at the surface",
         limits=(0.0, 1000.0),
         restarts=True,
     )
     unknown_nats: float = setting(
         FLOOR_NATS,
-        "most that the learned prior of an arm costs",
+        "largest cost of the learned prior of an arm",
         limits=(0.1, 50.0),
         restarts=True,
     )

@@ -1,4 +1,4 @@
-"""Arms drawn from the learned prior, from which the whole-body filter proposes some."""
+"""Sample of the learned prior of arms, from which the whole-body filter draws proposals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cardbox_tracker.estimation.cost.pose_prior import sample_bank
 
 @cache
 def bank_of_arms() -> FloatArray:
-    """Return angles (3000, 4), rad, of an arm; they serve for both sides."""
+    """Return angles (3000, 4) of arms, rad, which are valid for both sides."""
     limits = np.ascontiguousarray(JOINT_LIMITS[LEFT_ARM])
     arms: FloatArray = angles_of_arms(sample_bank(), 1.0, limits)
     arms.setflags(write=False)
