@@ -60,7 +60,7 @@ class Sighting(NamedTuple):
     """The person at one time.
 
     Attributes:
-        state: for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
+        state: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
         first: silhouette of the first camera, (H, W), 0 or 255.
         other: silhouette of the further camera.
         stddev: standard deviations of the state, (14,).
@@ -77,8 +77,8 @@ class PoseUpdate(NamedTuple):
 
     Attributes:
         extrinsics: updated pose.
-        change: from the previous pose, (6,).
-        covariance: of the change, from the scatter of the sightings, (6, 6).
+        change: change from the previous pose, (6,).
+        covariance: covariance of the change, from the scatter of the sightings, (6, 6).
         cost: mean of the sightings' weighted squared distances before the step.
     """
 
@@ -124,7 +124,7 @@ class PoseProblem:
             first: the first camera.
             other: the further camera, without its pitch.
             extrinsics: initial pose of the further camera.
-            sightings: of both cameras; those with an empty silhouette are ignored.
+            sightings: sightings of both cameras; those with an empty silhouette are ignored.
             tangents: tangent planes of both cameras, which also constrain the roll.
 
         Raises:

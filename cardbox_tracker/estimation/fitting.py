@@ -63,7 +63,7 @@ class Fitting:
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: of the same frame.
+            image: image of the same frame; None without one.
         """
         self._wait = max(0, self._wait - 1)
         if (body := self._last_that_fitted()) is not None:
@@ -109,8 +109,8 @@ class Fitting:
 
         Args:
             is_somebody: whether the image shows a person.
-            iou: of model and silhouette before the learned correction; None if the person was
-                lost.
+            iou: IoU of model and silhouette before the learned correction; None if the person
+                was lost.
         """
         self._absent = 0 if is_somebody else self._absent + 1
         if self._absent == _ABSENT_FRAMES:
@@ -132,7 +132,7 @@ class Fitting:
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: of the same frame.
+            image: image of the same frame; None without one.
             body: the person at the current place.
             posture: the person's posture, (12,).
         """

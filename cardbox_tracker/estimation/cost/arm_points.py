@@ -58,9 +58,9 @@ def add_costs_of_arms(
     """Add the approximate costs of arms beside the state ``torso`` (14,) to ``costs`` (N,).
 
     Args:
-        joints: of the arms in the torso's frame, (N, 3, 3), metres.
+        joints: joints of the arms in the torso's frame, (N, 3, 3), metres.
         torso: state of the trunk to which the arms belong.
-        body: of the person.
+        body: fields of :class:`~.kernel_arguments.Body`.
         uncovered: row sums outside of trunk and other arm, (rows, W + 1).
         scale: 1 / (pixels of the silhouette).
         costs: changed; as fractions of the silhouette.

@@ -62,7 +62,7 @@ class Surface(NamedTuple):
 
     Attributes:
         depth: (H, W), metres along the optical axis; 0 if unknown.
-        areas_px: of torso, waist, head, upper arm and forearm, (5,).
+        areas_px: areas of torso, waist, head, upper arm and forearm, (5,).
         unit_m: difference that costs 0.5.
         expected: mean cost of a point, which is subtracted.
     """

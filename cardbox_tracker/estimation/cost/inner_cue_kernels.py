@@ -83,7 +83,7 @@ class Forearm(NamedTuple):
 
     Attributes:
         length_m: including the fist.
-        width_m: of the forearm.
+        width_m: width of the forearm.
         px_per_m: scale at the expected place of the person; areas use it, so that a nearer state
             has no advantage.
     """
@@ -152,7 +152,7 @@ def ratio_maps(
         inside: silhouette (h, w), 0 outside.
         steps_of_levels: step of each level of each channel, (channels, 256).
         steps: number of steps.
-        ratios: by zone, hand or forearm, and bin, (3, 2, bins).
+        ratios: log-likelihood ratios by zone, hand or forearm, and bin, (3, 2, bins).
         zones: (6,), in pixels of these arrays, see :func:`torso_zones`.
         maps: written.
     """

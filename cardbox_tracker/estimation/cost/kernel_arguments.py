@@ -55,7 +55,7 @@ class Cardbox(NamedTuple):
     Attributes:
         parts: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies.
         shoulder: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
-        place: of the hips.
+        place: place of the hips.
         camera: intrinsics and pitch of the camera.
     """
 
@@ -72,7 +72,7 @@ class Body(NamedTuple):
         parts: the measured parts, (6, 6), metres.
         drawn: the parts whose outlines are drawn, with a longer waist, neck and forearm.
         girdle: shoulder joints and how the arms lift them, (5,).
-        place: of the hips.
+        place: place of the hips.
         camera: intrinsics and pitch of the camera.
     """
 

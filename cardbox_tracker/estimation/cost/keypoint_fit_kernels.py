@@ -120,7 +120,7 @@ def fit_keypoints(
         wanted: keypoints (6, 3), metres in the optical frame.
         stddev: standard deviations of the change, (14,); a value with 0 stays constant.
         limits: lowest and highest value of each, (14, 2).
-        steps: of the central differences, (14,).
+        steps: steps of the central differences, (14,).
         count: number of steps.
     """
     trial = state.copy()

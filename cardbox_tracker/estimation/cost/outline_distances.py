@@ -47,7 +47,7 @@ class SeenOutline:
     Attributes:
         is_empty: whether the silhouette has no foreground.
         camera: camera of the window.
-        distances: from the silhouette's outline at the grid's points, (n,), px, negative inside.
+        distances: distances of the grid's points from the outline, (n,), px, negative inside.
     """
 
     def __init__(self, silhouette: Silhouette, camera: Camera, hips_m: FloatArray) -> None:

@@ -103,10 +103,10 @@ def add_equations(
     """Add the outline in one camera to the normal equations of ``state`` (14,).
 
     Args:
-        state: for the first camera, (14,).
+        state: state for the first camera, (14,).
         camera: fields of :class:`Seen`.
         body: fields of :class:`~.kernel_arguments.Body`, before this camera.
-        steps: of the central differences, (14,).
+        steps: steps of the central differences, (14,).
         equations: matrix (14, 14), lower triangle, and right side (14,); changed.
         outline: fields of :class:`Outline`, written, (312, 2) each.
 
@@ -180,7 +180,7 @@ def costs_along(
     """Add the costs of one camera's outline after each of ``SHARES`` of a change to ``costs``.
 
     Args:
-        state: for the first camera, (14,).
+        state: state for the first camera, (14,).
         change: change of the state, (14,).
         camera: fields of :class:`Seen`.
         body: fields of :class:`~.kernel_arguments.Body`, before this camera.

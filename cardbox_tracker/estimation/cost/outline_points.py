@@ -46,7 +46,7 @@ def project_corners(
     """Write corners (13, 4, 2), px, of the patches ``first`` to ``end``.
 
     Args:
-        corners_m: of all patches in the optical frame, (3, 52), metres, see ``Workspace``.
+        corners_m: corners of all patches, (3, 52), metres in the optical frame, see ``Workspace``.
         lens: fx, fy, cx, cy.
         first: first patch.
         end: index after the last patch.

@@ -77,7 +77,7 @@ class Ray(NamedTuple):
     Attributes:
         shoulder: in the optical frame, (3,), metres.
         direction: unit vector, (3,).
-        rotation: of the torso, (3, 3).
+        rotation: rotation of the torso, (3, 3).
     """
 
     shoulder: Floats

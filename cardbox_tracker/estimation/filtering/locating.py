@@ -24,7 +24,7 @@ class Location(NamedTuple):
     """Estimated place of the person.
 
     Attributes:
-        bearing: of the silhouette's middle in the first camera: lateral coordinate over depth.
+        bearing: lateral coordinate over depth of the silhouette's middle in the first camera.
         step_m: lateral motion of the middle since the last frame, metres.
         x_m: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
         x_stddev_m: standard deviation of ``x_m``; None if the lines do not determine it.

@@ -57,10 +57,10 @@ class Pixels(NamedTuple):
     """Numbers of pixels.
 
     Attributes:
-        silhouette: of the silhouette.
-        frontal: of the model in the front posture.
-        differing: in which the mean state and the silhouette differ.
-        mean: of the model in the mean state.
+        silhouette: pixels of the silhouette.
+        frontal: pixels of the model in the front posture.
+        differing: pixels in which the model in the mean state and the silhouette differ.
+        mean: pixels of the model in the mean state.
     """
 
     silhouette: int

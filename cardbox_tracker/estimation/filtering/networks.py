@@ -32,8 +32,8 @@ class Network(NamedTuple):
         mean: means of the features, (F,).
         scale: standard deviations of the features, (F,).
         most: limit of the absolute scaled features.
-        weights: of each layer, (networks, inputs, outputs).
-        biases: of each layer, (networks, 1, outputs).
+        weights: weights of each layer, (networks, inputs, outputs).
+        biases: biases of each layer, (networks, 1, outputs).
         unit: factors of the answers, (A,).
     """
 

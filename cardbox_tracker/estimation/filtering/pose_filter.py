@@ -88,7 +88,7 @@ class PoseFilter(Protocol):
         A new search starts around the front reference posture.
 
         Args:
-            frames: of the first camera, then of the further ones.
+            frames: frames of the first camera, then of the further cameras.
             terms: further terms of the cost for each camera.
         """
 

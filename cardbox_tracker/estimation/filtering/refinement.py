@@ -77,7 +77,7 @@ class Refinement:
             frame: silhouette and, if there are any, image and depth image.
             fitted: the state that fits the outlines, (14,).
             stddev: standard deviations of the state, (14,).
-            iou: of model and silhouette.
+            iou: intersection over union of model and silhouette.
             search: result of the search.
         """
         if self.corrector is None:
@@ -104,7 +104,7 @@ class Refinement:
             state: the corrected result, (14,).
             stddev: standard deviations from the filter, (14,).
             keypoints_m: keypoints of the state, (6, 3), metres in the optical frame.
-            iou: of model and silhouette.
+            iou: intersection over union of model and silhouette.
         """
         if self.corrector is None or self.found is None:
             return stddev

@@ -36,7 +36,7 @@ class Walk:
 
         Args:
             silhouette: (H, W), 0 or 255.
-            bearing: of its middle: lateral coordinate over depth.
+            bearing: lateral coordinate over depth of its middle.
             ahead_m: distance of the person, metres.
 
         Returns:

@@ -133,7 +133,7 @@ def seen_appearance(
         silhouette: (H, W) of the person.
         body: the person at the current place.
         camera: working camera with the pitch of the body model.
-        posture: of the person, (12,).
+        posture: posture of the person, (12,).
 
     Returns:
         None if head or torso are not visible.

@@ -72,7 +72,7 @@ def measured_with_second(
         config: settings; the search starts at their distance.
         camera: the first camera; its pitch is replaced by that of ``config``.
         other: the second camera.
-        references: its silhouettes, see :func:`measured_scale`.
+        references: silhouettes of the second camera, see :func:`measured_scale`.
 
     Raises:
         InitializationError: see ``measure``; or the second camera does not show that person.
@@ -95,7 +95,7 @@ def measured_with_depth(
         measure: measurement with the camera.
         config: settings; the search starts at their distance.
         camera: camera of silhouettes and depth; its pitch is replaced by that of ``config``.
-        references: see :func:`depth_scale`.
+        references: silhouettes and depths, see :func:`depth_scale`.
 
     Raises:
         InitializationError: see ``measure``; or the depth images do not show that person.
@@ -149,7 +149,7 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
     Args:
         body: measured by ``camera`` at an assumed distance.
         camera: camera of silhouettes and depth, including its pitch.
-        references: by the names of the reference postures ``front`` and ``arms``.
+        references: silhouettes and depths by the names of the reference postures ``front`` and ``arms``.
 
     Raises:
         InitializationError: the depth images do not show the person.
