@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.drawing.overlay import ImageArray, draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
@@ -32,8 +32,8 @@ def draw_camera_overlay(
         points_m = view.points(tracker.camera.optical_to_reference(estimate.keypoints_m))
         estimate = replace(
             estimate,
-            posture=state[:N_JOINTS],
-            offset_m=state[N_JOINTS:],
+            posture=state[POSTURE],
+            offset_m=state[PLACE],
             keypoints_m=view.camera.reference_to_optical(points_m),
         )
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate)
