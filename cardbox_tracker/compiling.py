@@ -1,16 +1,16 @@
-"""numba's ``njit`` with a cache on disk that may be missing or damaged, but never ends a program.
+"""numba's ``njit`` with a cache on disk that tolerates missing folders and damaged files.
 
-numba keeps compiled code beside the sources, or below the home folder; ``NUMBA_CACHE_DIR`` names
-another place. Where numba can write to none of them, importing a module fails, and where a file of
-the cache was cut off, each call fails. Here a folder of our own below the folder for temporary
-files is tried next, then there is no cache; damaged code is compiled again.
+numba stores compiled code beside the sources, below the home folder, or in ``NUMBA_CACHE_DIR``. If
+it can write to none of them, the import of a module fails; if a file of the cache is truncated,
+each call fails. This module then uses a folder below the folder for temporary files, or no cache,
+and compiles damaged code again.
 
-Compiled code contains its callees and the constants of other files. numba alone only checks the
-file of the function itself; here an entry is valid for one state of all kernel sources of a
-package, see :func:`digest_of_kernels`. A newer entry overwrites the older one.
+Compiled code contains its callees and the constants of other files, but numba only checks the file
+of the function itself. Here an entry is valid for one state of all kernel sources of a package, see
+:func:`digest_of_kernels`. A newer entry overwrites the older one.
 
-Anybody who can write to the folder of the cache can have any code run. So ours belongs to the user
-and nobody else may write to it; a folder that another user made under its name is not used.
+A user who can write to the folder of the cache can execute code in each program that loads it. So
+the folder belongs to the user, and only the user may write to it; other folders are not used.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ _LINE_NUMBER = re.compile(r"-\d+(?=\.py)")
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
-    """Return a decorator that compiles a function, as numba's of that name with ``options``.
+    """Return a decorator that compiles a function, like ``numba.njit`` with ``options``.
 
     Args:
-        cache: keep the compiled code on disk where that is possible.
-        options: those of ``numba.njit``.
+        cache: store the compiled code on disk if that is possible.
+        options: options of ``numba.njit``.
     """
 
     def decorate(function: F) -> F:
@@ -60,18 +60,18 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
 
 
 kernel = njit(cache=True, nogil=True, error_model="numpy")
-"""Compiles a function that runs without the interpreter's lock."""
+"""Decorator that compiles a function, which runs without the interpreter's lock."""
 
 inlined_kernel = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-"""The same for a function that becomes a part of the kernels that call it."""
+"""Decorator that compiles a function, which is inlined into the kernels that call it."""
 
 
 @cached
 def digest_of_kernels(package: str) -> str:
     """Return a digest of all sources that compiled code of a package may contain.
 
-    These are the files that import this module, and the files that they import, for constants
-    become a part of the code.
+    These are the files that import this module, and the files that they import, because their
+    constants are compiled into the code.
 
     Args:
         package: folder of a top-level package.
@@ -93,7 +93,7 @@ def digest_of_kernels(package: str) -> str:
 
 
 def _package_of(file: str) -> str | None:
-    """Folder of the top-level package of a source file; None if it is in no package."""
+    """Return the folder of a source file's top-level package; None without a package."""
     folder, found = os.path.dirname(os.path.abspath(file)), None
     while os.path.isfile(os.path.join(folder, "__init__.py")):
         folder, found = os.path.dirname(folder), folder
@@ -101,7 +101,7 @@ def _package_of(file: str) -> str | None:
 
 
 def own_folder() -> Path | None:
-    """Return a folder for the cache that only this user can write to; None if there can be none."""
+    """Return a folder for the cache that only this user can write to; None if there is none."""
     folder = Path(tempfile.gettempdir()) / f"cardbox_tracker-{os.geteuid()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -113,7 +113,7 @@ def own_folder() -> Path | None:
 
 
 def _cache_of(function: Callable[..., Any]) -> _Cache | None:
-    """The cache of a function, where numba would have it or else in our own folder."""
+    """Return the cache of a function in numba's folder, or else in :func:`own_folder`; or None."""
     try:
         return _Cache(function)
     except (RuntimeError, OSError):
@@ -135,25 +135,25 @@ def _cache_of(function: Callable[..., Any]) -> _Cache | None:
 
 
 class _Cache(FunctionCache):
-    """numba's cache of one function, whose errors mean that there is nothing in it."""
+    """numba's cache of one function; a damaged entry counts as missing."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        """Find the folder of the cache.
+        """Choose the folder of the cache.
 
         Raises:
-            RuntimeError: there is no folder that can be written to.
+            RuntimeError: no folder can be written to.
         """
         super().__init__(function)
         locator = self._impl.locator
         packages = {_PACKAGE, _package_of(function.__code__.co_filename) or _PACKAGE}
         digests = tuple(digest_of_kernels(package) for package in sorted(packages))
-        # Names without line numbers, so that a function that moves leaves no files behind.
+        # Names without line numbers, so that a moved function leaves no old files behind.
         name = _LINE_NUMBER.sub("", self._impl.filename_base)
         stamp = locator.get_source_stamp(), digests
         self._cache_file = IndexDataCacheFile(locator.get_cache_path(), name, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled code; None if it is not there or damaged."""
+        """Return the compiled code; None if it is missing or damaged."""
         try:
             return super().load_overload(sig, target_context)
         except Exception as error:
@@ -162,11 +162,11 @@ class _Cache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the compiled code, if that is possible."""
+        """Store the compiled code, if that is possible."""
         try:
             super().save_overload(sig, data)
         except Exception as error:
-            # An index that was cut off cannot be added to.
+            # No entry can be added to a truncated index.
             if self._empties():
                 with contextlib.suppress(Exception):
                     super().save_overload(sig, data)

@@ -1,9 +1,9 @@
-"""Signals end every program of the package without a traceback, however early they come.
+"""Response of all programs to signals, which end them without a traceback at any time.
 
-Python turns Ctrl-C into an exception wherever it is: in an import, in a destructor, half-way
-through a constructor of rclpy. Here a program chooses: while it imports, a signal ends the process;
-a command raises KeyboardInterrupt where it can clean up; a running node leaves the signal to rclpy,
-which shuts ROS down.
+Python raises an exception for Ctrl-C at any place: in an import, in a destructor, within a
+constructor of rclpy. The functions of this module choose the response: during imports, a signal
+ends the process; a command raises KeyboardInterrupt where it can clean up; a running node leaves
+the signal to rclpy, which shuts ROS down.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class _State:
 
     Attributes:
         response: end the process, raise KeyboardInterrupt, or only note the signal.
-        code: exit code of an ended process; None: 128 and the signal's number, as in a shell.
+        code: exit code of an ended process; None for 128 plus the signal's number, as in a shell.
         received: number of the first signal; 0 before it.
     """
 
@@ -38,14 +38,14 @@ _state = _State()
 
 
 def received() -> int:
-    """Return the number of the signal that asked this program to end; 0 if none has."""
+    """Return the number of the first signal that this program received; 0 without any."""
     return _state.received
 
 
 def end_at_once(code: int | None = None) -> None:
-    """Let SIGINT and SIGTERM end the process with ``code``: for imports, when nothing is open.
+    """Let SIGINT and SIGTERM end the process with ``code``; use it during imports.
 
-    None is 128 and the signal's number.
+    None stands for 128 plus the signal's number.
     """
     _state.response, _state.code = "end", code
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -54,9 +54,10 @@ def end_at_once(code: int | None = None) -> None:
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """Context in which SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt; ignored ones stay so.
+    """Context in which SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
 
-    It does nothing in a thread other than the main one, which alone gets signals.
+    Ignored signals stay ignored. The context has no effect outside of the main thread, because only
+    the main thread receives signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -76,9 +77,9 @@ def raised() -> Iterator[None]:
 
 @contextmanager
 def only_noted() -> Iterator[None]:
-    """Context in which signals raise nothing, since rclpy, which sees them first, ends ROS.
+    """Context in which signals raise nothing, because the handler of rclpy shuts ROS down.
 
-    The handler is not replaced: it would take the place of rclpy's.
+    The handler is not replaced, because that would remove the one of rclpy.
     """
     with _responding("note"):
         yield
@@ -94,10 +95,10 @@ def ignore() -> None:
 
 
 def leave(code: int) -> NoReturn:
-    """End the process with ``code`` once its output is written, skipping Python's own end.
+    """Write all output and end the process with ``code``, without the finalization of Python.
 
-    Python ends ``python -m`` by SIGINT where Ctrl-C came within exec(), even if that was caught.
-    A node needs Python's own end, which takes its participant off the network.
+    Python ends ``python -m`` by SIGINT after a Ctrl-C within exec(), even if it was caught. A node
+    needs the finalization of Python, which takes its participant off the network.
     """
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

@@ -1,7 +1,7 @@
-"""Settings of the core: what each does, its unit, its range, declared once with its default.
+"""Declaration of settings: default, description, unit and range of each, at one place.
 
-A field of a settings dataclass, a :class:`Settings`, is made by :func:`setting`; the parameters of
-the nodes and their documentation take all of it from there.
+:func:`setting` makes a field of a settings dataclass, a :class:`Settings`. The parameters of the
+nodes and their documentation are generated from these fields.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ _TYPE_TEXTS = {bool: "true or false", int: "a whole number", float: "a number", 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is known of one setting besides its name, type and default.
+    """Properties of a setting in addition to name, type and default.
 
     Attributes:
-        description: what it does, one sentence.
+        description: its effect, in one sentence or phrase.
         unit: its unit; empty for a plain number or a text.
         minimum: smallest allowed value; None without a limit.
         maximum: largest allowed value; None without a limit.
-        choices: the allowed texts; empty if any text is.
+        choices: the allowed texts; empty if any text is allowed.
         restarts: True if tracking has to start again when it changes.
     """
 
@@ -46,7 +46,7 @@ class Setting:
 
     @property
     def range_text(self) -> str:
-        """The allowed values in words, or an empty text."""
+        """The allowed values as text; empty without limits and choices."""
         if self.choices:
             return " | ".join(choice or '""' for choice in self.choices)
         return "" if self.limits is None else " to ".join(map(_short, self.limits))
@@ -55,7 +55,7 @@ class Setting:
         """Check a value; None stands for "not set" and is always allowed.
 
         Raises:
-            ValueError: it is not allowed; the text has ``name``, the value and what is allowed.
+            ValueError: it is not allowed; the text has ``name``, the value and the allowed values.
         """
         if value is None:
             return
@@ -63,17 +63,17 @@ class Setting:
             raise ValueError(f"{name} is '{value}'; expected one of {', '.join(self.choices)}")
         if self.limits is not None:
             lowest, highest = self.limits
-            if not lowest <= value <= highest:  # so written, "not a number" is refused too
+            if not lowest <= value <= highest:  # this form refuses NaN, too
                 raise ValueError(f"{name} is {value:g}; expected {lowest:g} to {highest:g}")
 
 
 class NoEffectError(ValueError):
-    """A setting was given that changes nothing beside the others.
+    """A given setting has no effect together with the others.
 
     Attributes:
         name: of the setting.
-        where: in which case it has no effect, such as ``with the strategy drs``.
-        instead: names of settings that act.
+        where: condition under which it has no effect, such as ``with the strategy drs``.
+        instead: names of settings that have an effect.
     """
 
     def __init__(self, name: str, where: str, instead: str) -> None:
@@ -82,7 +82,7 @@ class NoEffectError(ValueError):
         self.name, self.where, self.instead = name, where, instead
 
     def renamed(self, names: Mapping[str, str]) -> str:
-        """Return the text with other names of settings, as a program calls them."""
+        """Return the text with the ``names`` that a program uses for the settings."""
         instead = self.instead
         for name, other in names.items():
             instead = instead.replace(name, other)
@@ -145,12 +145,12 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
     Args:
         instance: the settings to change; they stay as they are.
         given: values by the names of the fields. Nested settings are mappings in turn; a tuple of
-            settings is a mapping from the names of their classes.
-        where: what precedes a name in an error, such as ``whole_body.``.
+            settings is given as a mapping by the names of their classes.
+        where: prefix of names in errors, such as ``whole_body.``.
 
     Raises:
         ValueError: a name is unknown, a value has the wrong type or is out of range; the text has
-            the whole name and what is expected.
+            the whole name and the expected value.
     """
     known = {entry.name: getattr(instance, entry.name) for entry in fields(instance)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
@@ -217,10 +217,10 @@ def _typed(before: Any, value: Any, where: str) -> Any:
 
 
 def restarts(old: Any, new: Any) -> bool:
-    """Return whether tracking has to start again when ``old`` settings become ``new`` ones.
+    """Return whether tracking has to start again after a change from ``old`` to ``new`` settings.
 
-    Both are instances of one dataclass; the fields that are no settings, such as nested settings,
-    are compared as a whole.
+    Both are instances of one dataclass. Fields that are not settings, such as nested settings, are
+    compared as a whole.
     """
     known = settings_of(old)
     return any(

@@ -1,9 +1,9 @@
 """Start a program of the package: ``python -m cardbox_tracker.start NAME ARGUMENTS``.
 
-The installed ``cardbox``, ``background`` and so on begin here, before any slow import, so that a
-signal during the imports ends them without a traceback. ``colcon build`` outside the virtual
-environment makes executables for the system's Python, which lacks numba and rosbags: the error
-names the missing package.
+All installed executables (``cardbox``, ``background`` and others) begin here, before any slow
+import, so that a signal during the imports ends them without a traceback. ``colcon build`` outside
+the virtual environment makes executables for the system's Python, which lacks numba and rosbags;
+the error names the missing package.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ NODES: dict[str, str] = {
     "retarget": "cardbox_tracker.ros.nodes.retarget_node",
     "cardbox_nodes": "cardbox_tracker.ros.nodes.single_process",
 }
-"""Module of each executable that ``ros2 run cardbox_tracker`` knows, besides ``cardbox``."""
+"""Module of each executable of ``ros2 run cardbox_tracker`` except ``cardbox``."""
 
 
 def start(name: str, main: Callable[[], int]) -> int:
-    """Run ``main`` of the program ``name``; a package that is missing is named.
+    """Run ``main`` of the program ``name``, and print an error if a package is missing.
 
     Returns:
-        The exit code; 1 where a package is missing.
+        The exit code; 1 if a package is missing.
     """
     try:
         return main()
@@ -56,7 +56,7 @@ def start(name: str, main: Callable[[], int]) -> int:
 
 def _run(name: str) -> int:
     """Import and run the program ``name``; return its exit code."""
-    # A node that is asked to end has done what it should: 0. A command has not.
+    # A node that ends by a signal succeeds; an interrupted command does not.
     interrupts.end_at_once(0 if name in NODES else None)
     code = start(name, lambda: import_module(NODES.get(name, COMMAND)).main())
     if name in NODES:
@@ -66,7 +66,7 @@ def _run(name: str) -> int:
     return code
 
 
-# The console scripts of setup.py.
+# Functions of the console scripts in setup.py.
 cardbox = partial(_run, "cardbox")
 background = partial(_run, "background")
 initializer = partial(_run, "initializer")
@@ -80,7 +80,7 @@ cardbox_nodes = partial(_run, "cardbox_nodes")
 
 
 def main() -> int:
-    """Run the program that the first argument names."""
+    """Run the program named by the first argument."""
     name = sys.argv[1] if len(sys.argv) > 1 else ""
     if name not in (*NODES, "cardbox"):
         print(f"expected one of {', '.join(NODES)} or cardbox; got '{name}'", file=sys.stderr)

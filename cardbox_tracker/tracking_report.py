@@ -1,4 +1,4 @@
-"""What is said of the state of tracking, in a log and in diagnostics."""
+"""Texts about the state of tracking, for the log and the diagnostics."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ _REASONS = {
 
 
 class TrackingReport:
-    """Follows the estimates of a tracker, and describes its state in words and numbers."""
+    """Collects the estimates of a tracker, and describes its state in words and numbers."""
 
     def __init__(self) -> None:
-        """Start before the first estimate."""
+        """Begin without an estimate."""
         self._body: BodyModel | None = None
         self._state = ""
         self._counts: dict[str, int] = {}
         self._estimate: Estimate | None = None
 
     def start(self, body: BodyModel) -> None:
-        """Forget the state: tracking starts anew, with ``body``."""
+        """Begin again with ``body``."""
         self._state, self._body = "", body
 
     def add(self, estimate: Estimate, body: BodyModel) -> dict[str, str]:
-        """Take note of the estimate of an image, and of whose ``body`` it is.
+        """Add the estimate of an image and the ``body`` to which it belongs.
 
         Returns:
-            What has changed with it, by kind.
+            Texts about changes, by kind.
         """
         news = {}
         if body is not self._body:
@@ -56,21 +56,21 @@ class TrackingReport:
         if estimate.state == UNCERTAIN:
             news["state"] = f"tracking, but {reason}"
         elif before != UNCERTAIN or reason:
-            # Uncertain frames may come and go with every other image.
+            # The state may change between tracking and uncertain with each image.
             news["state"] = f"not tracking: {reason}" if reason else "tracking"
         return news
 
     def warnings(self) -> dict[str, str]:
-        """Return what is wrong now, if anything is, by kind."""
+        """Return texts about present problems, by kind."""
         reason = _REASONS.get(self._state)
         if reason is None:
             return {}
         return {"": reason if self._state == UNCERTAIN else f"no joint states: {reason}"}
 
     def values(self, cameras: Mapping[str, str]) -> dict[str, str]:
-        """Return the state, how often each occurred, and the figures of the last posture.
+        """Return the state, the number of images with each state, and values of the last posture.
 
-        ``cameras`` are further values, which come before the figures.
+        ``cameras`` are further values, which precede those of the posture.
         """
         values = {"state": self._state or "not started"}
         values |= {f"images {state}": str(count) for state, count in self._counts.items()}

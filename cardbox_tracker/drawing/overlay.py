@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.body.kinematics import BodyFrames
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
 from cardbox_tracker.estimation.estimate import Estimate
@@ -89,8 +89,8 @@ def draw_camera_overlay(
         points_m = view.points(tracker.camera.optical_to_reference(estimate.keypoints_m))
         estimate = replace(
             estimate,
-            posture=state[:N_JOINTS],
-            offset_m=state[N_JOINTS:],
+            posture=state[POSTURE],
+            offset_m=state[PLACE],
             keypoints_m=view.camera.reference_to_optical(points_m),
         )
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate)

@@ -1,1 +1,1 @@
-"""How a posture is found: cost, resampling, particle filter, hierarchy, initialization."""
+"""Estimation of a posture: cost, resampling, particle filter, hierarchy, initialization."""

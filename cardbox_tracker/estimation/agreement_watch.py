@@ -1,4 +1,4 @@
-"""Asks now and then, beside the tracking, whether several cameras are where they are said to be."""
+"""Periodic check of the extrinsics of several cameras, in a thread beside the tracking."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 
 
 class AgreementWatch:
-    """Checks the extrinsics in a thread of its own, one window of images after the other."""
+    """Checks the extrinsics in a separate thread, one window of images after the other."""
 
     def __init__(self, cameras: Sequence[str]) -> None:
-        """Watch the further ones of ``cameras``, by name, the first camera first."""
+        """Prepare for the names of all ``cameras``, of which the first one is the reference."""
         self._names = list(cameras)[1:]
         self._thread: threading.Thread | None = None
         self._agreement: CameraAgreement | None = None
@@ -23,8 +23,8 @@ class AgreementWatch:
         if agreement is None or not agreement.is_due:
             return
         if self._thread is None or not self._thread.is_alive():
-            # Python waits for it at the end, no longer than interrupts.py does: a daemon that is
-            # in compiled code while Python ends aborts the process.
+            # No daemon thread: one that runs compiled code while Python ends aborts the process.
+            # interrupts.py limits the wait at the end.
             self._thread = threading.Thread(target=agreement.check, name="agreement", daemon=False)
             self._thread.start()
 
@@ -34,13 +34,13 @@ class AgreementWatch:
             self._thread.join()
 
     def values(self) -> dict[str, str]:
-        """Return by how much each further camera seems to be turned, for the diagnostics."""
+        """Return the estimated rotation error of each further camera, for the diagnostics."""
         if self._agreement is None:
             return {}
-        said = {"turned": self._agreement.turned_deg, "rolled": self._agreement.rolled_deg}
+        errors = {"turned": self._agreement.turned_deg, "rolled": self._agreement.rolled_deg}
         return {
             f"{name} {how} (deg)": "not yet known" if degrees is None else f"{degrees:.1f}"
-            for how, found in said.items()
+            for how, found in errors.items()
             for name, degrees in zip(self._names, found, strict=True)
         }
 

@@ -65,7 +65,7 @@ class CameraAgreement:
         """Add a tracked frame.
 
         Args:
-            state: for the first camera, (14,).
+            state: state for the first camera, (14,).
             first: the person's silhouette in the first camera, (H, W), 0 or 255.
             others: upright silhouettes of the further cameras; None for a missing image.
         """

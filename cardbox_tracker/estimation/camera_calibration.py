@@ -77,8 +77,7 @@ class CalibratedCamera(NamedTuple):
 
 def calibrated_camera(
     body: BodyModel,
-    first: Camera,
-    other: Camera,
+    cameras: tuple[Camera, Camera],
     references: Mapping[str, Pair],
     moving: Sequence[MovingFrame],
     side_turn: str = "left",
@@ -89,8 +88,7 @@ def calibrated_camera(
 
     Args:
         body: the person, measured by the first camera.
-        first: the first camera.
-        other: the further camera, without its pitch.
+        cameras: the first camera and the further one, without their pitch.
         references: silhouettes of both cameras by the names of the reference postures.
         moving: frames in which the person moves, starting in the front reference posture.
         side_turn: direction in which the person turned for ``side``.
@@ -101,6 +99,7 @@ def calibrated_camera(
         InitializationError: the silhouettes do not show the same person, or too few frames show
             the person in both cameras.
     """
+    first, other = cameras
     states = reference_states(body, side_turn)
     still = [Sighting(states[name], *pair, _REFERENCE_STDDEV) for name, pair in references.items()]
     pose = guessed_extrinsics(body, first, other, references, side_turn)

@@ -41,7 +41,7 @@ ROTATION = (0, 1, 2)
 """Indices of a change that rotate the camera."""
 
 WITHOUT_ROLL = (0, 1, 3, 4, 5)
-"""All indices of a change but the roll, which outlines hardly constrain."""
+"""All indices of a change except the roll, which outlines hardly constrain."""
 
 # Standard deviation of a distance, px.
 _POINT_PX = 4.0
@@ -60,7 +60,7 @@ class Sighting(NamedTuple):
     """The person at one time.
 
     Attributes:
-        state: for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
+        state: state for the first camera, (14,): d1..d12, ``torso_x``, ``torso_z``.
         first: silhouette of the first camera, (H, W), 0 or 255.
         other: silhouette of the further camera.
         stddev: standard deviations of the state, (14,).
@@ -77,8 +77,8 @@ class PoseUpdate(NamedTuple):
 
     Attributes:
         extrinsics: updated pose.
-        change: from the previous pose, (6,).
-        covariance: of the change, from the scatter of the sightings, (6, 6).
+        change: change from the previous pose, (6,).
+        covariance: covariance of the change, from the scatter of the sightings, (6, 6).
         cost: mean of the sightings' weighted squared distances before the step.
     """
 
@@ -124,7 +124,7 @@ class PoseProblem:
             first: the first camera.
             other: the further camera, without its pitch.
             extrinsics: initial pose of the further camera.
-            sightings: of both cameras; those with an empty silhouette are ignored.
+            sightings: sightings of both cameras; those with an empty silhouette are ignored.
             tangents: tangent planes of both cameras, which also constrain the roll.
 
         Raises:
@@ -155,8 +155,8 @@ class PoseProblem:
 
         Args:
             extrinsics: current pose.
-            free: indices of the change that are estimated; by default all, or all but the roll if
-                there are no tangents.
+            free: indices of the change that are estimated; by default all, or all except the roll
+                if there are no tangents.
 
         Raises:
             CameraError: the person is not in front of the further camera.

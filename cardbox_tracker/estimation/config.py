@@ -1,4 +1,4 @@
-"""Settings of the tracker and the two presets; the single source of their defaults."""
+"""Settings of the tracker and its two presets; the defaults are declared only here."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 from cardbox_tracker.settings import NoEffectError, Settings, changed, restarting, setting
 
 FILTERS = ("hierarchical", "whole_body")
-"""Every name that ``filter`` may have."""
+"""Allowed values of ``filter``."""
 
-# Settings of one filter, with those that do similar work in the other one.
+# Settings of one filter, and the settings of the other filter with a similar effect.
 _OF_HIERARCHICAL = MappingProxyType(
     {
         "torso.particles": "effort",
@@ -40,48 +40,51 @@ _OF_WHOLE_BODY = MappingProxyType({"survivors": "torso.survival_rate", "average"
 
 @dataclass(frozen=True)
 class FilterConfig(Settings):
-    """One particle filter, as one column of the paper's Table I."""
+    """Settings of one particle filter: one column of the paper's Table I."""
 
     particles: int = restarting(200, "particles of each filter, N", limits=(2, 1_000_000))
     survival_rate: float = restarting(
-        0.4, "fraction of the particles that survive a cycle, e of DRS", limits=(1e-9, 1.0)
+        0.4,
+        "fraction of the particles that survive a cycle, e of DRS",
+        limits=(1e-9, 1.0),
     )
     rotation_noise_rad: float = restarting(
         0.25, "noise of the angles", unit="rad", limits=(0.0, 3.2)
     )
-    # The arms have none.
+    # Arms have no place.
     translation_noise_m: float = restarting(0.0, "noise of the place", unit="m", limits=(0.0, 1.0))
     sigma_gamma_px: float = restarting(
         4000.0,
-        "width of the Gaussian that turns costs into the weights of SRS, at 320x240; it grows with "
+        "standard deviation sigma_gamma of the Gaussian weights of SRS, at 320x240; it grows with "
         "the image's area",
         unit="px",
         limits=(1e-9, 1e9),
     )
     elite: bool = restarting(
-        True, "the first particle of a cycle is the best of the one before, unchanged"
+        True,
+        "the best particle of a cycle survives unchanged as the first one of the next cycle",
     )
 
 
 @dataclass(frozen=True)
 class TrackerConfig(Settings):
-    """The hierarchy of filters and what goes beyond the paper; the defaults are the paper's.
+    """Settings of the filters and of the extensions; the defaults are those of the paper.
 
     Attributes:
         torso: filter of d1..d4 (Table I).
         arm: filter of each arm (Table I).
-        terms: settings of the cost's terms beside that of the silhouette (``estimation/cost``).
+        terms: settings of the cost's terms in addition to the silhouette (``estimation/cost``).
         whole_body: settings of the filter ``whole_body``.
 
-    The filter ``hierarchical`` uses all settings but those of ``whole_body``; the filter
-    ``whole_body`` uses those, ``terms``, ``relocalize``, ``select_person``, ``lost_iou`` and
+    The filter ``hierarchical`` uses all settings except ``whole_body``. The filter ``whole_body``
+    uses ``whole_body``, ``terms``, ``relocalize``, ``select_person``, ``lost_iou`` and
     ``lost_frames``.
     """
 
     filter: str = restarting(
         "hierarchical",
-        "hierarchical: the paper's, one for the torso and one for each arm; whole_body: all joints "
-        "and the torso's place, with a rounded model and learned postures",
+        "hierarchical: the paper's filters, one for the torso and one for each arm; whole_body: "
+        "one filter of all joints and the torso's place, with a rounded model and learned priors",
         choices=FILTERS,
     )
 
@@ -90,7 +93,7 @@ class TrackerConfig(Settings):
     strategy: str = restarting(
         "drs", "resampling strategy of the filters", choices=tuple(STRATEGIES)
     )
-    cycles: int = setting(1, "estimation cycles an image", limits=(1, 100))
+    cycles: int = setting(1, "estimation cycles per image", limits=(1, 100))
     terms: tuple[TermSettings, ...] = ()
     whole_body: WholeBodyConfig = WholeBodyConfig()
     average: int = restarting(
@@ -98,32 +101,30 @@ class TrackerConfig(Settings):
         "best particles whose weighted mean is the result; 1: the best one",
         limits=(1, 1_000_000),
     )
-    # Rated alone, the torso leans forward to cover the upper arms.
+    # A torso that is rated without arms leans forward to cover the upper arms.
     torso_beside_arms: bool = restarting(
         True,
-        "rate a torso beside the arms found last, where they are in the image, so that the whole "
-        "model is drawn as in equation (2)",
+        "rate a torso together with the last arms, which stay in place in the image, so that the "
+        "whole model is drawn as in equation (2)",
     )
     relocalize: bool = setting(
-        False, "search again when the person was lost, or came back into the image"
+        False, "search again if the person was lost or came back into the image"
     )
     select_person: bool = restarting(
         False,
-        "only the parts of the silhouette count that can be the person, not a door, a chair or "
-        "somebody who passes by",
+        "use only the parts of the silhouette that can belong to the person, not to a door, a "
+        "chair or a passer-by",
     )
-    lost_iou: float = setting(
-        0.4, "an image whose overlap (IoU) is below this does not fit", limits=(0.0, 1.0)
-    )
+    lost_iou: float = setting(0.4, "least IoU of an image that fits", limits=(0.0, 1.0))
     lost_frames: int = setting(
         5,
-        "consecutive images below lost_iou before the state is lost",
+        "consecutive images below lost_iou until the state is lost",
         limits=(1, 1_000_000),
     )
 
     @property
     def has_several_views(self) -> bool:
-        """Whether it may be given several cameras, or depth."""
+        """Whether the filter supports several cameras and depth images."""
         return self.filter == "whole_body"
 
     def __post_init__(self) -> None:
@@ -138,17 +139,17 @@ class TrackerConfig(Settings):
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")
 
     def with_depth(self) -> TrackerConfig:
-        """Return the same settings with the term of a measured depth."""
+        """Return these settings with the term for depth images."""
         return replace(self, terms=(*self.terms, Depth()))
 
     def changed(self, given: Mapping[str, Any]) -> TrackerConfig:
-        """Return the settings with other values, all of which act in the filter that is chosen.
+        """Return these settings with other values, each of which acts in the selected filter.
 
         Args:
             given: values by name, nested ones as mappings: ``{"whole_body": {"effort": 0.5}}``.
 
         Raises:
-            NoEffectError: one of them would change nothing.
+            NoEffectError: one of the values has no effect.
             ValueError: a name is unknown, a value has the wrong type or is out of range.
         """
         config = changed(self, given)
@@ -157,7 +158,7 @@ class TrackerConfig(Settings):
         return config
 
     def _check_effect(self, name: str) -> None:
-        """Raise NoEffectError if the setting of this dotted name changes nothing."""
+        """Raise NoEffectError if the setting with this dotted name has no effect."""
         first, _, last = name.rpartition(".")
         if self.filter == "whole_body":
             instead = _OF_HIERARCHICAL.get(name) or _OF_HIERARCHICAL.get(first)
@@ -180,10 +181,10 @@ class TrackerConfig(Settings):
             raise NoEffectError(name, "of arms, which have no place", "arm.rotation_noise_rad")
 
     def with_particles(self, particles: int) -> TrackerConfig:
-        """Return the same settings with N = ``particles`` in each of the three filters.
+        """Return these settings with N = ``particles`` in each of the three filters.
 
         Raises:
-            NoEffectError: the filter is another one, which has none.
+            NoEffectError: the filter is not ``hierarchical``.
             ValueError: the number is out of range.
         """
         number = {"particles": particles}
@@ -192,7 +193,7 @@ class TrackerConfig(Settings):
 
 
 def _names(given: Mapping[str, Any], before: str = "") -> Iterator[str]:
-    """Yield the dotted names of all values."""
+    """Yield the dotted name of each value."""
     for name, value in given.items():
         if isinstance(value, Mapping):
             yield from _names(value, f"{before}{name}.")
@@ -201,12 +202,12 @@ def _names(given: Mapping[str, Any], before: str = "") -> Iterator[str]:
 
 
 def paper_preset() -> TrackerConfig:
-    """Return Table I: 600 particles, one cycle a frame, the best particle is the result."""
+    """Return Table I: 600 particles, one cycle per frame; the best particle is the result."""
     return TrackerConfig()
 
 
 def default_preset() -> TrackerConfig:
-    """Return what tracks best: the whole-body filter (``docs/architecture.md``)."""
+    """Return the most accurate settings: the whole-body filter (``docs/architecture.md``)."""
     return TrackerConfig(
         filter="whole_body", terms=(InnerCue(),), relocalize=True, select_person=True
     )

@@ -1,8 +1,8 @@
-"""What a tracker says of one image.
+"""The result of tracking for one time.
 
-States: ``tracking``; ``uncertain`` (a posture that may be wrong); ``lost`` (somebody is there, but
-the model has not fitted for several frames); ``no_person`` (too few foreground pixels for anybody).
-Only ``tracking`` and ``uncertain`` have a posture.
+States: ``tracking``; ``uncertain`` (the posture may be wrong); ``lost`` (a person is visible, but
+the model has not fitted for several frames); ``no_person`` (too few foreground pixels for a
+person). Only ``tracking`` and ``uncertain`` have a posture.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_pers
 
 @dataclass(frozen=True)
 class Estimate:
-    """What one silhouette says.
+    """State of tracking and posture of the person at one time.
 
     Attributes:
-        state: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; the rest is None unless it is
-            one of the first two.
+        state: ``tracking``, ``uncertain``, ``lost`` or ``no_person``; with the last two, all other
+            attributes are None.
         posture: d1..d12, (12,), rad and metres.
-        posture_stddev: standard deviation of each joint, (12,): over the particles, weighted by
-            fit, or learned of results like this one (``filtering/deviations.py``).
+        posture_stddev: standard deviation of each joint, (12,), rad and metres: the weighted spread
+            of the particles, or the output of a learned model (``filtering/deviations.py``).
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
-        cost_px: equation (2) of the posture.
+        cost_px: cost of the posture (equation (2)), px.
         iou: intersection over union of model and silhouette, above the hips.
-        offset_m: ``torso_x`` and ``torso_z``, (2,): how far the hips are nearer to the camera, and
-            higher, than the body model's placement; None if the filter keeps them constant.
-        offset_stddev_m: their standard deviations, (2,).
+        offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
+            model's placement, towards the camera and up; None if the filter keeps it constant.
+        offset_stddev_m: standard deviations of ``offset_m``, (2,), metres.
     """
 
     state: str
@@ -44,7 +44,7 @@ class Estimate:
     offset_stddev_m: FloatArray | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
-        """Return ``body`` where this estimate finds it."""
+        """Return ``body`` at the place of this estimate."""
         if self.offset_m is None:
             return body
         x_m, z_m = self.offset_m.tolist()

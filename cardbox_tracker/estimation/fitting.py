@@ -26,8 +26,8 @@ _ABSENT_FRAMES = 5
 # Frames over which the usual IoU is averaged; loss of IoU, and number of frames with it, that
 # count as clearly worse.
 _USUAL_FRAMES, _WORSE, _WORSE_FRAMES = 10, 0.08, 5
-# Frames between two comparisons of the torso's colours, Bhattacharyya distance of other clothes,
-# and number of such comparisons in a row that count as another person.
+# Frames between two comparisons of the torso's colours; Bhattacharyya distance that indicates other
+# clothes; consecutive comparisons with this result that indicate another person.
 _COMPARE_EVERY, _OTHER_CLOTHES, _OTHER_TIMES = 4, 0.2, 2
 # Shortest and longest pause between attempts in frames, and frames of tracking after which the
 # pause is the shortest again.
@@ -63,7 +63,7 @@ class Fitting:
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: of the same frame.
+            image: image of the same frame; None without one.
         """
         self._wait = max(0, self._wait - 1)
         if (body := self._last_that_fitted()) is not None:
@@ -105,12 +105,12 @@ class Fitting:
         return float(np.mean(self._ious)) if self._ious else 1.0
 
     def after(self, is_somebody: bool, iou: float | None) -> None:
-        """Update with the result of the frame.
+        """Store the result of the frame.
 
         Args:
-            is_somebody: whether a person was in the image.
-            iou: of model and silhouette before the learned correction; None if the person was
-                lost.
+            is_somebody: whether the image shows a person.
+            iou: IoU of model and silhouette before the learned correction; None if the person
+                was lost.
         """
         self._absent = 0 if is_somebody else self._absent + 1
         if self._absent == _ABSENT_FRAMES:
@@ -132,7 +132,7 @@ class Fitting:
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: of the same frame.
+            image: image of the same frame; None without one.
             body: the person at the current place.
             posture: the person's posture, (12,).
         """

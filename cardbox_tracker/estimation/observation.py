@@ -1,4 +1,4 @@
-"""What one camera saw at one time: the input of the tracker."""
+"""The observation of one camera at one time: the input of the tracker."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What one camera saw at one time; 2D keypoints of a detector belong here, too.
+    """The data of one camera at one time; 2D keypoints of a detector belong here, too.
 
-    An observation without a silhouette is one of a camera that is silent.
+    An observation without a silhouette stands for a camera without data at this time.
 
     Attributes:
-        silhouette: (H, W), 0 or 255, of the camera's size; None where the camera has none.
+        silhouette: (H, W), 0 or 255, of the camera's size; None if there is none.
         image: (H, W) grey or (H, W, 3) bgr of the same time, for terms that use it.
-        depth_m: (H, W), metres along the optical axis, for the term ``Depth``; not finite or 0
-            where it is not known. Only that of the first camera counts.
-        stamp_ns: when it was taken, ns; None where that is not known.
+        depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths are 0
+            or not finite. Only the depth image of the first camera is used.
+        stamp_ns: time of the data, ns; None if it is unknown.
     """
 
     silhouette: Silhouette | None = None
@@ -29,13 +29,13 @@ class Observation:
 
 
 Observations = Sequence[Observation | None]
-"""Of the first camera, then of the further ones; None of a camera that is silent."""
+"""One observation for each camera, the first camera first; None for a camera without data."""
 
 
 def stamp_of(observations: Observations) -> int | None:
-    """Return the stamp of what the cameras saw together, ns; None where none is known.
+    """Return the common stamp of the observations, ns; None if no stamp is known.
 
-    It is the first camera's; without that, the earliest of the others.
+    This is the stamp of the first camera, or else the earliest stamp of the further cameras.
     """
     first, *others = (None if one is None else one.stamp_ns for one in observations)
     if first is not None:

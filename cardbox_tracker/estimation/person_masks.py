@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, POSTURE
+from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.vision.camera import Camera
 
@@ -146,7 +146,7 @@ class PersonDrawer:
     def _points(self, posture: FloatArray) -> list[Point]:
         """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
         place, camera = self._body.placement, self._camera
-        x_m, z_m = posture[N_JOINTS:].tolist() or (0.0, 0.0)
+        x_m, z_m = posture[PLACE].tolist() or (0.0, 0.0)
         moved = self._body.with_values(
             distance_m=max(place.distance_m - x_m, _NEAREST_M),
             hip_height_m=place.hip_height_m + z_m,

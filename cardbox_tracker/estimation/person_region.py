@@ -87,8 +87,8 @@ class PersonRegion:
 
         Args:
             silhouette: (H, W), 0 or 255, of the camera's size.
-            posture: of the previous frame, (12,) or with ``torso_x`` and ``torso_z`` (14,); None
-                at the start of tracking.
+            posture: state of the previous frame, (12,) or with ``torso_x`` and ``torso_z`` (14,);
+                None at the start of tracking.
             is_sure: whether that posture fitted well.
             image: (H, W) grey or (H, W, 3) bgr of the same frame; without it, pixels in front of
                 an object at rest belong to the person only near the last posture.

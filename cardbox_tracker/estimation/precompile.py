@@ -1,6 +1,6 @@
-"""Compile everything into the cache on disk, so that nobody waits for the compiler later.
+"""Compilation of all kernels into the cache on disk, so that tracking starts without delay.
 
-Installation, the tests and the tracker's node do so before their work begins.
+The installation, the tests and the tracker's node run it before their work begins.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cardbox_tracker.vision.rasterisation import render
 
 
 def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
-    """Follow a drawn person with each of ``presets``, so that all their code was run once."""
+    """Track a drawn person with each of ``presets``, which compiles all their kernels."""
     background.warm_up()
     person_region.warm_up()
     body = BodyModel()
@@ -49,7 +49,7 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
 
 
 def quickest(config: TrackerConfig) -> TrackerConfig:
-    """Return ``config`` with as few states as its filter allows."""
+    """Return ``config`` with the smallest number of states that its filter allows."""
     if config.filter == "hierarchical":
         return config.with_particles(2)
     return config.changed({"whole_body": {"effort": 0.25}})

@@ -43,10 +43,10 @@ def likely_postures(
     They are drawn from the particles, or by :func:`normal_postures` without particles.
 
     Args:
-        posture: of the estimate, (12,).
+        posture: posture of the estimate, (12,).
         stddev: standard deviations of the estimate, (12,).
         offset_m: ``torso_x`` and ``torso_z`` of the estimate, (2,), needed with particles.
-        particles: of the same image.
+        particles: particles of the same image.
         count: number of samples.
         rng: random numbers.
 

@@ -124,7 +124,7 @@ def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float
     different columns.
 
     Args:
-        tangents: of several frames.
+        tangents: tangents of several frames.
         extrinsics: assumed pose.
 
     Returns:

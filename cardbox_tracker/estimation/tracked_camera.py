@@ -1,4 +1,4 @@
-"""One camera of a tracker: its view of the body, the person in its images, its terms."""
+"""One camera of a tracker: view of the body, selection of the person, terms of the cost."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
@@ -21,8 +21,8 @@ class TrackedCamera:
     """The first camera, or a further one whose images are turned upright.
 
     Attributes:
-        view: how a further camera sees the body; None of the first camera.
-        terms: the further terms of its cost.
+        view: the body in the frame of a further camera; None for the first camera.
+        terms: terms of its cost in addition to the silhouette.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class TrackedCamera:
         config: TrackerConfig,
         other: OtherCamera | None = None,
     ) -> None:
-        """Prepare for ``body``, which stands before ``first``, pitched as it stands.
+        """Prepare for ``body`` in front of ``first``, with the pitch of the body model.
 
         Call :meth:`reset` before the first frame.
 
@@ -40,7 +40,7 @@ class TrackedCamera:
             body: the person.
             first: the first camera.
             config: settings of the tracker.
-            other: the further camera that this one is; None: it is the first one.
+            other: this camera if it is a further one; None for the first camera.
 
         Raises:
             CameraError: the person is not in front of the camera.
@@ -51,17 +51,17 @@ class TrackedCamera:
         self._name = "the first camera" if other is None else "a further camera"
         self._body = body if self.view is None else self.view.body
         self._camera = first if self.view is None else self.view.camera
-        # Rows of a further camera are cut by its own cost, where the person is found.
+        # The cost of a further camera limits the rows where the person is found.
         self._rows = rows_above_hips(body, first) if self.view is None else self._camera.height
         self.configure(config)
         self._region: PersonRegion | None = None
 
     def configure(self, config: TrackerConfig) -> None:
-        """Build the terms anew."""
+        """Build the terms from other settings."""
         self.terms: list[Term] = [term.build(self._body, self._camera) for term in config.terms]
 
     def reset(self, config: TrackerConfig) -> None:
-        """Forget which part of the images is the person."""
+        """Forget the region of the person in the images."""
         self._region = PersonRegion(self._body, self._camera) if config.select_person else None
 
     def frame(
@@ -74,21 +74,21 @@ class TrackedCamera:
         """Return the frame of an observation: upright, with the person's part of the silhouette.
 
         Args:
-            observation: what the camera saw; without a silhouette, the frame shows nobody.
-            before: state of the frame before, (12,) or (14,) of the first camera; None where
-                tracking starts.
+            observation: data of the camera; without a silhouette, the frame is empty.
+            before: state of the previous frame, (12,) or (14,), for the first camera; None at the
+                start of tracking.
             is_sure: whether that state fitted.
-            interval_s: since the frame before, s.
+            interval_s: time since the previous frame, s.
 
         Raises:
-            ValueError: the silhouette or the image has not the camera's size.
+            ValueError: the size of the silhouette or the image is not the camera's.
         """
         posture, depth_m = before, None
         stamp_ns = None if observation is None else observation.stamp_ns
         if self.view is None:
             depth_m = None if observation is None else observation.depth_m
         elif before is not None:
-            posture = self.view.states(before) if len(before) == N_JOINTS + 2 else None
+            posture = self.view.states(before) if len(before) == N_STATE else None
         if observation is None or observation.silhouette is None:
             nothing = np.zeros((self._camera.height, self._camera.width), np.uint8)
             return Frame(nothing, self._rows, 0, None, posture, depth_m, interval_s, stamp_ns)
@@ -118,7 +118,7 @@ class TrackedCamera:
 def _upright(
     view: View, silhouette: Silhouette, image: Image | None
 ) -> tuple[Silhouette, Image | None]:
-    """Return silhouette and image turned upright; the image only where there is foreground."""
+    """Return silhouette and image turned upright; the image is only filled at the foreground."""
     silhouette = view.upright(silhouette, is_mask=True)
     if image is None:
         return silhouette, None

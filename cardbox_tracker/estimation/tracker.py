@@ -1,4 +1,4 @@
-"""Follow one person's posture from silhouette to silhouette, and say how well it went."""
+"""Tracking of one person's posture over silhouettes, with a confidence for each frame."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from cardbox_tracker.vision.camera import Camera
 FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
     {"hierarchical": Cycles, "whole_body": WholeBodyFilter}
 )
-"""The filters by the names that ``TrackerConfig.filter`` may have."""
+"""Filter classes by the values of ``TrackerConfig.filter``."""
 
 
 class Tracker:
     """Tracks one measured person (paper, algorithm "Online Motion Tracking").
 
     Attributes:
-        agreement: whether several cameras stand where their extrinsics say; None of one camera.
+        agreement: check of the extrinsics of several cameras; None with one camera.
     """
 
     def __init__(
@@ -58,21 +58,21 @@ class Tracker:
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
     ) -> None:
-        """Set up for ``body``; the camera is pitched as the body model says.
+        """Set up for ``body``; the camera gets the pitch of the body model.
 
         Args:
-            body: the person. What is unknown of them is fitted while tracking, which replaces
-                the attribute ``body``. Until then, no estimate is better than ``uncertain``.
+            body: the person. Unknown values are fitted while tracking, which replaces the attribute
+                ``body``. Until then, estimates are at best ``uncertain``.
             camera: working camera, of the silhouettes' size.
             config: settings; the paper's by default.
             rng: source of all noise; seeded with 0 by default.
-            silhouette: another implementation of the silhouette's term, for comparison.
-            make_filter: another filter than that of the settings.
+            silhouette: implementation of the silhouette's term; compiled by default.
+            make_filter: filter that replaces the one of the settings.
             others: further cameras; they need the filter ``whole_body``.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
-            ValueError: there are ``others``, and another filter.
+            ValueError: there are ``others``, but the filter is not ``whole_body``.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
@@ -88,7 +88,7 @@ class Tracker:
         self._use(body, silhouette or CompiledSilhouette(body, self.camera))
 
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
-        """Track ``body`` from the next silhouette on."""
+        """Track ``body`` from the next frame on."""
         self.body, self._silhouette = body, silhouette
         self._cameras = [
             TrackedCamera(body, self.camera, self.config, other) for other in (None, *self._others)
@@ -98,7 +98,7 @@ class Tracker:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the posture: the next silhouette is tracked from the front reference posture."""
+        """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
         for camera in self._cameras:
             camera.reset(self.config)
@@ -107,17 +107,16 @@ class Tracker:
         self._poor_frames = 0
         self._last_ns: int | None = None
         self._particles: Particles | None = None
-        # What terms may know of the frame before: d1..d12, and torso_x, torso_z where estimated.
+        # State of the previous frame for the terms: d1..d12, and torso_x, torso_z if estimated.
         self._before: FloatArray | None = None
-        # How well the last result fitted before it was corrected.
+        # IoU of the last result before its correction.
         self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:
-        """Use other settings from the next silhouette on.
+        """Use other settings from the next frame on.
 
         Returns:
-            True if they need other particles, so that tracking starts again as after
-            :meth:`reset`.
+            True if tracking starts again, as after :meth:`reset`, because the particles change.
         """
         is_new_start = restarts(self.config, config)
         if config.terms != self.config.terms:
@@ -132,19 +131,19 @@ class Tracker:
 
     @property
     def filter(self) -> PoseFilter:
-        """What searches the postures; for tools that want to know more than the estimate."""
+        """The particle filter, for tools that need more than the estimate."""
         return self._filter
 
     @property
     def views(self) -> tuple[View, ...]:
-        """How the further cameras see the body."""
+        """Views of the body from the further cameras."""
         return tuple(camera.view for camera in self._cameras if camera.view is not None)
 
     def camera_ious(self) -> list[float | None]:
-        """Return how well the last estimate fits what each camera saw.
+        """Return the IoU of the last estimate with each camera's silhouette, the first one first.
 
         Returns:
-            IoU by camera, the first camera's first; None of one that saw nobody.
+            One value for each camera; None for a camera that showed no person.
         """
         return self._filter.ious()
 
@@ -154,20 +153,20 @@ class Tracker:
         image: Image | None = None,
         stamp_ns: int | None = None,
     ) -> Estimate:
-        """Estimate the posture behind what the cameras saw at one time.
+        """Estimate the posture from the observations of all cameras at one time.
 
         Args:
-            observations: of the first camera, then of ``others``; None, or an observation without
-                a silhouette, of a camera that is silent, and it may be missing at the end. One
-                observation is that of the first camera, and so is a silhouette (H, W), 0 or 255.
-            image: of the same time as a bare silhouette, (H, W) grey or (H, W, 3) bgr.
-            stamp_ns: of a bare silhouette. Without a stamp, a frame is 1/15 s after the one
-                before.
+            observations: one for each camera, the first camera first. A camera without data has
+                None or an observation without a silhouette, and may be missing at the end. A single
+                observation or silhouette (H, W), 0 or 255, belongs to the first camera.
+            image: (H, W) grey or (H, W, 3) bgr of the same time as a bare silhouette.
+            stamp_ns: time of a bare silhouette, ns. Without a stamp, the interval to the previous
+                frame is 1/15 s.
 
         Raises:
-            ValueError: a silhouette or an image has not its camera's size, there are more
-                observations than cameras, or ``image`` or ``stamp_ns`` beside observations, which
-                have their own.
+            ValueError: the size of a silhouette or an image is not its camera's; there are more
+                observations than cameras; or ``image`` or ``stamp_ns`` is given in addition to
+                observations.
         """
         if isinstance(observations, np.ndarray):
             observations = Observation(observations, image, stamp_ns=stamp_ns)
@@ -183,7 +182,7 @@ class Tracker:
         return self._track(self._frames_of(observations))
 
     def _frames_of(self, observations: Observations) -> list[Frame]:
-        """Return the frames of all cameras, one that shows nobody for each that is silent."""
+        """Return the frames of all cameras; the frame of a camera without data is empty."""
         stamp_ns, before_ns = stamp_of(observations), self._last_ns
         self._last_ns, interval_s = stamp_ns, USUAL_INTERVAL_S
         if stamp_ns is not None and before_ns is not None and stamp_ns > before_ns:
@@ -215,7 +214,7 @@ class Tracker:
         return estimate
 
     def sample(self, estimate: Estimate, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return postures (count, 12) as likely as the last ``estimate``: ``likely_postures``."""
+        """Sample postures (count, 12) for the last ``estimate``; see ``likely_postures``."""
         found = estimate.posture, estimate.posture_stddev, estimate.offset_m
         return likely_postures(*found, self._particles, count, rng)
 
@@ -224,16 +223,16 @@ class Tracker:
         if presence is Presence.NOBODY:
             self._before = None
             if self.config.relocalize:
-                # The person may come back elsewhere.
+                # The person may come back at another place.
                 self._filter.forget()
             return Estimate(NO_PERSON)
         if presence is Presence.TOO_MUCH:
-            # A lamp goes on, a door opens: soon the person is where they were.
+            # After a short change of the light, the person is still at the same place.
             return Estimate(LOST)
         fit = self._filter.follow(frames, [camera.terms for camera in self._cameras])
         self._particles = fit.particles
         if not fit.is_finite:
-            # Particles that are not numbers would stay so for ever.
+            # Without a reset, values that are not finite would stay in the particles.
             self.reset()
             return Estimate(LOST)
         self._before, self._seen_iou = fit.seen, fit.seen_iou

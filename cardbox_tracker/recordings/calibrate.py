@@ -89,8 +89,7 @@ def calibrate_recording(
             done = number / len(names[1:])
             found[name] = calibrated_camera(
                 body,
-                first.camera,
-                other.camera,
+                (first.camera, other.camera),
                 pairs,
                 _moving(first, other, motion),
                 config.side_turn,

@@ -1,4 +1,4 @@
-"""Settings of the background model and of the silhouettes cut out with it."""
+"""Settings of the background model and of the silhouette extraction."""
 
 from __future__ import annotations
 
@@ -20,50 +20,49 @@ class BackgroundConfig(Settings):
     )
     min_stddev: float = setting(
         1.5,
-        "smallest standard deviation that is assumed of a pixel",
+        "least standard deviation of a pixel",
         unit="grey levels",
         limits=(0.0, 100.0),
     )
     clean_up: bool = setting(
-        True, "false applies equation (1) alone: all settings after this one have no effect"
+        True, "clean the silhouette; false: apply equation (1) alone, without the settings below"
     )
     smoothing_px: float = setting(
         0.6,
-        "standard deviation of the Gaussian that smooths the difference before the threshold; "
-        "it lowers the noise and with it the specks",
+        "standard deviation of the Gaussian that smooths the difference before the threshold, "
+        "against noise and specks",
         unit="px",
         limits=(0.0, 20.0),
     )
     min_contrast: float = setting(
         7.0,
-        "a smoothed difference below this is never foreground",
+        "least smoothed difference of a foreground pixel",
         unit="grey levels",
         limits=(0.0, 255.0),
     )
     shadow: float = setting(
         0.13,
-        "a pixel that is darker than the background by less than this fraction is a shadow, not "
-        "the person; 0 is off",
+        "a pixel that is darker than the background by less than this fraction is a shadow; 0: off",
         limits=(0.0, 1.0),
     )
     soft_shadow: float = setting(
         0.07,
-        "a darker pixel is also a shadow where the brightness relative to the background changes "
-        "by less than this fraction within 5x5 px, all the way from the background; 0 is off",
+        "a darker pixel is also a shadow if it is connected to the background by pixels whose "
+        "relative brightness changes by less than this fraction within 5x5 px; 0: off",
         limits=(0.0, 1.0),
     )
     darkest_shadow: float = setting(
         0.4,
-        "a pixel that is darker than the background by more than this fraction is no soft shadow",
+        "largest darkening of a soft shadow, as a fraction of the background's brightness",
         limits=(0.0, 1.0),
     )
     color: bool = setting(
         True,
-        "a pixel is also foreground if its colour differs; only for images in colour",
+        "a pixel of a colour image is also foreground if its colour differs",
     )
     min_color_contrast: float = setting(
         7.0,
-        "a colour difference (Cr, Cb) below this is never foreground",
+        "least colour difference (Cr, Cb) of a foreground pixel",
         unit="grey levels",
         limits=(0.1, 255.0),
     )
@@ -77,34 +76,33 @@ class BackgroundConfig(Settings):
     edge: float = setting(
         0.35,
         "a pixel is dropped if its difference is less than this fraction of the largest among its "
-        "8 neighbours, so that smoothing does not widen the outline; 0 is off",
+        "8 neighbours, so that smoothing does not widen the outline; 0: off",
         limits=(0.0, 1.0),
     )
     flicker: float = setting(
         0.1,
-        "with follow off: a brightness change of the whole scene up to this fraction is "
-        "compensated; 0 is off",
+        "largest brightness change of the whole scene that is compensated if follow is off, as a "
+        "fraction; 0: off",
         limits=(0.0, 1.0),
     )
     follow: bool = setting(
         True,
-        "follow the light of the scene: drift, automatic gain and white balance, a lamp; the "
+        "adapt to changes of the light (drift, automatic gain and white balance, a lamp); the "
         "person never becomes background",
     )
     min_area: float = setting(
         0.004,
-        "foreground regions smaller than this fraction of the image are dropped",
+        "least area of a foreground region, as a fraction of the image",
         limits=(0.0, 1.0),
     )
     max_hole: float = setting(
         0.0008,
-        "holes smaller than this fraction of the image are filled",
+        "area below which a hole is filled, as a fraction of the image",
         limits=(0.0, 1.0),
     )
     absorb_after: int = setting(
         300,
-        "images after which a region of the silhouette in and near which nothing moves, such as a "
-        "door left open, becomes background; a person sways; of more than 20 images a second not "
-        "all count; 0: never",
+        "images after which a region of the silhouette without motion in and near it, such as an "
+        "open door, becomes background; at most 20 images a second count; 0: never",
         limits=(0, 1000000),
     )

@@ -16,6 +16,8 @@ from cardbox_tracker.body.posture import (
     JOINT_LIMITS,
     JOINT_NAMES,
     LEFT_ARM,
+    MIRROR_SIGNS,
+    MIRRORED,
     N_STATE,
     PLACE,
     PLACE_NAMES,
@@ -51,11 +53,6 @@ def test_the_indices_are_those_of_the_names() -> None:
     for side, first in zip(("left", "right"), FIRST_ANGLES, strict=True):
         for name in arm:
             assert names[first + getattr(posture_module, name)] == f"{side}_{name.lower()}"
-
-
-# The mirror image: the arms change places; aside, roll and yaw turn over.
-MIRRORED = [*range(4), *range(8, 12), *range(4, 8), 12, 13]
-MIRROR_SIGNS = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * (N_STATE - 4)])
 
 
 @given(shares=arrays(np.float64, N_STATE, elements=st.floats(0.0, 1.0)))

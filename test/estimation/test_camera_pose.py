@@ -208,14 +208,14 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
     moving = [
         MovingFrame((one.first, one.other), (None, None)) for one in sightings(waving(16, 0.1))
     ]
-    found = calibrated_camera(BODY, CAMERA, OTHER, references, moving)
+    found = calibrated_camera(BODY, (CAMERA, OTHER), references, moving)
     angle_rad, away_m = found.extrinsics.difference(TRUE)
     assert np.degrees(angle_rad) < 6.0
     assert away_m < 0.25
     assert found.halves_deg < 10.0
     assert "degrees" in str(found)
     with pytest.raises(InitializationError, match="ten seconds"):
-        calibrated_camera(BODY, CAMERA, OTHER, references, moving[:3])
+        calibrated_camera(BODY, (CAMERA, OTHER), references, moving[:3])
 
 
 def test_no_pose_is_guessed_where_nobody_is_seen() -> None:

@@ -1,8 +1,8 @@
 """Cost of a posture: terms over one observation.
 
-``silhouette`` defines the cost of equation (2) and implements it as it reads; ``compiled`` gives
-the same numbers, fast. Compiled code is built of ``kinematics`` (state to joints), patches
+``silhouette`` defines the cost of equation (2) and implements it literally; ``compiled`` computes
+the same numbers fast. Compiled code consists of ``kinematics`` (state to joints), patches
 (``cardbox_kernels`` for the paper's model, ``body_outline`` for the whole body), ``rasterisation``
 (patches to columns of rows) and ``union`` (pixels under any patch, from ``row_sums``).
-``kernel_arguments`` makes body and camera into what these take.
+``kernel_arguments`` converts body and camera to the arguments of the kernels.
 """

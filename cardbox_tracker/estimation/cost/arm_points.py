@@ -1,12 +1,12 @@
-"""Arms rated at a few points along their bones: a tenth of the work of drawing them.
+"""Approximate costs of arms from a few points along their bones, a tenth of the work of drawing.
 
-A limb is a bar, and a point of its axis speaks for the part of the bar around it. With S the row
-sums of what trunk and other arm leave uncovered, the cost of an arm is about
+A limb is a bar, and each point of its axis represents the part of the bar around it. Let S be the
+row sums of the pixels that trunk and other arm leave uncovered. The cost of an arm is about
 
     scale * sum over its points of (pixels of that part) * (S(v, u + 1) - S(v, u))
 
-where (u, v) is the point's pixel: -1 for foreground that is uncovered, 0 for what is covered, 1 for
-background. That is enough to tell which of many arms are worth being drawn.
+where (u, v) is the point's pixel. The difference is -1 for uncovered foreground, 0 for covered
+pixels and 1 for background. The approximation selects the arms that are drawn.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 from cardbox_tracker.estimation.cost.kinematics import pose_arm, state_pose
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 
-# Points of the upper arm, the elbow among them, and of the forearm, to the end of the fingers.
+# Points of the upper arm, including the elbow, and of the forearm, up to the fingertips.
 _POINTS = (3, 4)
-# Nearer to the camera nothing is drawn, m.
+# Least depth of drawn points, m.
 _NEAREST_M = 0.05
 
 
@@ -58,12 +58,12 @@ def add_costs_of_arms(
     """Add the approximate costs of arms beside the state ``torso`` (14,) to ``costs`` (N,).
 
     Args:
-        joints: of the arms in the torso's frame, (N, 3, 3), metres.
-        torso: state whose trunk the arms are at.
-        body: of the person.
-        uncovered: row sums beside trunk and other arm, (rows, W + 1).
+        joints: joints of the arms in the torso's frame, (N, 3, 3), metres.
+        torso: state of the trunk to which the arms belong.
+        body: fields of :class:`~.kernel_arguments.Body`.
+        uncovered: row sums outside of trunk and other arm, (rows, W + 1).
         scale: 1 / (pixels of the silhouette).
-        costs: shares of the silhouette.
+        costs: changed; as fractions of the silhouette.
     """
     rows, width = uncovered.shape[0], uncovered.shape[1] - 1
     of = body_of(body)
@@ -84,7 +84,7 @@ def add_costs_of_arms(
             for j in range(3):
                 axis[j] = (seen_m[limb + 1, j] - start[j]) / parts[part, HEIGHT]
             far_m = max(start[2] + 0.5 * long_m * axis[2], _NEAREST_M)
-            # How long the limb looks: what of its axis lies across the line of sight.
+            # Length of the limb in the image: the part of its axis across the line of sight.
             across = axis[0] - axis[2] * start[0] / far_m
             down = axis[1] - axis[2] * start[1] / far_m
             looks_m = sqrt(across * across + down * down) * long_m + 0.5 * wide_m

@@ -1,8 +1,8 @@
 """Compiled outlines of the whole body: the corners of its patches in the optical frame.
 
-Torso, waist, neck and head are the outlines of elliptic frustums, so they look as wide from any
-side as a body does, with the torso's top as a rectangle; a limb is a bar that faces the camera with
-a square at its end. These are 13 patches instead of the cardbox's 15.
+Torso, waist, neck and head are drawn as outlines of elliptic frustums, so their width is right from
+any side; the torso's top is a rectangle. A limb is a bar that faces the camera, with a square at
+its end. These are 13 patches instead of the cardbox's 15.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ from cardbox_tracker.estimation.cost.rasterisation import Workspace, new_workspa
 _TRUNK_PARTS, TRUNK_PATCHES, _LIMB_PATCHES = 4, 5, 2
 ARM_PATCHES = 2 * _LIMB_PATCHES
 BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
-# The square at an elbow is as large as the disc of the limbs' mean width, that at a hand's end as
-# the disc of the forearm's width: half sides, sqrt(pi) / 2 = 0.886 of the radius.
+# A square replaces the disc of equal area at an elbow (limbs' mean width) and at a hand's end
+# (forearm's width); half its side is sqrt(pi) / 2 = 0.886 of the radius.
 _SQUARE_OF_DISC = 0.886
 
 
@@ -49,8 +49,8 @@ _SQUARE_OF_DISC = 0.886
 def _frustum(part: Floats, p: int, vx: float, vy: float, shape: Floats) -> None:
     """Write patch ``p``: the outline of an elliptic frustum of the torso's frame.
 
-    It is seen along the level direction (vx, vy). An ellipse with half axes a along Y and b along X
-    shows the two points
+    The line of sight is the level direction (vx, vy). The outline of an ellipse with half axes a
+    along Y and b along X consists of the two points
 
         +-(-vy b^2, vx a^2) / sqrt(vy^2 b^2 + vx^2 a^2)
     """
@@ -69,7 +69,7 @@ def _frustum(part: Floats, p: int, vx: float, vy: float, shape: Floats) -> None:
 
 @inlined_kernel
 def lid(part: Floats, p: int, shape: Floats) -> None:
-    """Write patch ``p``: the horizontal rectangle at a part's top."""
+    """Write patch ``p``: the horizontal rectangle at the top of a part."""
     patches = shape.shape[1] // 4
     x, y = part[DEPTH] / 2, part[TOP_WIDTH] / 2
     for c in range(4):
@@ -83,7 +83,7 @@ def lid(part: Floats, p: int, shape: Floats) -> None:
 def place_trunk(work: Workspace, drawn: Floats) -> None:
     """Write the corners of torso, waist, neck, head and the torso's top, patches 0 to 4."""
     rotation, hip, shape, corners = work.torso, work.hip, work.shape, work.corners
-    # The direction of sight, level in the torso's frame, at half the height of the torso's top.
+    # Line of sight, level in the torso's frame, to half the height of the torso's top.
     middle = 0.5 * (drawn[TORSO, BOTTOM] + drawn[TORSO, HEIGHT])
     x = hip[0] + middle * rotation[0, 2]
     y = hip[1] + middle * rotation[1, 2]
@@ -93,7 +93,7 @@ def place_trunk(work: Workspace, drawn: Floats) -> None:
     norm = sqrt(vx * vx + vy * vy) + 1e-9
     for p in range(_TRUNK_PARTS):
         _frustum(drawn[p], p, vx / norm, vy / norm, shape)
-    # The top is visible of a person who bows.
+    # The top is visible if the person bows.
     lid(drawn[TORSO], _TRUNK_PARTS, shape)
     patches = shape.shape[1] // 4
     for j in range(3):
@@ -118,17 +118,17 @@ def _place_limb(
     mx = start[0] + 0.5 * length * axis[0]
     my = start[1] + 0.5 * length * axis[1]
     mz = start[2] + 0.5 * length * axis[2]
-    # Across limb and line of sight.
+    # Direction across limb and line of sight.
     sx = my * axis[2] - mz * axis[1]
     sy = mz * axis[0] - mx * axis[2]
     sz = mx * axis[1] - my * axis[0]
     norm = sqrt(sx * sx + sy * sy + sz * sz)
     far = sqrt(mx * mx + my * my + mz * mz) + 1e-12
     if norm < 1e-6 * far:
-        # It points to the camera: any direction will do.
+        # The limb points to the camera, so any direction is valid.
         sx, sy, sz, norm = 1.0, 0.0, 0.0, 1.0
     sx, sy, sz = sx / norm, sy / norm, sz / norm
-    # Across that and the line of sight.
+    # Direction across that one and the line of sight.
     tx, ty, tz = (sy * mz - sz * my) / far, (sz * mx - sx * mz) / far, (sx * my - sy * mx) / far
     for c in range(4):
         is_first = c == 0 or c == 3
@@ -157,7 +157,7 @@ def place_arm(arm: PosedArm, p: int, drawn: Floats, corners: Floats) -> None:
 
 @inlined_kernel
 def new_scratch() -> tuple[Workspace, PosedArm]:
-    """Return the scratch of :func:`place_patches`."""
+    """Return the scratch arrays of :func:`place_patches`."""
     return new_workspace(BODY_PATCHES, 1), new_arm()
 
 

@@ -1,4 +1,4 @@
-"""Compiled priors of the whole body, in units of squared distances from rest."""
+"""Compiled priors of the whole body; their unit is a squared normalized distance."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from cardbox_tracker.estimation.cost.pose_prior import nats_of
 ) = range(15)
 N_RULES = 15
 
-# Below the middle of the hips a body ends, m: a hanging arm is not inside the legs.
+# The body ends this far below mid-hip, m, so that a hanging arm is not inside the legs.
 _HIPS_END_M = -0.1
 
 
@@ -61,7 +61,7 @@ class Prior(NamedTuple):
     """The priors of one frame.
 
     Attributes:
-        anchor: x and z of the last frame and the home of x, metres, and the expected yaw, (4,).
+        anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
         rules: units and weights, (15,).
         gmm: mixture of Gaussians of an arm's directions, see :mod:`.pose_prior`.
     """
@@ -76,13 +76,13 @@ PriorTuple = tuple[Floats, Floats, Floats]
 
 @inlined_kernel
 def _saturating(square: float, cap: float) -> float:
-    """``square`` where it is small, ``cap`` where it is large."""
+    """Return about ``square`` for small values, and at most ``cap``."""
     return cap * (1.0 - exp(-square / cap))
 
 
 @inlined_kernel
 def torso_prior(state: Floats, given: Prior) -> float:
-    """Prior of the torso of a state (14,)."""
+    """Return the prior of the torso of a state (14,)."""
     anchor, rules = given.anchor, given.rules
     cap = rules[ANGLE_CAP]
     pitch = state[PITCH] - rules[PITCH_REST]
@@ -100,9 +100,10 @@ def torso_prior(state: Floats, given: Prior) -> float:
 
 @inlined_kernel
 def _depth_inside(x: float, y: float, z: float, parts: Floats, margin: float) -> float:
-    """How deep a point of the torso's frame lies in trunk or head: 0, outside, to 1, on the axis.
+    """Return the depth of a point inside trunk or head: 0 outside, up to 1 on the axis.
 
-    The trunk is an elliptic frustum, the head an ellipsoid, both wider by ``margin``, metres.
+    The point is in the torso's frame. The trunk is an elliptic frustum and the head an ellipsoid,
+    both widened by ``margin``, metres.
     """
     waist_top = parts[TORSO, BOTTOM]
     top = waist_top + parts[TORSO, HEIGHT]
@@ -125,7 +126,7 @@ def _depth_inside(x: float, y: float, z: float, parts: Floats, margin: float) ->
 
 @kernel
 def penetration(points: Floats, parts: Floats) -> float:
-    """Sum of how deep hand, middle of the forearm and elbow (3, 3) lie inside trunk or head."""
+    """Return the sum of the depths of hand, mid-forearm and elbow (3, 3) inside trunk or head."""
     margin = parts[FOREARM, TOP_WIDTH] / 2
     elbow, hand = points[1], points[2]
     deep = _depth_inside(hand[0], hand[1], hand[2], parts, margin)
@@ -137,7 +138,7 @@ def penetration(points: Floats, parts: Floats) -> float:
 
 @inlined_kernel
 def arm_prior(arm: PosedArm, side: float, parts: Floats, given: Prior) -> float:
-    """Prior of a posed arm: the learned one, nats, and what it costs to be inside the body."""
+    """Return the prior of a posed arm: the learned prior, nats, and the cost of penetration."""
     rules = given.rules
     for c in range(6):
         arm.outward[c] = arm.directions[c] * (side if c == 1 or c == 4 else 1.0)

@@ -1,13 +1,13 @@
 """Compiled costs of the cardbox model: kinematics, projection, rasterisation and XOR in one pass.
 
-With h = 1 where the model is drawn and f = 1 where the silhouette is, (h XOR f) = f + h (1 - 2 f),
-so that equation (2) is
+Let h be 1 on the drawn model and f be 1 on the silhouette. Then (h XOR f) = f + h (1 - 2 f), so
+equation (2) becomes
 
     W = sum of f + sum over the pixels covered by the model of (1 - 2 f)
 
 The first sum is a constant of the image. The second is read from the row sums, see
-:mod:`cardbox_tracker.estimation.cost.union`. For the arms the row sums stay level where the trunk
-covers the image already, so that an arm particle draws its own 4 patches, not 11.
+:mod:`cardbox_tracker.estimation.cost.union`. For the arms, the row sums are constant on pixels that
+the trunk covers, so an arm particle draws only its own 4 patches instead of 11.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.cost.union import cover_patches, sum_union
 
 TRUNK_PATCHES = 8
-"""7 of the paper and one for a neck, which draws nothing without a width: loops of fours."""
+"""7 patches of the paper and a neck, which is empty at width 0; a multiple of four for loops."""
 ARM_PATCHES = 4
 _BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
-# An index of this type is never negative, so no code is made to count from an array's end.
+# With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 
 
 @inlined_kernel
 def _joint(axis: int, side: float, shoulder: Floats, torso: Floats, hip: Floats) -> float:
-    """Coordinate of a shoulder joint: hip + torso (0, side aside, height)."""
+    """Return a coordinate of a shoulder joint: hip + torso (0, side aside, height)."""
     joint: float = hip[axis] + side * shoulder[0] * torso[axis, 1] + shoulder[1] * torso[axis, 2]
     return joint
 
@@ -61,7 +61,7 @@ def _joint(axis: int, side: float, shoulder: Floats, torso: Floats, hip: Floats)
 def _upright(part: Floats, is_frontal: bool, p: int, shape: Floats) -> None:
     """Write patch ``p``: a part's frontal trapezoid, in the plane of Y and Z, or its sagittal one.
 
-    Corners: left and right below, then right and left above.
+    The order of the corners is left and right below, then right and left above.
     """
     patches = shape.shape[1] // 4
     half_below = (part[BOTTOM_WIDTH] if is_frontal else part[DEPTH]) / 2
@@ -91,7 +91,7 @@ def _shape_trunk(parts: Floats, shape: Floats) -> None:
 
 @inlined_kernel
 def _shape_arm(parts: Floats, first: int, shape: Floats) -> None:
-    """Write the patches of an upper arm and a forearm, ``first`` on, in their own frames."""
+    """Write the patches of upper arm and forearm, from ``first`` on, in the frames of the parts."""
     _upright(parts[UPPER_ARM], True, first, shape)
     _upright(parts[UPPER_ARM], False, first + 1, shape)
     _upright(parts[FOREARM], True, first + 2, shape)
@@ -110,7 +110,7 @@ def _shape_body(parts: Floats, shape: Floats) -> None:
 def _place(
     shape: Floats, first: int, end: int, rotation: Floats, origin: Floats, corners: Floats
 ) -> None:
-    """Turn and move the patches ``first`` to ``end`` from their part's frame to the optical one."""
+    """Transform the patches ``first`` to ``end`` from their part's frame to the optical frame."""
     patches = shape.shape[1] // 4
     for j in range(3):
         a, b, c, o = rotation[j, 0], rotation[j, 1], rotation[j, 2], origin[j]
@@ -123,15 +123,16 @@ def _place(
 
 @inlined_kernel
 def _place_trunk(work: Workspace) -> None:
-    """Corners of torso, waist, head and neck, the first patches, in the torso's pose."""
+    """Write the corners of torso, waist, head and neck, the first patches, in the torso's pose."""
     _place(work.shape, 0, TRUNK_PATCHES, work.torso, work.hip, work.corners)
 
 
 @inlined_kernel
 def _place_arm(work: Workspace, first: int, angles: Floats, side: float, model: Cardbox) -> None:
-    """Corners of an arm at the torso's pose; ``side`` is 1 for left, -1 for right.
+    """Write the corners of an arm at the torso's pose; ``side`` is 1 for left, -1 for right.
 
-    Its patches are ``first`` on, its angles (4,) abduction and flexion of shoulder and elbow.
+    The patches of the arm begin at ``first``. The ``angles`` (4,) are abduction and flexion of
+    shoulder and elbow, rad.
     """
     elbow, end = first + ARM_PATCHES // 2, first + ARM_PATCHES
     for j in range(3):
@@ -146,7 +147,7 @@ def _place_arm(work: Workspace, first: int, angles: Floats, side: float, model: 
 
 @inlined_kernel
 def _place_body(work: Workspace, posture: Floats, model: Cardbox) -> None:
-    """Corners of all 16 patches for d1..d12."""
+    """Write the corners of all 16 patches for d1..d12."""
     torso_pose(posture, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
     for arm in range(2):
@@ -174,7 +175,7 @@ def trunk_costs(
 def cover_trunk(
     torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
 ) -> np.int64:
-    """Write the row sums beside a trunk (4,) to ``covered``; return the gain that they lack."""
+    """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     work = new_workspace(TRUNK_PATCHES, rows)
@@ -191,7 +192,7 @@ def cover_trunk(
 def cover_arms(
     posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
 ) -> np.int64:
-    """Write the row sums beside the arms of a posture (12,); return the gain that they lack."""
+    """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     work = new_workspace(2 * ARM_PATCHES, rows)
@@ -216,7 +217,7 @@ def arm_costs(
     base: int,
     costs: Counts,
 ) -> None:
-    """Write the costs (N,) of arms (N, 4) beside a trunk (4,), by its row sums and its cost."""
+    """Write the costs (N,) of arms (N, 4) beside a trunk (4,), given its row sums and its cost."""
     model = cardbox_of(cardbox)
     rows, width = covered.shape[0], covered.shape[1] - 1
     work = new_workspace(ARM_PATCHES, rows)
@@ -254,7 +255,7 @@ def full_costs(
 def body_costs(
     postures: Floats, bodies: CardboxTuple, row_sums: RowSums, base: int, costs: Counts
 ) -> None:
-    """Write the costs (N,) of N ``bodies`` in one place, each in its own posture (N, 12)."""
+    """Write the costs (N,) of N ``bodies`` at one place in the N ``postures`` (N, 12)."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     work = new_workspace(_BODY_PATCHES, rows)
     parts, shoulders, place, camera = bodies
@@ -270,7 +271,7 @@ def body_costs(
 def polygon_costs(
     corners_m: Floats, camera: IntrinsicsTuple, row_sums: RowSums, base: int, costs: Counts
 ) -> None:
-    """Write the costs (N,) of any quadrilaterals (N, K, 4, 3) of the optical frame, metres."""
+    """Write the costs (N,) of quadrilaterals (N, K, 4, 3) in the optical frame, metres."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     count = corners_m.shape[1]
     work = new_workspace(count, rows)
@@ -287,7 +288,7 @@ def polygon_costs(
 def keypoints(posture: Floats, cardbox: CardboxTuple, points: Floats) -> None:
     """Write shoulder, elbow, hand of the left, then the right arm to ``points`` (6, 3).
 
-    Metres in the optical frame.
+    The points are in the optical frame, metres.
     """
     model = cardbox_of(cardbox)
     torso, hip = np.empty((3, 3)), np.empty(3)

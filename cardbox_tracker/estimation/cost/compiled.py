@@ -1,6 +1,6 @@
-"""The silhouette's term, compiled: equal results, a fraction of the time.
+"""Compiled implementation of the silhouette's term.
 
-``experiments/reference.py`` is the reference;
+``experiments/reference.py`` is the reference with equal results;
 :mod:`cardbox_tracker.estimation.cost.cardbox_kernels` explains the method.
 """
 
@@ -37,10 +37,10 @@ class CompiledSilhouette(SilhouetteTerm):
     """The silhouette's term with compiled kernels."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, and compile the kernels if they are not yet."""
+        """Prepare for one body and one camera, and compile the kernels if necessary."""
         super().__init__(body, camera)
         self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
-        # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
+        # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
         self._sums = np.int16 if camera.width < 2**15 else np.int32
         self.warm_up()
 
@@ -48,7 +48,7 @@ class CompiledSilhouette(SilhouetteTerm):
         """Run every kernel once, so that no live image waits for the compiler."""
         empty = np.zeros((self.camera.height, self.camera.width), np.uint8)
         self.look(empty)
-        # Pixels out of a message are read-only, which is another type to the compiler.
+        # The pixels of a message are read-only, which is another type for the compiler.
         empty.setflags(write=False)
         observation = self.look(empty)
         posture = np.zeros((1, N_JOINTS))
@@ -170,10 +170,10 @@ class CompiledObservation(SilhouetteObservation):
 
 
 class CompiledKeypoints:
-    """Keypoints as :func:`cardbox_tracker.body.kinematics.keypoints_m` has them, but optical."""
+    """Compiled :func:`cardbox_tracker.body.kinematics.keypoints_m`, in the optical frame."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, and compile the kernel if it is not yet."""
+        """Prepare for one body and one camera, and compile the kernel if necessary."""
         self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
         self(np.zeros(N_JOINTS))
 

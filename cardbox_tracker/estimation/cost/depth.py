@@ -1,10 +1,10 @@
-"""The term of a measured depth: the model's visible surface against a depth image.
+"""Term of the cost that compares the model's visible surface with a depth image.
 
-An outline hardly shows how far away a part is. A depth image (of a depth camera, or of a
-rectified pair, :mod:`cardbox_tracker.vision.stereo`) says it wherever the surface was measured. The
-term compares both at points of trunk, head and limbs, inside the silhouette, see
-:mod:`cardbox_tracker.estimation.cost.depth_kernels`. A difference far beyond ``unit_m`` costs no
-more than an even larger one. Without a depth image the term is zero.
+An outline hardly constrains the distance of a part. A depth image (of a depth camera, or of a
+rectified pair, :mod:`cardbox_tracker.vision.stereo`) measures it. The term compares both at points
+of trunk, head and limbs inside the silhouette, see
+:mod:`cardbox_tracker.estimation.cost.depth_kernels`. The cost saturates for differences far beyond
+``unit_m``. Without a depth image the term is zero.
 """
 
 from __future__ import annotations
@@ -50,48 +50,46 @@ _SILENCE = Silence()
 
 @dataclass(frozen=True)
 class Depth(Settings):
-    """Settings of the term of a measured depth."""
+    """Settings of the term for depth images."""
 
     weight: float = setting(
         1.0,
-        "pixels of the outline that a pixel at a quite different depth is worth",
+        "weight of a pixel with a quite different depth, in pixels of the outline",
         limits=(0.0, 100.0),
     )
     unit_m: float = setting(
         0.1,
-        "difference at which half of that is reached",
+        "difference of depths that costs half of this weight",
         unit="m",
         limits=(0.001, 1.0),
     )
-    # So that a point at which nothing was measured is as good as a usual one.
-    expected: float = setting(
-        0.3, "what points cost on average, which is subtracted", limits=(0.0, 1.0)
-    )
+    # It makes points without a measured depth as good as average points.
+    expected: float = setting(0.3, "mean cost of a point, which is subtracted", limits=(0.0, 1.0))
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term for a measured person before a working camera."""
+        """Return the term for a measured person and a working camera."""
         return DepthTerm(self, body, camera)
 
 
 class DepthTerm:
-    """The term for one person before one camera.
+    """The term for one person and one camera.
 
     Attributes:
-        body_px: what a whole body costs at most, px.
+        body_px: largest cost of a whole body, px.
     """
 
     def __init__(self, config: Depth, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, and compile the kernel if it is not yet."""
+        """Prepare for one body and one camera, and compile the kernel if necessary."""
         self.config = config
         model = WholeBodyCost(body, camera, WholeBodyCostConfig())
         self.body = model.body
-        # As at the place of the body model, so that nobody gains by coming nearer.
+        # Areas at the place of the body model, so that a nearer state has no advantage.
         per_m = camera.fx / body.placement.distance_m
         parts = model.parts[[TORSO_PART, WAIST, HEAD, UPPER_ARM, FOREARM]]
         wide = 0.5 * (parts[:, BOTTOM_WIDTH] + parts[:, TOP_WIDTH])
         areas_px = config.weight * per_m**2 * parts[:, HEIGHT] * wide
         self.areas_px = np.ascontiguousarray(areas_px)
-        # A body has two arms.
+        # The areas of the limbs count for both arms.
         self.body_px = float(areas_px[:3].sum() + 2.0 * areas_px[3:].sum())
         self.costs(np.zeros((1, N_STATE)), np.zeros((camera.height, camera.width), np.float32))
 
@@ -99,7 +97,7 @@ class DepthTerm:
         """Return the term's observation, which is zero without a depth image."""
         if frame.depth_m is None:
             return _SILENCE
-        # At the outline a pixel may show the person or the background.
+        # Pixels at the outline can show the person or the background.
         inside = cv2.erode(frame.silhouette, np.ones((3, 3), np.uint8))
         known = (inside > 0) & np.isfinite(frame.depth_m)
         return DepthObservation(self, np.where(known, frame.depth_m, 0.0).astype(np.float32))
@@ -128,7 +126,7 @@ class DepthObservation:
 
     Attributes:
         term: the term of the person.
-        depth_m: (H, W), metres along the optical axis; 0 where it is not known.
+        depth_m: (H, W), metres along the optical axis; 0 if unknown.
     """
 
     term: DepthTerm
@@ -161,7 +159,7 @@ class DepthObservation:
 
 
 def _states(torsos: FloatArray) -> FloatArray:
-    """Return states (N, 14) of torsos (N, 4), or (N, 6) with x and z, without arms."""
+    """Return states (N, 14) of torsos (N, 4), or (N, 6) with x and z; the arms are zero."""
     states = np.zeros((len(torsos), N_STATE))
     places = torsos[:, TORSO.stop :]
     states[:, TORSO] = torsos[:, TORSO]

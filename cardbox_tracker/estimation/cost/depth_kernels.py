@@ -1,13 +1,13 @@
-"""Compiled depth of a body's visible surface, compared with a measured one at a few points.
+"""Compiled comparison of a body's visible surface with a depth image at a few points.
 
 Points lie on the axes of the limbs, and on the side of trunk and head that faces the camera. Where
 a point's pixel has a measured depth, the difference
 
     e = measured - expected surface, m
 
-costs e^2 / (e^2 + unit^2) - expected of the area for which the point stands; half of the first
-where the measured surface is nearer, since something else may be in front; nothing where nothing
-was measured.
+costs e^2 / (e^2 + unit^2) - expected, times the area that the point represents. The fraction is
+halved if the measured surface is nearer, because another object may be in front. A point without a
+measured depth costs nothing.
 """
 
 from __future__ import annotations
@@ -48,22 +48,22 @@ from cardbox_tracker.estimation.cost.kinematics import (
 
 DepthMap = NDArray[np.float32]
 
-# Points along a limb, as fractions of its length; rows and columns on a part of the trunk, the
+# Points along a limb, as fractions of its length; rows of points on a part of the trunk, and
 # columns as fractions of half its width.
 _UPPER_ARM_AT, _FOREARM_AT = (0.35, 0.65, 0.95), (0.25, 0.5, 0.75, 1.0)
 _ROWS, _COLUMNS = 4, (-0.6, 0.0, 0.6)
-# A limb that points to the camera is not thicker than this times its width.
+# Largest thickness of a limb that points to the camera, in widths of the limb.
 _THICKEST = 2.0
 _OCCLUDED = 0.5
 
 
 class Surface(NamedTuple):
-    """A measured surface and how differences from it count.
+    """A measured surface and the costs of differences from it.
 
     Attributes:
-        depth: (H, W), metres along the optical axis; 0 where it is not known.
-        areas_px: of torso, waist, head, upper arm and forearm, (5,).
-        unit_m: difference that costs a half.
+        depth: (H, W), metres along the optical axis; 0 if unknown.
+        areas_px: areas of torso, waist, head, upper arm and forearm, (5,).
+        unit_m: difference that costs 0.5.
         expected: mean cost of a point, which is subtracted.
     """
 
@@ -85,7 +85,7 @@ def _compare(
     camera: Intrinsics,
     surface: Surface,
 ) -> float:
-    """Cost of a surface ``before_m`` in front of the point (x, y, z) of the optical frame."""
+    """Return the cost of a surface ``before_m`` in front of the optical point (x, y, z)."""
     cost, depth = 0.0, surface.depth
     if z > 0.1:
         u = int(camera.fx * x / z + camera.cx + 0.5)
@@ -109,7 +109,7 @@ def _limb(
     camera: Intrinsics,
     surface: Surface,
 ) -> float:
-    """Mean cost of the points of a limb from ``start`` (3,) along ``axis`` (3,)."""
+    """Return the mean cost of the points of a limb from ``start`` (3,) along ``axis`` (3,)."""
     total = 0.0
     for fraction in fractions:
         along = fraction * length
@@ -132,11 +132,11 @@ def _part(
     camera: Intrinsics,
     surface: Surface,
 ) -> float:
-    """Mean cost of the points on the side of an elliptic frustum that faces the camera.
+    """Return the mean cost of points on the side of an elliptic frustum that faces the camera.
 
-    Along the level direction v an ellipse with half axes a and b is met 1 / sqrt(vx^2/b^2 +
-    vy^2/a^2) before its middle; chords beside it are shorter, with their middles on the diameter
-    that joins the two points where v touches it.
+    A line through the middle along the level direction v meets an ellipse with half axes a and b at
+    a distance 1 / sqrt(vx^2/b^2 + vy^2/a^2) from the middle. Parallel chords are shorter; their
+    middles lie on the diameter between the two points at which v is tangent.
     """
     total = 0.0
     b = 0.5 * part[DEPTH]
@@ -167,7 +167,7 @@ def _part(
 def depth_costs(
     states: Floats, drawn: Drawn, body: BodyTuple, measured: SurfaceTuple, costs: Floats
 ) -> None:
-    """Write the costs (N,), px, of the ``drawn`` parts of states (N, 14) before a ``Surface``."""
+    """Write the costs (N,), px, of the ``drawn`` parts of states (N, 14) against a ``Surface``."""
     of, surface = body_of(body), Surface(*measured)
     parts, camera, areas_px = of.parts, of.camera, surface.areas_px
     rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()

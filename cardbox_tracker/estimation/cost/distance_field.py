@@ -1,10 +1,9 @@
 """Compiled signed distances of pixels from the outline of a mask, up to ``FAR_PX``.
 
-Euclidean distances between pixels' centres, found in two passes as of Felzenszwalb and Huttenlocher
-("Distance Transforms of Sampled Functions", 2012): along the columns, then along the rows, where
-the least of nearby squares is taken. Distances beyond ``FAR_PX`` are cut off, so that all loops are
-short and have no branches. OpenCV's ``distanceTransform`` measures one side at a time, takes longer
-for both than this function, and is approximate unless it is given more time still.
+The distances are Euclidean, between pixel centres. They are computed in two passes after
+Felzenszwalb and Huttenlocher ("Distance Transforms of Sampled Functions", 2012): along the columns,
+then along the rows as the least of nearby squared distances. The limit ``FAR_PX`` keeps all loops
+short and free of branches. OpenCV's ``distanceTransform`` computes one side per call and is slower.
 """
 
 from __future__ import annotations
@@ -15,24 +14,24 @@ from numpy.typing import NDArray
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
 
-# An index of this type is never negative, so no code is made to count from an array's end.
+# With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 _FAR = int(FAR_PX)
 
 
 @kernel
 def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32]) -> None:
-    """Write the distance of each pixel from the nearest one of the other side, px.
+    """Write the distance of each pixel from the nearest pixel of the other side, px.
 
     Args:
         mask: (H, W), 0 outside and 1 inside.
-        distances: written, (H, W): negative inside, at most ``FAR_PX`` either way.
+        distances: written, (H, W): negative inside, between -``FAR_PX`` and ``FAR_PX``.
     """
     height, width = mask.shape
     none, one, far = np.float32(0.0), np.float32(1.0), np.float32(_FAR)
     columns = np.empty((height, width), np.float32)
     _along_columns(mask, columns)
-    # Squares, positive inside and negative outside; beyond the border there is nothing.
+    # Squared distances, positive inside and negative outside; pixels beyond the border are ignored.
     squares = np.empty(width + 2 * _FAR, np.float32)
     side, best = np.empty(width, np.float32), np.empty(width, np.float32)
     middle = squares[_FAR : _FAR + width]
@@ -54,7 +53,7 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
                 sign = side[_index(u)]
                 one_way, other_way = sign * before[_index(u)], sign * after[_index(u)]
                 nearer = one_way if one_way < other_way else other_way
-                # A pixel of the other side is the nearest one itself.
+                # The pixel itself is of the other side, so it is the nearest one.
                 nearer = (nearer if nearer > none else none) + apart
                 now = best[_index(u)]
                 best[_index(u)] = nearer if nearer < now else now
@@ -65,7 +64,7 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
 
 @kernel
 def _along_columns(mask: NDArray[np.uint8], distances: NDArray[np.float32]) -> None:
-    """Write how far above or below the nearest pixel of the other side is, px."""
+    """Write the vertical distance to the nearest pixel of the other side, px."""
     height, width = mask.shape
     one, far = np.float32(1.0), np.float32(_FAR)
     for u in range(width):

@@ -1,18 +1,18 @@
 """The cue inside the outline: hands and forearms by their colours.
 
-An outline does not show an arm before the torso. The initialization has learned the colours of the
-person's parts (``BodyModel.appearance``):
+An outline does not show an arm in front of the torso. The initialization learns the colours of the
+person's parts (``BodyModel.appearance``), and the term uses them in four steps:
 
-1. The brightness of the torso is followed slowly, so that the colours stay comparable.
-2. Within the silhouette's bounding box every pixel gets two log-likelihood ratios, of the hand and
-   of the forearm, against the part that the last posture has there: torso, head, or the legs.
-3. An arm gains the mean ratio over its hand and over its forearm, each times the area, as at the
-   place where the person is expected: a sum over pixels, so that a limb is not rewarded for being
-   short, and not for coming nearer.
-4. A hand gains less where the other forearm is, and nothing behind the torso.
+1. A low-pass filter estimates the brightness of the torso, so that the colours stay comparable.
+2. Each pixel in the silhouette's bounding box gets two log-likelihood ratios, of the hand and of
+   the forearm, against the part at this place in the last posture: torso, head or legs.
+3. The gain of an arm is the mean ratio over its hand times the hand's area, plus the same for the
+   forearm. The areas are those at the expected place of the person, so that neither short nor near
+   limbs are preferred.
+4. A hand gains less where the other forearm covers it, and nothing behind the torso.
 
-The gain is subtracted from the cost. Without an image, without a posture before, or for a person
-whose colours are not known, the term is zero.
+The gain is subtracted from the cost. The term is zero without an image, without a previous posture,
+and for a person with unknown colours.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ from cardbox_tracker.estimation.cost.terms import (
 from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
 
-# One pixel says no more than this: histograms of a few hundred pixels are not that certain.
+# Limit of a ratio, since histograms of a few hundred pixels are uncertain.
 _LIMIT_NATS = 2.5
-# Parts whose Bhattacharyya distance is below this look alike; their ratios are zero.
+# Parts with a smaller Bhattacharyya distance look alike; their ratios are zero.
 _ALIKE = 0.05
-# The light is not believed to change beyond this.
+# Limits of the change of the light.
 _DARKEST, _BRIGHTEST = 0.6, 1.6
 # Step between pixels of the torso; fewest rows and columns, and fewest pixels in the outline.
 _STRIDE, _LEAST_SIDE_PX, _LEAST_PX = 3, 6, 20
@@ -70,21 +70,20 @@ class InnerCue(Settings):
 
     hand: float = setting(
         0.7,
-        "pixels of the outline that a pixel of a hand is worth for each nat by which it looks like "
-        "one",
+        "weight of a nat of a hand's pixel, in pixels of the outline",
         limits=(0.0, 10.0),
     )
-    forearm: float = setting(0.7, "the same of a forearm", limits=(0.0, 10.0))
+    forearm: float = setting(0.7, "weight of a nat of a forearm's pixel", limits=(0.0, 10.0))
     light: float = setting(
         0.25,
-        "share of an image in the brightness to which its colours are compared; 0: the light does "
-        "not change",
+        "weight of a new image in the low-pass filter of the brightness; 0: the brightness is "
+        "constant",
         limits=(0.0, 1.0),
     )
     lifts_shoulders: bool = setting(
         True,
-        "shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as in "
-        "the filter hierarchical",
+        "the shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as "
+        "in the filter hierarchical",
     )
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
@@ -96,10 +95,10 @@ _SILENCE = Silence()
 
 
 class InnerCueTerm:
-    """The cue for one person whose colours are known."""
+    """The cue for one person with known colours."""
 
     def __init__(self, config: InnerCue, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, and compile the kernels if they are not yet.
+        """Prepare for one body and one camera, and compile the kernels if necessary.
 
         Raises:
             ValueError: ``body`` has no appearance.
@@ -128,7 +127,7 @@ class InnerCueTerm:
     def observe(self, frame: Frame) -> TermObservation:
         """Return the term's observation, which is zero without an image or a last posture."""
         if frame.posture is None:
-            # Tracking starts anew, maybe after a while and in another light.
+            # Tracking starts again, possibly in another light.
             self._brightness = self._appearance.brightness.copy()
             return _SILENCE
         image = None if frame.image is None else self._comparable(frame.image)
@@ -146,7 +145,7 @@ class InnerCueTerm:
         return InnerCueObservation(self._arms, maps, (u0, v0), others)
 
     def _comparable(self, image: Image) -> Image | None:
-        """Return the image (H, W, channels) as the colours were learned; None if it lacks them."""
+        """Return the image (H, W, channels) with the learned channels; None if it lacks colours."""
         if image.ndim == 2:
             return image[..., None] if self._appearance.is_grey else None
         if self._appearance.is_grey:
@@ -154,7 +153,7 @@ class InnerCueTerm:
         return image
 
     def _follow_light(self, image: Image, silhouette: Silhouette, zones: FloatArray) -> None:
-        """Let the torso's brightness follow that of the chest, below the head."""
+        """Update the torso's brightness from the chest, below the head."""
         u, v, half_width, half_height, hips, _ = zones.tolist()
         top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
         left, right = max(int(u - 1.2 * half_width), 0), int(u + 1.2 * half_width)
@@ -175,12 +174,12 @@ class InnerCueTerm:
         zones: FloatArray,
         box: tuple[int, int, int, int],
     ) -> NDArray[np.float32]:
-        """Ratios of hand and forearm within ``box`` (u, v, width, height), (2, h, w), nats."""
+        """Return ratios (2, h, w) of hand and forearm in ``box`` (u, v, width, height), nats."""
         u0, v0, width, height = box
         maps = np.empty((2, max(height, 1), max(width, 1)), np.float32)
         part = (slice(v0, v0 + maps.shape[1]), slice(u0, u0 + maps.shape[2]))
-        # Copies, which are small: the kernel is compiled for one type of array, whatever the
-        # image's is (out of a message, for one, it is read-only).
+        # Small copies have one type of array, so that the kernel is compiled only once; the pixels
+        # of a message, for example, are read-only.
         ratio_maps(
             np.array(image[part], order="C"),
             np.array(silhouette[part], order="C"),
@@ -197,7 +196,7 @@ class InnerCueTerm:
 
 def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:
     """Return log-likelihood ratios by zone (torso, head, below), hand or forearm, and bin, nats."""
-    # Around the hips shirt and trousers meet, so both are expected there.
+    # Shirt and trousers meet at the hips, so both are expected there.
     below = 0.5 * histograms[TORSO] + 0.5 * histograms[LEGS]
     ratios = np.zeros((3, 2, histograms.shape[1]), np.float32)
     for zone, other in enumerate((histograms[TORSO], histograms[HEAD], below)):
@@ -212,10 +211,10 @@ class InnerCueObservation:
     """The cue of one frame; see :class:`~cardbox_tracker.estimation.cost.terms.TermObservation`.
 
     Attributes:
-        view: the person who is looked for.
+        view: the person before the camera.
         maps: ratios of hand and forearm, (2, h, w), nats.
         corner: column and row of the image where the maps begin.
-        others: elbow and hand of each arm in the frame before, (1, 2, 3).
+        others: elbow and hand of each arm in the previous frame, (1, 2, 3).
     """
 
     view: ArmView
@@ -224,11 +223,11 @@ class InnerCueObservation:
     others: dict[str, FloatArray]
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """Nothing: the outline says where the torso is."""
+        """Return zero costs, because the outline determines the torso."""
         return _SILENCE.postures
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Rate arms by the image at their place; the other arm is where it was last."""
+        """Rate arms by the image at their place; the other arm has its last place."""
         torsos = np.zeros((1, N_TORSO))
         torsos[0, : len(torso)] = torso
 

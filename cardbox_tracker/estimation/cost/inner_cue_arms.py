@@ -1,4 +1,4 @@
-"""Places of one person's arms in the image, and their gains."""
+"""Image coordinates of one person's arms, and the gains of the inner cue."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from cardbox_tracker.vision.camera import Camera
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
 
 N_TORSO = TORSO.stop + len(PLACE_NAMES)
-"""Values of a torso: d1..d4, ``torso_x`` and ``torso_z``."""
+"""Number of values of a torso: d1..d4, ``torso_x`` and ``torso_z``."""
 
 
 @dataclass(frozen=True, eq=False)
 class ArmView:
-    """One person before one camera: what does not change from frame to frame.
+    """One person before one camera: the arguments that are constant over frames.
 
     Attributes:
         person: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Person`.
         forearm: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Forearm`.
-        weights: px of the outline that one of hand and forearm is worth for each nat, (2,).
+        weights: weight of a nat of hand and forearm, px of the outline, (2,).
     """
 
     person: kernels.PersonTuple
@@ -40,9 +40,10 @@ class ArmView:
     def of(
         cls, body: BodyModel, camera: Camera, weights: FloatArray, lifts_shoulders: bool
     ) -> ArmView:
-        """Return the view of ``body`` before a working camera, pitched as it stands.
+        """Return the view of ``body`` before a working camera that includes the pitch.
 
-        With ``lifts_shoulders`` they rise with the arms as in the whole-body filter by default.
+        With ``lifts_shoulders``, the shoulders rise with the arms as in the whole-body filter by
+        default.
         """
         px_per_m = float(camera.fx) / body.placement.distance_m
         lengths = _lengths(body, lifts_shoulders)
@@ -52,7 +53,7 @@ class ArmView:
     def project(
         self, torsos: FloatArray, arms: FloatArray, side: str
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return elbow and hand (N, 2, 3) in the image, and whether it is hidden (N,)."""
+        """Return elbow and hand (N, 2, 3) in the image, and whether the hand is hidden (N,)."""
         points, hidden = np.empty((len(arms), 2, 3)), np.empty(len(arms), np.bool_)
         kernels.project_arms(
             torsos,
@@ -89,8 +90,8 @@ class ArmView:
     def zones(self, posture: FloatArray) -> FloatArray:
         """Return the places of head and torso of a posture (12,) or (14,) in the image, (6,), px.
 
-        Centre of the head (u, v), half axes of an ellipse around it, the row of the hips, and the
-        row of the torso's top.
+        The values are the head's centre (u, v), the half axes of an ellipse around it, the row of
+        the hips, and the row of the torso's top.
         """
         zones = np.empty(6)
         kernels.torso_zones(torsos_of(posture[None])[0], self.person, zones)
@@ -98,7 +99,7 @@ class ArmView:
 
 
 def torsos_of(postures: FloatArray) -> FloatArray:
-    """Torsos (N, 6) of postures (N, 12), or (N, 14) with ``torso_x`` and ``torso_z`` at the end."""
+    """Return the torsos (N, 6) of postures (N, 12), or states (N, 14)."""
     torsos = np.zeros((len(postures), N_TORSO))
     places = postures[:, POSTURE.stop :]
     torsos[:, TORSO] = postures[:, TORSO]

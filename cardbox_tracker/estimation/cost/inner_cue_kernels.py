@@ -1,7 +1,6 @@
 """Compiled cue inside the outline: maps of a frame, arms in the image, and their gains.
 
-A torso is (6,): d1..d4, and how far the hips are nearer to the camera and higher than their place,
-metres.
+A torso is (6,): d1..d4, ``torso_x`` and ``torso_z``.
 """
 
 from __future__ import annotations
@@ -20,27 +19,27 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 )
 from cardbox_tracker.estimation.cost.kinematics import torso_pose, turn_limb
 
-# The forearm's patch begins and ends at these fractions of elbow to fist (then comes the hand); its
-# width is this fraction of the forearm's, since a wider one would sample what lies beside.
+# Begin and end of the forearm's patch between elbow and fist, and its width in forearm widths; a
+# wider patch would sample pixels outside of the forearm.
 _BEGIN, _END, _WIDTH = 0.04, 0.76, 0.7
 _POINTS = (6, 3)
-# The hand's patch: a fist is nearly as long as wide, and its middle lies before the forearm's end.
+# The hand's patch is nearly square; its middle lies before the forearm's end.
 _HAND_LENGTH_M, _HAND_WIDTH_M, _HAND_BEFORE_END_M = 0.09, 0.075, 0.02
 _HAND_POINTS = (4, 3)
-# Half of a hand's gain goes where the other forearm covers it: the pixels are one hand's only.
+# Share of a hand's gain that is lost if the other forearm covers it: a pixel shows one hand.
 _CLAIM = 0.5
-# Beyond this distance from its axis the other forearm, or its hand, covers nothing.
+# Distance from the axis of the other forearm, or its hand, up to which it covers pixels.
 _CLAIM_REACH_M = 0.09
-# A hand further behind the torso's middle than this, and within its width, is covered by it.
+# A hand this far behind the torso's middle, and within its width, is hidden.
 _BEHIND_M, _NEAREST_M = 0.03, 0.1
-# Values of a torso (6,) behind d1..d4.
+# Indices of ``torso_x`` and ``torso_z`` in a torso (6,).
 _X, _Z = 4, 5
 
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
 
 
 class Lengths(NamedTuple):
-    """Lengths of a body, metres, and how its shoulders rise; a plain tuple to the kernels.
+    """Lengths of a body, metres, and the lift of its shoulders; kernels get a plain tuple.
 
     ``clavicle`` is the radius of the circle on which the girdle lifts a shoulder joint, by
     ``lift_gain`` times the elevation of the upper arm beyond ``lift_from``, rad.
@@ -80,13 +79,13 @@ class Maps(NamedTuple):
 
 
 class Forearm(NamedTuple):
-    """A forearm and how large it is in the image.
+    """A forearm and its scale in the image.
 
     Attributes:
-        length_m: with the fist.
-        width_m: of the forearm.
-        px_per_m: where the person is expected; areas count as there, so that nobody gains by coming
-            nearer to the camera.
+        length_m: including the fist.
+        width_m: width of the forearm.
+        px_per_m: scale at the expected place of the person; areas use it, so that a nearer state
+            has no advantage.
     """
 
     length_m: float
@@ -119,8 +118,8 @@ def _torso_pose(torso: Any, place: Place, camera: Intrinsics, rotation: Any, hip
 def torso_zones(torso: Any, person: PersonTuple, zones: Any) -> None:
     """Write the places of head and torso of a torso (6,) in the image: ``zones`` (6,), px.
 
-    Centre of the head (u, v), half axes of an ellipse around it, the row of the hips, and the row
-    of the torso's top.
+    The values are the head's centre (u, v), the half axes of an ellipse around it, the row of the
+    hips, and the row of the torso's top.
     """
     body, place, camera = _person_of(person)
     rotation, hip = np.empty((3, 3)), np.empty(3)
@@ -146,14 +145,14 @@ def torso_zones(torso: Any, person: PersonTuple, zones: Any) -> None:
 def ratio_maps(
     pixels: Any, inside: Any, steps_of_levels: Any, steps: int, ratios: Any, zones: Any, maps: Any
 ) -> None:
-    """Write the ratios (2, h, w), nats, of hand and forearm against what else would be there.
+    """Write the log-likelihood ratios (2, h, w), nats, of hand and forearm against other parts.
 
     Args:
         pixels: (h, w, channels).
         inside: silhouette (h, w), 0 outside.
         steps_of_levels: step of each level of each channel, (channels, 256).
-        steps: how many there are.
-        ratios: by zone, hand or forearm, and bin, (3, 2, bins).
+        steps: number of steps.
+        ratios: log-likelihood ratios by zone, hand or forearm, and bin, (3, 2, bins).
         zones: (6,), in pixels of these arrays, see :func:`torso_zones`.
         maps: written.
     """
@@ -167,7 +166,7 @@ def ratio_maps(
                 color = color * steps + steps_of_levels[c, pixels[v, u, c]]
             zone = _LOWER_ZONE if v > zones[4] else _TORSO_ZONE
             a, b = (u - zones[0]) / zones[2], (v - zones[1]) / zones[3]
-            # The neck is skin, too: what lies under the head and above the torso's top.
+            # The neck, between head and torso's top, is skin, too.
             if a * a + b * b < 1.0 or (abs(a) < 0.8 and b > 0.0 and v < zones[5]):
                 zone = _HEAD_ZONE
             maps[0, v, u] = ratios[zone, 0, color]
@@ -185,9 +184,9 @@ def project_arms(
 ) -> None:
     """Write the places of arms in the image: ``points`` (N, 2, 3) and ``hidden`` (N,).
 
-    Points are u, v, px a metre of elbow and hand (the forearm's end) of ``arms`` (N, 4), rad, at
-    ``torsos`` (N, 6), or (1, 6) for all of them; hidden is a hand behind the torso. ``side`` is 1
-    for left arms, -1 for right ones.
+    ``points`` has column, row and pixels per metre of elbow and hand (the forearm's end) of
+    ``arms`` (N, 4), rad, at ``torsos`` (N, 6), or (1, 6) for all arms. ``hidden`` marks hands
+    behind the torso. ``side`` is 1 for left arms, -1 for right arms.
     """
     body, place, camera = _person_of(person)
     torso, upper, fore = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -228,9 +227,10 @@ def project_arms(
 
 @kernel
 def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int, int]) -> float:
-    """Mean of ``ratios`` (h, w) over a grid of ``points``, along and across, of a patch.
+    """Return the mean of ``ratios`` (h, w) over a grid of ``points`` of a patch.
 
-    ``half`` is half the patch along the limb, ``aside`` half of it across, px; outside is 0.
+    ``half`` and ``aside`` are the half axes of the patch along and across the limb, px. Points
+    outside of the image count as 0.
     """
     h, w = ratios.shape
     along, across = points
@@ -248,7 +248,7 @@ def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int,
 
 @inlined_kernel
 def _claimed(u: float, v: float, other: Any, u0: int, v0: int) -> float:
-    """Share, 0 to 1, of a hand at (u, v) that the other forearm, or its hand, covers."""
+    """Return the share, 0 to 1, of a hand at (u, v) that the other forearm or hand covers."""
     eu, ev = other[0, 0] - u0, other[0, 1] - v0
     du, dv = other[1, 0] - u0 - eu, other[1, 1] - v0 - ev
     along = ((u - eu) * du + (v - ev) * dv) / max(du * du + dv * dv, 1e-6)
@@ -272,11 +272,11 @@ def arm_gains(
 
     Args:
         points: (N, 2, 3), see :func:`project_arms`.
-        hidden: (N,), the hand shows nothing.
+        hidden: (N,), whether the hand is hidden.
         others: (N, 2, 3), or (1, 2, 3) for all: points of the other arm.
         maps: fields of :class:`Maps`.
         forearm: fields of :class:`Forearm`.
-        weights: px of the outline that one of hand and forearm is worth for each nat, (2,).
+        weights: weight of a nat of hand and forearm, px of the outline, (2,).
         gains: written.
     """
     ratios, u0, v0 = maps
@@ -305,6 +305,6 @@ def arm_gains(
         centre = (eu + middle * du, ev + middle * dv)
         half, aside = (reach * du, reach * dv), (-av * across, au * across)
         covered = _mean(ratios[1], centre, half, aside, _POINTS)
-        # A forearm that points to the camera shows less: its length in the image counts.
+        # The length in the image counts, because a forearm that points to the camera covers less.
         area_m2 = _WIDTH * width_m * (_END - _BEGIN) * length / per_m
         gains[i] += weights[1] * covered * area_m2 * px_per_m**2

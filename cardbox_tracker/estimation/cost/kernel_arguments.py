@@ -1,6 +1,6 @@
-"""A body and a camera as the kernels take them, computed once.
+"""Body and camera as arguments of the kernels, computed once.
 
-From Python they come as plain tuples, which cross over several times faster than named ones; the
+Python passes plain tuples, because numba unpacks them several times faster than named ones; the
 kernels name the fields again with :func:`body_of` and :func:`cardbox_of`.
 """
 
@@ -23,17 +23,16 @@ Counts = NDArray[np.int64]
 
 # Rows of ``parts`` and ``drawn`` (6, 6), ordered as ``BodyParts`` of body/parts.py.
 TORSO, WAIST, NECK, HEAD, UPPER_ARM, FOREARM = 0, 1, 2, 3, 4, 5
-# Their columns, ordered as ``Part``, metres.
+# Columns of these arrays, ordered as ``Part``, metres.
 BOTTOM, HEIGHT, BOTTOM_WIDTH, TOP_WIDTH, DEPTH, FORWARD = 0, 1, 2, 3, 4, 5
 
-# Values of ``girdle`` (5,): the shoulder joint of a hanging arm in the torso's frame, m; the radius
-# of the circle on which it is lifted, m; radians of that circle per radian of elevation, and the
-# elevation where it begins, rad.
+# Values of ``girdle`` (5,): shoulder joint of a hanging arm in the torso's frame, and radius of the
+# circle of its lift, m; lift per elevation, rad/rad; elevation at which the lift begins, rad.
 ASIDE, UPWARDS, CLAVICLE, LIFT_GAIN, LIFT_FROM = 0, 1, 2, 3, 4
 
 
 class Intrinsics(NamedTuple):
-    """A camera: focal lengths and principal point, px, and how far it looks down."""
+    """A camera: focal lengths and principal point, px, and cosine and sine of its pitch."""
 
     fx: float
     fy: float
@@ -56,8 +55,8 @@ class Cardbox(NamedTuple):
     Attributes:
         parts: six lengths of six parts, (6, 6), metres; (N, 6, 6) for N bodies.
         shoulder: the shoulder joint in the torso's frame, aside and upwards, (2,), metres; (N, 2).
-        place: of the hips.
-        camera: that sees it.
+        place: place of the hips.
+        camera: intrinsics and pitch of the camera.
     """
 
     parts: Floats
@@ -73,8 +72,8 @@ class Body(NamedTuple):
         parts: the measured parts, (6, 6), metres.
         drawn: the parts whose outlines are drawn, with a longer waist, neck and forearm.
         girdle: shoulder joints and how the arms lift them, (5,).
-        place: of the hips.
-        camera: that sees it.
+        place: place of the hips.
+        camera: intrinsics and pitch of the camera.
     """
 
     parts: Floats
@@ -89,7 +88,7 @@ PlaceTuple = tuple[float, float]
 CardboxTuple = tuple[Floats, Floats, PlaceTuple, IntrinsicsTuple]
 BodyTuple = tuple[Floats, Floats, Floats, PlaceTuple, IntrinsicsTuple]
 Drawn = tuple[bool, bool, bool]
-"""Whether trunk, left arm and right arm are drawn."""
+"""Whether trunk, left arm and right arm are drawn, in this order."""
 
 
 @inlined_kernel
@@ -126,12 +125,12 @@ def shape_of(sizes_m: FloatArray, neck_to_head: float = 0.0) -> tuple[FloatArray
         neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
 
     Returns:
-        Shape (..., 6, 6): the six lengths of each :class:`~cardbox_tracker.body.parts.Part`, the
-        parts ordered as in :class:`~cardbox_tracker.body.parts.BodyParts`; and (..., 2): how far
-        aside and how high a shoulder joint is in the torso's frame.
+        The six lengths of each :class:`~cardbox_tracker.body.parts.Part`, (..., 6, 6), the parts
+        ordered as in :class:`~cardbox_tracker.body.parts.BodyParts`; and the lateral and vertical
+        coordinate of a shoulder joint in the torso's frame, (..., 2).
     """
     *parts, aside, height = parts_of_bodies(sizes_m, neck_to_head)
     lengths = np.array([length for part in parts for length in part])
-    # Lengths were rows, one body after the other; now each body's lengths lie together.
+    # Each body's lengths become contiguous.
     bodies = np.ascontiguousarray(lengths.T).reshape(*np.shape(sizes_m)[:-1], len(parts), -1)
     return bodies, np.ascontiguousarray(np.array([aside, height]).T)

@@ -1,8 +1,8 @@
 """Compiled fit of a state to wanted keypoints.
 
-Inverse kinematics gives the first state. Bones of given lengths, the torso's angles and the limits
-leave a difference, which Gauss-Newton steps share out among all values. With the Jacobian J of the
-keypoints K(state) and damping in units of ``stddev``, each step solves
+Inverse kinematics gives the initial state. It leaves residuals, because bones and torso angles are
+fixed and the joints have limits; Gauss-Newton steps distribute them over all values. With the
+Jacobian J of the keypoints K(state) and damping in units of ``stddev``, each step solves
 
     (J' J / SPREAD_M^2 + diag(1 / stddev^2)) change = J' (wanted - K(state)) / SPREAD_M^2
 """
@@ -27,20 +27,20 @@ from cardbox_tracker.estimation.cost.linear_kernels import solve
 
 KEYPOINTS = 6
 SPREAD_M = 0.01
-"""Distance from a wanted keypoint that costs as much as a joint that turns by its deviation."""
+"""Distance to a wanted keypoint that costs as much as one ``stddev`` of a joint."""
 
 
 @kernel
 def pose_at_keypoints(state: Floats, body: BodyTuple, wanted: Floats, limits: Floats) -> None:
     """Change arms and place of ``state`` (14,) so that its keypoints are near ``wanted``.
 
-    Inverse kinematics: bones point to the wanted keypoints, or as near to that as the limits allow;
-    a forearm begins at the elbow found first. The torso keeps its angles and moves so that the
-    middle of the shoulders is the wanted one.
+    This is inverse kinematics: bones point to the wanted keypoints as far as the limits allow; the
+    forearm starts at the resulting elbow. The torso keeps its angles and moves so that the middle
+    of the shoulders is the wanted one.
 
     Args:
-        state: to begin with; changed.
-        body: of the person.
+        state: initial state; changed in place.
+        body: fields of :class:`~.kernel_arguments.Body`.
         wanted: keypoints (6, 3), metres in the optical frame.
         limits: lowest and highest value of each, (14, 2).
     """
@@ -62,7 +62,7 @@ def pose_at_keypoints(state: Floats, body: BodyTuple, wanted: Floats, limits: Fl
         flexion = atan2(ahead[0], sa * ahead[1] - ca * ahead[2])
         angles[0], angles[1] = abduction, _nearest(flexion, within[1, 0], within[1, 1])
         pose_arm(angles, side, of.parts, of.girdle, points, directions)
-        # Where the forearm would point from the elbow as it is now.
+        # Direction of the forearm from the present elbow.
         _in_torso(rotation, shoulder, hand, ahead)
         for c in range(3):
             ahead[c] += points[0, c] - points[1, c]
@@ -87,7 +87,7 @@ def pose_at_keypoints(state: Floats, body: BodyTuple, wanted: Floats, limits: Fl
 
 @kernel
 def _in_torso(rotation: Floats, begin: Floats, end: Floats, ahead: Floats) -> None:
-    """Write the way between two points of the optical frame to ``ahead``, in the torso's frame."""
+    """Write the difference of two optical points to ``ahead``, in the torso's frame."""
     for c in range(3):
         ahead[c] = 0.0
         for r in range(3):
@@ -96,7 +96,7 @@ def _in_torso(rotation: Floats, begin: Floats, end: Floats, ahead: Floats) -> No
 
 @kernel
 def _nearest(angle: float, least: float, most: float) -> float:
-    """Return ``angle``, rad, or the limit that is the shorter way round from it."""
+    """Return ``angle``, rad, or the nearer limit, measured around the circle."""
     middle = 0.5 * (least + most)
     off = (angle - middle + pi) % (2.0 * pi) - pi
     return min(max(middle + off, least), most)
@@ -115,13 +115,13 @@ def fit_keypoints(
     """Change ``state`` (14,) in place, by ``count`` steps.
 
     Args:
-        state: to begin with.
-        body: of the person.
+        state: initial state; changed in place.
+        body: fields of :class:`~.kernel_arguments.Body`.
         wanted: keypoints (6, 3), metres in the optical frame.
-        stddev: deviation by which each value of the state moves, (14,); one of 0 stays.
+        stddev: standard deviations of the change, (14,); a value with 0 stays constant.
         limits: lowest and highest value of each, (14, 2).
-        steps: of the central differences, (14,).
-        count: how many steps.
+        steps: steps of the central differences, (14,).
+        count: number of steps.
     """
     trial = state.copy()
     now = np.empty((KEYPOINTS, 3))

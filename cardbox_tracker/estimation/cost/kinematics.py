@@ -1,8 +1,8 @@
 """Compiled kinematics: torso, limbs and keypoints in the torso's and in the optical frame.
 
 The shoulder girdle lifts the shoulders with the arms; the frames are those of
-:mod:`cardbox_tracker.body.kinematics`. Matrix products are written out: through BLAS they would
-cost more than all the rest.
+:mod:`cardbox_tracker.body.kinematics`. Matrix products are written out, because calls of BLAS are
+slow for such small matrices.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def torso_pose(
         sw cp    sw sp sr + cw cr    sw sp cr - cw sr
         -sp      cp sr               cp cr
 
-    and a camera that looks down by v has the axes
+    A camera that looks down by v has the axes
 
         x = Y,    y = -cos v Z + sin v X,    z = -sin v Z - cos v X
     """
@@ -89,7 +89,7 @@ def turn_limb(parent: Floats, abduction: float, flexion: float, rotation: Floats
 
 
 class PosedArm(NamedTuple):
-    """Scratch of one arm."""
+    """Scratch arrays of one arm."""
 
     points: Floats
     """(3, 3): shoulder, elbow, hand in the torso's frame, metres."""
@@ -102,12 +102,12 @@ class PosedArm(NamedTuple):
     away: Floats
     """(6,): scratch of the arms' prior."""
     outward: Floats
-    """(6,): the directions with y outwards, as the arms' prior has them; scratch else."""
+    """(6,): the directions with y outwards, for the arms' prior; otherwise scratch."""
 
 
 @inlined_kernel
 def new_arm() -> PosedArm:
-    """Return the scratch of one arm."""
+    """Return the scratch arrays of one arm."""
     return PosedArm(
         points=np.empty((3, 3)),
         directions=np.empty(6),
@@ -120,20 +120,20 @@ def new_arm() -> PosedArm:
 
 @inlined_kernel
 def first_angle(arm: int) -> int:
-    """Index in a state at which the angles of the left arm, 0, or the right, 1, begin."""
+    """Return the index in a state of the first angle of the left arm, 0, or the right arm, 1."""
     return FIRST_ANGLES[arm]
 
 
 @inlined_kernel
 def angles_in(state: Floats, arm: int) -> Floats:
-    """Angles (4,) of the left arm, 0, or the right, 1, of a state or posture."""
+    """Return the angles (4,) of the left arm, 0, or the right arm, 1, of a state or posture."""
     first = first_angle(arm)
     return state[first : first + ARM_ANGLES]
 
 
 @inlined_kernel
 def side_of(arm: int) -> float:
-    """1 for the left arm, 0, and -1 for the right, 1: abduction is mirrored, flexion is not."""
+    """Return 1 for the left arm, 0, and -1 for the right arm, 1; only abduction is mirrored."""
     return 1.0 - 2.0 * arm
 
 
@@ -150,12 +150,13 @@ def state_pose(
 def limb_directions(angles: Floats, side: float, directions: Floats) -> None:
     """Write unit vectors of upper arm and forearm (6,) in the torso's frame for angles (4,).
 
-    With the angles a, f of the shoulder the upper arm's frame is Rx(a) Ry(-f), and it points along
-    -Z of it; the forearm's direction in that frame is (sin g, sin e cos g, -cos e cos g).
+    With the angles a, f of the shoulder, the upper arm's frame is Rx(a) Ry(-f), and the upper arm
+    points along -Z of this frame. With the angles e, g of the elbow, the forearm's direction in
+    this frame is (sin g, sin e cos g, -cos e cos g).
     """
     ca, sa = cos(side * angles[0]), sin(side * angles[0])
     cf, sf = cos(angles[1]), sin(angles[1])
-    # Columns x, y and z of the upper arm's frame; the x component of y is 0.
+    # Columns x, y and z of the upper arm's frame; the x component of column y is 0.
     x0, x1, x2 = cf, -sa * sf, ca * sf
     y1, y2 = ca, sa
     z0, z1, z2 = -sf, -sa * cf, ca * cf
@@ -208,7 +209,7 @@ def turn_arm(arm: PosedArm, rotation: Floats, hip: Floats) -> None:
 def angles_of_arm(directions: Floats, side: float, limits: Floats, angles: Floats) -> None:
     """Write the angles (4,) of an arm with ``directions`` (6,) in the torso's frame.
 
-    The inverse of :func:`limb_directions`, within ``limits`` (4, 2).
+    This is the inverse of :func:`limb_directions`, within ``limits`` (4, 2).
     """
     flexion = asin(min(max(directions[0], -1.0), 1.0))
     turned = atan2(directions[1], -directions[2])
@@ -218,7 +219,7 @@ def angles_of_arm(directions: Floats, side: float, limits: Floats, angles: Float
     ca, sa = cos(turned), sin(turned)
     cf, sf = cos(flexion), sin(flexion)
     u, v, w = directions[3], directions[4], directions[5]
-    # The forearm along the columns of the upper arm's frame.
+    # Coordinates of the forearm in the upper arm's frame.
     along_x = cf * u - sa * sf * v + ca * sf * w
     along_y = ca * v + sa * w
     along_z = -sf * u - sa * cf * v + ca * cf * w
@@ -242,7 +243,7 @@ def angles_of_arms(directions: Floats, side: float, limits: Floats) -> Floats:
 def keypoints(state: Floats, body: BodyTuple, points: Floats) -> None:
     """Write shoulder, elbow, hand of the left, then the right arm to ``points`` (6, 3).
 
-    Metres in the optical frame.
+    The points are in the optical frame, metres.
     """
     of = body_of(body)
     rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()

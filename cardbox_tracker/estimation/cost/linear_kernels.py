@@ -1,4 +1,4 @@
-"""Compiled solution of small systems of linear equations, without SciPy, which numba would need."""
+"""Compiled solution of small linear systems; numba's own linear algebra would need SciPy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import Floats
 
 @kernel
 def solve(matrix: Floats, right: Floats) -> None:
-    """Solve a system of equations in place, by Cholesky's decomposition.
+    """Solve a linear system in place by a Cholesky decomposition.
 
     Args:
         matrix: symmetric, positive definite, (n, n); its lower triangle is read, and overwritten.

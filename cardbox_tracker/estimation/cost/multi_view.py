@@ -1,11 +1,12 @@
-"""Rate whole bodies by what one camera or several see: the cost is the sum over the cameras.
+"""Ratings of whole bodies with one camera or several: the cost is the sum over the cameras.
 
-Each camera's silhouette counts by its own area, so a camera that is nearer has no more to say:
+The pixels of each camera are divided by the area of its silhouette, so that a near camera has no
+larger weight:
 
     n rating = sum over n cameras of (pixels that differ) / (pixels of the silhouette) + priors
 
-so a rating stays a share of the silhouette, and priors weigh less where more cameras see. A camera
-that sees nobody in a frame is left out; priors count once, whoever sees.
+So a rating is a fraction of the silhouette, and priors have less weight with more cameras. A camera
+that shows no person in a frame is ignored; the priors count once.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.vision.camera import Camera
 
 ToView = Callable[[FloatArray], FloatArray]
-"""Takes states (N, 14) or (14,) of the first camera; returns them as another camera has them."""
+"""Transforms states (N, 14) or (14,) of the first camera into those of another camera."""
 
 
 class MultiViewCost:
-    """Ratings of states (N, 14), which are those of the first camera, before all cameras.
+    """Ratings of states (N, 14) of the first camera, with the silhouettes of all cameras.
 
-    It is asked like a :class:`~cardbox_tracker.estimation.cost.whole_body.WholeBodyCost`.
+    The interface is that of :class:`~cardbox_tracker.estimation.cost.whole_body.WholeBodyCost`.
 
     Attributes:
         costs: the cost of each camera, the first camera's first.
-        to_views: what turns states into those of each camera.
-        seeing: cameras that see the person in this frame, by their number.
+        to_views: transform of states for each camera.
+        seeing: indices of the cameras that show the person in this frame.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class MultiViewCost:
         views: Sequence[View],
         config: WholeBodyCostConfig,
     ) -> None:
-        """Prepare for one body before ``camera``, and for each of the further ``views`` of it."""
+        """Prepare for one body before ``camera`` and for the further ``views`` of the body."""
         without_priors = replace(config, weight=0.0)
         self.costs = [WholeBodyCost(body, camera, config)]
         self.costs += [WholeBodyCost(view.body, view.camera, without_priors) for view in views]
@@ -57,35 +58,35 @@ class MultiViewCost:
         self.anchor = first.anchor
 
     def see(self, silhouettes: Sequence[Silhouette], state: FloatArray) -> None:
-        """Take the silhouettes (H, W) of all cameras, of a person about where ``state`` says."""
+        """Set the silhouettes (H, W) of all cameras; the person is near the place of ``state``."""
         for cost, to_view, silhouette in zip(self.costs, self.to_views, silhouettes, strict=True):
             cost.see(silhouette, to_view(state))
 
     def choose(self, seeing: Sequence[int]) -> None:
-        """Let only the cameras of these numbers count in this frame."""
+        """Use only the cameras with these indices in this frame."""
         self.seeing = tuple(seeing)
         if 0 not in self.seeing:
-            # Its priors count all the same.
+            # The priors of the first camera count in any case.
             self.costs[0].see_nothing()
 
     def observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> None:
-        """Take what the further terms of each camera that sees say of its frame."""
+        """Set the observations of the further terms for each camera that shows the person."""
         for number, cost in enumerate(self.costs):
             counting = terms[number] if number in self.seeing else ()
             cost.terms = tuple(term.observe(frames[number]) for term in counting)
 
     @property
     def silhouette_px(self) -> int:
-        """Foreground pixels that count, of all cameras that see."""
+        """Foreground pixels that count, summed over the cameras that show the person."""
         return sum(self.costs[number].silhouette_px for number in self.seeing)
 
     @property
     def frontal_px(self) -> int:
-        """Pixels of the model in the front reference posture, before all cameras that see."""
+        """Pixels of the model in the front reference posture, summed over the same cameras."""
         return sum(self.costs[number].frontal_px for number in self.seeing)
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
-        """Rate torsos (N,), with the arms of a state drawn where they are in the images."""
+        """Rate torsos (N,); the arms of the state ``arms_of`` keep their place in the images."""
         return self._sum(lambda cost, to_view: cost.torsos(to_view(states), to_view(arms_of)))
 
     def fix_torso(self, torso: FloatArray) -> None:
@@ -98,7 +99,7 @@ class MultiViewCost:
         return self._sum(lambda cost, to_view: cost.arms(arms, arm))
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return about what arms (N, 4) cost, 0 left or 1 right, without priors, (N,)."""
+        """Return approximate costs (N,) of arms (N, 4), 0 left or 1 right, without priors."""
         joints = self.costs[0].joints(arms, arm)
         return self._sum(lambda cost, _: cost.arms_by_points(joints, arm))
 
@@ -117,9 +118,9 @@ class MultiViewCost:
         return ratings, costs_px, areas_px
 
     def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
-        """Return how well a state (14,) covers each camera's silhouette, as IoU.
+        """Return the IoU of a state (14,) and the silhouette of each camera.
 
-        None of cameras that are not among ``seeing``.
+        Cameras that are not in ``seeing`` have None.
         """
         found: list[float | None] = [None] * len(self.costs)
         for number in seeing:

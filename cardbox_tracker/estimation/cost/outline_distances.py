@@ -1,6 +1,6 @@
-"""Distances from outlines: the model's and a silhouette's, on the same grid of points of an image.
+"""Signed distances from the outlines of model and silhouette, on a common grid of image points.
 
-A signed distance changes smoothly where an outline moves, which a count of pixels does not.
+A signed distance changes smoothly when an outline moves, unlike a number of pixels.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.vision.camera import Camera
 
 WIDTH = 320
-"""Images are compared at this width, px."""
+"""Width of the image for the comparison, px."""
 
 HALF_PX, FAR_PX = 5.0, 10.0
-"""Distance that weighs a quarter, and the one at which distances are cut off."""
+"""Distance with a quarter of the weight, and limit of the distances."""
 
-# Pixels from one point of the grid to the next.
+# Distance between neighbouring points of the grid, px.
 _GRID = 4
 # fillConvexPoly paints every pixel that an edge touches.
 _TOO_WIDE_PX = 0.5
 ABOVE_HIPS_PX = 4
-"""The legs, which the model does not have, begin this far above the hips."""
+"""Height above the hips at which the legs, which the model lacks, begin."""
 
 STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * (2 * ARM_ANGLES), 0.04, 0.02])
-"""Steps (14,) of central differences: about 2 px. Nearer ones see the outline's whole pixels."""
+"""Steps (14,) of central differences, about 2 px; smaller steps would suffer from whole pixels."""
 
-# Beside the person, what the model may cover while it is moved.
+# Margin around the person for the moved model.
 _MARGIN_PX = 24
 
 
@@ -45,18 +45,18 @@ class SeenOutline:
     """The part of a silhouette above the hips, and the window of the image around it.
 
     Attributes:
-        is_empty: nobody is in it.
-        camera: of the window.
-        distances: of the grid's points from the silhouette's outline, px, negative inside, (n,).
+        is_empty: whether the silhouette has no foreground.
+        camera: camera of the window.
+        distances: distances of the grid's points from the outline, (n,), px, negative inside.
     """
 
     def __init__(self, silhouette: Silhouette, camera: Camera, hips_m: FloatArray) -> None:
-        """Take a silhouette (H, W), 0 or 255, of ``camera`` at any size.
+        """Compute the distances of a silhouette.
 
         Args:
-            silhouette: of the person.
-            camera: at the size of the comparison.
-            hips_m: middle of the hips, (3,), in its optical frame.
+            silhouette: (H, W), 0 or 255, at any size.
+            camera: camera at the size of the comparison.
+            hips_m: middle of the hips, (3,), metres in the camera's optical frame.
         """
         size = camera.width, camera.height
         grey = cv2.resize(np.asarray(silhouette, np.uint8), size, interpolation=cv2.INTER_AREA)
@@ -70,7 +70,7 @@ class SeenOutline:
             left = max(0, int(columns[0]) - _MARGIN_PX)
             right = min(camera.width, int(columns[-1]) + _MARGIN_PX)
             top = max(0, int(rows[0]) - _MARGIN_PX)
-        # Outlines beyond the end still matter for the distances of the rows before.
+        # Outlines below the last row still affect the distances above it.
         bottom = min(camera.height, end + int(FAR_PX))
         self.camera = replace(
             camera, width=right - left, height=bottom - top, cx=camera.cx - left, cy=camera.cy - top
@@ -79,7 +79,7 @@ class SeenOutline:
         self.distances = self._distances(mask[top:bottom, left:right], 0.0)
 
     def drawn(self, corners_m: FloatArray) -> FloatArray:
-        """Return the distances from the outline of patches (n, 4, 3) in the optical frame."""
+        """Return the distances, px, from the outline of patches (n, 4, 3) in the optical frame."""
         image = np.zeros((self.camera.height, self.camera.width), np.uint8)
         for patch in np.rint(16.0 * self.camera.project(corners_m)).astype(np.int32):
             cv2.fillConvexPoly(image, cv2.convexHull(patch), 255, cv2.LINE_8, 4)

@@ -1,8 +1,8 @@
-"""Compiled Gauss-Newton steps that draw the model's outline onto a silhouette's.
+"""Compiled Gauss-Newton steps that fit the model's outline to the outline of a silhouette.
 
 The outline of a state (14,) consists of points on the edges of its patches that no other patch
-covers. Each has a distance from the outline of its camera's silhouette, r, px. With weights after
-Geman and McClure, and kept near the first state by squares in units of ``stddev``, the steps lower
+covers. Each point has a distance r, px, from the outline of its camera's silhouette. With
+Geman-McClure weights and a quadratic prior around the initial state, the steps minimize
 
     INFORMATION * sum(length * r^2 / (1 + r^2 / HALF^2)) + sum(((state - begin) / stddev)^2)
 """
@@ -36,23 +36,25 @@ from cardbox_tracker.estimation.cost.outline_points import (
 )
 
 SHARES = (0.0, 0.2, 0.5, 1.0)
-"""Fractions of a change that are tried."""
+"""Step lengths of the line search, as fractions of a change."""
 
-# Weight of a pixel of outline, 1 / px^2: the errors of 312 neighbouring points are not independent.
+# Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated.
 INFORMATION = 0.01
 _MOST_CHANGE = 0.25
 _ALL = (True, True, True)
 
 
 class Seen(NamedTuple):
-    """One camera and the silhouette that it sees.
+    """One camera and its silhouette.
+
+    The state in the frame of this camera is ``turned`` @ (state of the first camera) + ``moved``.
 
     Attributes:
-        turned: the state of the first camera times this, (14, 14), plus
-        moved: this, (14,), is the state as this camera has it.
+        turned: (14, 14).
+        moved: (14,).
         lens: fx, fy, cx, cy of the image of ``field``, (4,).
         field: signed distances from the silhouette's outline, (H, W), px, negative inside.
-        end_row: rows from it on do not count.
+        end_row: first row that does not count.
     """
 
     turned: Floats
@@ -67,7 +69,7 @@ class Outline(NamedTuple):
 
     Attributes:
         edges: patch, and corner at which the edge of the point begins, (n, 2).
-        points: share of the edge, and length of outline that the point stands for, px, (n, 2).
+        points: fraction of the edge, and length of the outline at the point, px, (n, 2).
     """
 
     edges: Ints
@@ -81,7 +83,7 @@ EquationsTuple = tuple[Floats, Floats]
 
 @kernel
 def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> None:
-    """Write the state (14,) as another camera has it."""
+    """Write the state (14,) in the frame of another camera."""
     for j in range(N_STATE):
         total = 0.0
         for i in range(N_STATE):
@@ -98,14 +100,14 @@ def add_equations(
     equations: EquationsTuple,
     outline: OutlineTuple,
 ) -> int:
-    """Add the outline that one camera sees to the normal equations of ``state`` (14,).
+    """Add the outline in one camera to the normal equations of ``state`` (14,).
 
     Args:
-        state: of the first camera.
+        state: state for the first camera, (14,).
         camera: fields of :class:`Seen`.
-        body: of the person before this camera.
-        steps: of the central differences, (14,).
-        equations: matrix (14, 14), of which the lower triangle is used, and right side (14,).
+        body: fields of :class:`~.kernel_arguments.Body`, before this camera.
+        steps: steps of the central differences, (14,).
+        equations: matrix (14, 14), lower triangle, and right side (14,); changed.
         outline: fields of :class:`Outline`, written, (312, 2) each.
 
     Returns:
@@ -131,7 +133,7 @@ def add_equations(
         )
         outlying = 1.0 + (now[i] / HALF_PX) ** 2
         weights[i] = INFORMATION * points[i, 1] / (outlying * outlying)
-    # Each value of a state moves some of the points only.
+    # Each value of a state moves only some of the points.
     jacobian, span = np.empty((N_STATE, count)), np.empty((N_STATE, 2), np.int64)
     for j in range(N_STATE):
         trial[:] = state
@@ -178,12 +180,12 @@ def costs_along(
     """Add the costs of one camera's outline after each of ``SHARES`` of a change to ``costs``.
 
     Args:
-        state: of the first camera, (14,).
-        change: of it, (14,).
+        state: state for the first camera, (14,).
+        change: change of the state, (14,).
         camera: fields of :class:`Seen`.
-        body: of the person before this camera.
-        outline: fields of :class:`Outline`, as :func:`add_equations` wrote them.
-        costs: one for each share.
+        body: fields of :class:`~.kernel_arguments.Body`, before this camera.
+        outline: fields of :class:`Outline`, from :func:`add_equations`.
+        costs: one for each of ``SHARES``; changed.
     """
     seen, of = Seen(*camera), body_of(body)
     edges, points = outline
@@ -206,14 +208,14 @@ def costs_along(
 def solve_equations(
     state: Floats, begin: Floats, stddev: Floats, matrix: Floats, right: Floats, costs: Floats
 ) -> None:
-    """Write the change of ``state`` into ``right``, and the cost of leaving ``begin``.
+    """Write the change of ``state`` to ``right``, and the costs of the distance to ``begin``.
 
     Args:
         state: (14,).
-        begin: the state near which it is kept, (14,).
-        stddev: units of the distance from there, (14,).
-        matrix: of the normal equations, (14, 14); overwritten.
-        right: their right side; overwritten by the change, (14,).
+        begin: mean of the quadratic prior, (14,).
+        stddev: standard deviations of the prior, (14,).
+        matrix: matrix of the normal equations, (14, 14); overwritten.
+        right: right side, (14,); overwritten by the change.
         costs: written, one for each of ``SHARES`` of the change.
     """
     for j in range(N_STATE):

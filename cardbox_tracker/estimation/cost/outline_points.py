@@ -35,7 +35,7 @@ Ints = NDArray[np.int64]
 # Points on each edge of a patch.
 _ON_EDGE = 6
 POINTS = BODY_PATCHES * 4 * _ON_EDGE
-# A point counts as covered so far inside another patch, and is no outline so near to the border.
+# Depth inside another patch at which a point is covered; margin of the image without points.
 _COVERED_PX, _BORDER_PX = 0.5, 3.0
 
 
@@ -46,10 +46,10 @@ def project_corners(
     """Write corners (13, 4, 2), px, of the patches ``first`` to ``end``.
 
     Args:
-        corners_m: of all patches in the optical frame, (3, 52), as ``Workspace`` has them, metres.
+        corners_m: corners of all patches, (3, 52), metres in the optical frame, see ``Workspace``.
         lens: fx, fy, cx, cy.
-        first: patch.
-        end: patch.
+        first: first patch.
+        end: index after the last patch.
         corners_px: written.
     """
     for p in range(first, end):
@@ -62,7 +62,7 @@ def project_corners(
 
 @kernel
 def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[float, float]:
-    """Return the point at a share of the edge that begins at corner ``c`` of patch ``p``, px."""
+    """Return the point at a fraction of the edge from corner ``c`` of patch ``p``, px."""
     d = (c + 1) % 4
     x, y = corners_px[p, c, 0], corners_px[p, c, 1]
     return x + share * (corners_px[p, d, 0] - x), y + share * (corners_px[p, d, 1] - y)
@@ -70,12 +70,12 @@ def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[flo
 
 @kernel
 def _turns(corners_px: Floats, turns: Floats, sides_px: Floats) -> None:
-    """Write how patches lie.
+    """Write orientation and side lengths of the patches.
 
     Args:
         corners_px: (13, 4, 2).
-        turns: whether the corners of each run one way round, 1, or the other, -1; (13,).
-        sides_px: how long each edge is, (13, 4).
+        turns: orientation of each patch, 1 or -1, (13,).
+        sides_px: length of each edge, (13, 4).
     """
     for p in range(BODY_PATCHES):
         twice_area = 0.0
@@ -95,7 +95,7 @@ def _turns(corners_px: Floats, turns: Floats, sides_px: Floats) -> None:
 def _is_inside(
     corners_px: Floats, sides_px: Floats, p: int, turn: float, x: float, y: float
 ) -> bool:
-    """Whether a point is well inside the convex patch ``p``, whose corners run by ``turn``."""
+    """Return whether a point is well inside the convex patch ``p`` with orientation ``turn``."""
     for c in range(4):
         d = (c + 1) % 4
         along_x = corners_px[p, d, 0] - corners_px[p, c, 0]
@@ -118,10 +118,9 @@ def find_outline(
     Args:
         corners_px: (13, 4, 2).
         size: width and height of the image.
-        end_row: rows from it on do not count.
-        edges: written: patch and corner at which the edge of a point begins, (312, 2).
-        points: written: the share of the edge there, and how much outline the point stands for, px,
-            (312, 2).
+        end_row: first row that does not count.
+        edges: written: patch and first corner of the edge of each point, (312, 2).
+        points: written: fraction of the edge, and length of the outline at the point, px, (312, 2).
 
     Returns:
         Number of points.
@@ -157,7 +156,7 @@ def find_outline(
 
 @kernel
 def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
-    """Return the value of ``field`` (H, W) at a point, linear between pixels."""
+    """Return the value of ``field`` (H, W) at a point by bilinear interpolation."""
     height, width = field.shape
     x = min(max(x, 0.0), width - 1.001)
     y = min(max(y, 0.0), height - 1.001)
@@ -171,11 +170,11 @@ def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
 
 @kernel
 def first_points(edges: Ints, count: int, first: Ints) -> None:
-    """Write where the points of each patch begin, and where the last ones end, (14,).
+    """Write the index of each patch's first point, and the end of the last patch, (14,).
 
     Args:
         edges: patches, in order, and corners of the points, (n, 2).
-        count: of the points.
+        count: number of points.
         first: written.
     """
     p = 0
@@ -189,7 +188,7 @@ def first_points(edges: Ints, count: int, first: Ints) -> None:
 
 @kernel
 def moved_patches(one: Floats, other: Floats) -> tuple[int, int]:
-    """Return the first and the end of the patches that differ between two states (14,)."""
+    """Return first and end index of the patches that differ between two states (14,)."""
     for j in (TORSO_Y, ROLL, PITCH, YAW, TORSO_X, TORSO_Z):
         if one[j] != other[j]:
             return 0, BODY_PATCHES

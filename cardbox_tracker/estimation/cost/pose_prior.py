@@ -1,12 +1,12 @@
-"""A learned prior of one arm's posture.
+"""Learned prior of one arm's posture.
 
-An outline is alike for an arm that points to the camera and one that points away. The prior is a
-mixture of Gaussians over six numbers, the unit vectors of upper arm and forearm in the torso's
-frame: x forwards, y outwards (to the left for the left arm, to the right for the right one), z up.
+The outline hardly shows whether an arm points to the camera or away from it. The prior is a mixture
+of Gaussians over six numbers, the unit vectors of upper arm and forearm in the torso's frame: x
+forwards, y outwards (to the left for the left arm, to the right for the right one), z up.
 ``tools/make_pose_prior.py`` learns it from motion capture; the data file names the source. Its unit
 is the nat: -log p, about 0 at the likeliest posture, never above ``FLOOR_NATS``.
 
-Both arms share it: a positive abduction raises either outwards, so d5..d8 and d9..d12 mean alike.
+Both arms share it, because a positive abduction raises either arm outwards.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import inlined_kernel
 
 FLOOR_NATS = 8.0
-"""About what a posture costs that was nowhere in the motion capture; none is impossible, so an arm
-that the image shows clearly is found there, too."""
+"""Approximate cost of a posture that is not in the motion capture; it is finite, so that the image
+can still outweigh it."""
 
 _DATA = "pose_prior.json"
 _D = 6
@@ -41,9 +41,9 @@ def _data() -> dict[str, Any]:
 def load_gmm() -> FloatArray:
     """Return the mixture, (K, 28), read-only; a row is a Gaussian with mean m and covariance C.
 
-    Its numbers are log(share / density's normalization) less the offset that makes the likeliest
-    posture cost about nothing (1), m (6), and the lower triangle of L^-1, C = L L^T, row by row
-    (21); so that log p = log(sum of exp(row[0] - |L^-1 (x - m)|^2 / 2)).
+    A row has the logarithm of weight / normalization, minus an offset that makes the lowest cost
+    about 0 (1 number), m (6), and the lower triangle of L^-1 with C = L L^T, row by row (21). So
+    log p = log(sum of exp(row[0] - |L^-1 (x - m)|^2 / 2)).
     """
     data = _data()
     shares, means = np.array(data["shares"]), np.array(data["means"])
@@ -57,7 +57,7 @@ def load_gmm() -> FloatArray:
 
 
 def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
-    """Draw arms from the mixture: unit vectors of upper arm and forearm, (count, 6)."""
+    """Sample arms from the mixture: unit vectors of upper arm and forearm, (count, 6)."""
     data = _data()
     rng = np.random.default_rng(seed)
     shares = np.array(data["shares"])
@@ -85,7 +85,7 @@ def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
                 place += 1
             squares += y * y
         log_density = gmm[k, 0] - 0.5 * squares
-        # Less would not change a sum that is exp(-FLOOR_NATS) at least.
+        # Smaller summands would not change the sum, which is at least exp(-FLOOR_NATS).
         if log_density > -20.0:
             density += exp(log_density)
     return -log(density)

@@ -1,9 +1,8 @@
 """Compiled rasterisation: the two columns where each row crosses the outline of each patch.
 
-The pixel rule is that of :mod:`cardbox_tracker.vision.rasterisation`; the results are equal. The
-loops over patches or rows have no branches and use 32-bit whole numbers, for which there are vector
-instructions. Patches that the near plane cuts, or that rounding dents, take a slower way to the
-same result.
+The results are equal to those of :mod:`cardbox_tracker.vision.rasterisation`. The loops over
+patches or rows have no branches and use 32-bit integers, so that they can be vectorized. Patches
+that the near plane cuts, or that rounding makes concave, use slower code.
 
 Corners and edges of K patches are flat arrays: entry c K + p is corner c of patch p, in order
 around it, or the edge from that corner to the next.
@@ -27,10 +26,10 @@ from cardbox_tracker.vision.rasterisation import (
 _ONE = float(2**CROSSING_BITS)
 _BITS = np.int32(CROSSING_BITS)
 _ROUND_UP = 2**CROSSING_BITS - 1
-# Steeper than this an edge meets one row at most, and its step is not used.
+# Largest step of an edge; a flatter edge meets at most one row, and its step is not used.
 _STEEPEST = 32000.0
 
-# An index of this type is never negative, so no code is made to count from an array's end.
+# With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 _Index = int | np.integer[Any]
 # Rows of the array of edges.
@@ -38,10 +37,10 @@ _FIRST_ROW, _END_ROW, _CROSSING, _STEP = 0, 1, 2, 3
 
 
 class Workspace(NamedTuple):
-    """Scratch of one call for K patches.
+    """Scratch arrays of one call for K patches.
 
-    Functions that are inlined take all of it; the others take the arrays they need, for handing
-    over all of them makes a call dear.
+    Inlined functions take the whole workspace. Other functions take only the arrays that they need,
+    because many arguments make a call slow.
     """
 
     shape: Floats
@@ -49,22 +48,22 @@ class Workspace(NamedTuple):
     corners: Floats
     """(3, 4 K): the same in the optical frame."""
     pixels: Floats
-    """(2, 5 K): the same projected and snapped; the first corner again as the fifth."""
+    """(2, 5 K): the corners projected and snapped; the fifth corner repeats the first."""
     edges: Whole
-    """(4, 4 K): first and end row, crossing of the first row and step from row to row, 2^-16 px."""
+    """(4, 4 K): first and end row, column at the first row and step per row, 2^-16 px."""
     sides: Whole
     """(K, 2, rows): the two columns where a row crosses the outline of a patch, in any order."""
     extent: Counts
     """(K, 2): first and end row of a patch."""
     runs: Whole
-    """(2, K): first and end columns of the runs of one row, to be joined."""
+    """(2, K): first and end columns of the runs of one row."""
     active: Counts
-    """(K,): patches that a row meets."""
+    """(K,): patches that meet a row."""
     joined: Whole
-    """(2, rows): runs of two patches as one."""
+    """(2, rows): joined runs of two patches."""
     outline: Floats
-    """(2, 6): pixels of a patch that the near plane cuts. A plane patch that is cut has 5 corners,
-    but one that lies in the near plane may seem to cross it at all edges, by rounding."""
+    """(2, 6): corners of a patch that the near plane cuts, pixels. Rounding can give a sixth corner
+    to a patch that lies in the near plane."""
     torso: Floats
     upper_arm: Floats
     forearm: Floats
@@ -76,7 +75,7 @@ class Workspace(NamedTuple):
 
 @inlined_kernel
 def new_workspace(patches: int, rows: int) -> Workspace:
-    """Return the scratch for a number of patches and rows; its shape is zero."""
+    """Return the workspace for a number of patches and rows; ``shape`` is zero."""
     return Workspace(
         shape=np.zeros((3, 4 * patches)),
         corners=np.zeros((3, 4 * patches)),
@@ -98,7 +97,7 @@ def new_workspace(patches: int, rows: int) -> Workspace:
 
 @inlined_kernel
 def _snap(pixel: float) -> float:
-    """Nearest point of the 1/256 px grid, within 16000 px."""
+    """Return the nearest point of the 1/256 px grid, within 16000 px."""
     near = min(max(pixel, -FARTHEST_PX), FARTHEST_PX)
     snapped: float = np.floor(near * SUBPIXELS + 0.5) / SUBPIXELS
     return snapped
@@ -106,14 +105,14 @@ def _snap(pixel: float) -> float:
 
 @inlined_kernel
 def _row(y: float, rows: float) -> float:
-    """First row at or below ``y``, within the image."""
+    """Return the first row at or below ``y``, within the image."""
     row: float = np.ceil(min(max(y, 0.0), rows))
     return row
 
 
 @inlined_kernel
 def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
-    """Write sides and extent of all patches, whose corners are there.
+    """Write sides and extent of all patches from their corners.
 
     An edge from its upper end (x0, y0) to its lower end (x1, y1) has the slope
     s = (x1 - x0) / (y1 - y0), first meets row v0 = ceil(y0), crosses it at x0 + (v0 - y0) s and
@@ -144,7 +143,7 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
         upper_x = x0 if y0 < y1 else x1
         upper_y = min(y0, y1)
         row = _row(upper_y, limit)
-        # A level edge meets no row; its crossing has only to be some number.
+        # A level edge meets no row; its crossing only has to be finite.
         crossing = upper_x + (0.0 if y0 == y1 else (row - upper_y) * slope)
         step = min(max(slope, -_STEEPEST), _STEEPEST)
         edges[_FIRST_ROW, _index(e)] = np.int32(row)
@@ -152,8 +151,8 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
         edges[_CROSSING, _index(e)] = np.int32(np.floor(crossing * _ONE + 0.5))
         edges[_STEP, _index(e)] = np.int32(np.floor(step * _ONE + 0.5))
     for p in range(patches):
-        # Edges that go down write one side of their rows and those that go up the other: each row
-        # is met once by either, unless rounding dented a sliver.
+        # Downward edges write one side of their rows, upward edges the other. Each row gets both
+        # sides once, unless rounding makes a thin patch concave.
         y0, y1 = pixels[1, _index(p)], pixels[1, _index(p + patches)]
         y2, y3 = pixels[1, _index(p + 2 * patches)], pixels[1, _index(p + 3 * patches)]
         a, b, c, d = y1 > y0, y2 > y1, y3 > y2, y0 > y3
@@ -170,7 +169,7 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
 
 @inlined_kernel
 def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int) -> None:
-    """Write the columns where edge ``e`` crosses its rows as one side of patch ``p``."""
+    """Write the columns where edge ``e`` crosses its rows, as one side of patch ``p``."""
     first = np.int64(edges[_FIRST_ROW, _index(e)])
     x, step, limit = edges[_CROSSING, _index(e)], edges[_STEP, _index(e)], np.int32(width)
     base, k = _index(first), _index(p)
@@ -181,9 +180,10 @@ def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int)
 
 @kernel
 def _draw_cut(work: Workspace, p: int, camera: Intrinsics, rows: int, width: int) -> None:
-    """Write sides and extent of patch ``p``, cut at the near plane, as the definition says.
+    """Write sides and extent of patch ``p`` after clipping at the near plane.
 
-    That is :func:`cardbox_tracker.vision.rasterisation.clip_near` and ``fill_convex``.
+    The algorithm is that of :func:`cardbox_tracker.vision.rasterisation.clip_near` and
+    ``fill_convex``.
     """
     corners, sides, extent, outline = work.corners, work.sides, work.extent, work.outline
     fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy

@@ -1,10 +1,10 @@
-"""Compiled running sums along the rows of a silhouette, from which the costs are read.
+"""Compiled cumulative sums along the rows of a silhouette, from which the costs are computed.
 
 With f = 1 for foreground and 0 for background, row v of the row sums is
 
     S(v, 0) = 0,    S(v, u + 1) = S(v, u) + 1 - 2 f(v, u)
 
-so that the sum of (1 - 2 f) over the columns a <= u < b is S(v, b) - S(v, a).
+The sum of (1 - 2 f) over the columns a <= u < b is S(v, b) - S(v, a).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from cardbox_tracker.compiling import inlined_kernel, kernel
 
 RowSums = NDArray[np.signedinteger[Any]]
-"""Shape (rows, W + 1), of 16 bits where the image is narrow enough, else of 32."""
+"""Shape (rows, W + 1), of 16 bits if the image is narrow enough, else of 32 bits."""
 
 _FOREGROUND = np.uint64(0xFFFFFFFFFFFFFFFF)
-# An index of this type is never negative, so no code is made to count from an array's end.
+# With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 
 
@@ -41,8 +41,8 @@ def fill_row_sums(
 
     Args:
         silhouette: shape (rows, W), 0 or 255.
-        words: the same memory as (rows, W / 8) of 64 bits, so that runs of alike pixels are counted
-            eight at a time; without words, (rows, 0), every pixel is counted by itself.
+        words: the same memory as (rows, W / 8) of 64 bits, so that eight equal pixels are counted
+            at a time; with (rows, 0) each pixel is counted by itself.
         row_sums: written.
 
     Returns:
@@ -82,9 +82,10 @@ def fill_row_sums(
 
 @kernel
 def leave_out(row_sums: RowSums, first_row: int, start: int, end: int) -> int:
-    """Let the columns ``start`` to ``end`` of the rows from ``first_row`` on, the legs, not count.
+    """Exclude the legs: columns ``start`` to ``end`` of the rows from ``first_row`` on.
 
-    Returns the foreground pixels there.
+    Returns:
+        Foreground pixels of this area.
     """
     taken = 0
     for v in range(first_row, row_sums.shape[0]):
@@ -100,7 +101,7 @@ def leave_out(row_sums: RowSums, first_row: int, start: int, end: int) -> int:
 
 @kernel
 def median_column(row_sums: RowSums) -> float:
-    """Column that halves the foreground, from every 8th row and every 4th column, pixels."""
+    """Return the median column of the foreground, from every 8th row and every 4th column, px."""
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
     counts = np.zeros(width // 4 + 1, np.int64)
     total = 0

@@ -2,12 +2,12 @@
 
     W(d, I_t) = sum over x, y of h(x, y, d) XOR f(x, y, I_t)
 
-Only the rows above the hips count: a model of the upper body has no legs. The middle of
-the hips never moves up or down, so the first row below it is a constant of body and camera.
+Only the rows above the hips count, because the model has no legs. Mid-hip has a constant height, so
+the first row below it depends only on body and camera.
 
-:class:`SilhouetteTerm` is what all its implementations share. The tracker uses the compiled one in
-:mod:`cardbox_tracker.estimation.cost.compiled`; ``experiments/reference.py`` does just what the
-equation says.
+:class:`SilhouetteTerm` is the base of all implementations. The tracker uses the compiled one,
+:mod:`cardbox_tracker.estimation.cost.compiled`; ``experiments/reference.py`` implements the
+equation literally.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from cardbox_tracker.vision.camera import Camera
 class SilhouetteObservation(TermObservation):
     """One silhouette.
 
-    Torsos are rated by the patches of torso, waist and head, drawn together with the given arms;
-    arms with the trunk and that one arm drawn; whole postures with all patches.
+    For torsos, the patches of torso, waist and head are drawn together with the given arms; for
+    arms, the trunk and this arm are drawn; for whole postures, all patches are drawn.
     """
 
     frame: Frame
@@ -41,7 +41,7 @@ class SilhouetteTerm(ABC):
     """Base of all implementations of the silhouette's term."""
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body before one camera, pitched as it stands."""
+        """Prepare for one body and one camera, which gets the pitch of the body model."""
         self.body, self.camera = body, camera
         self.rows = rows_above_hips(body, camera)
 
@@ -50,10 +50,10 @@ class SilhouetteTerm(ABC):
 
         Args:
             silhouette: (H, W), 0 or 255.
-            image: (H, W) grey or (H, W, 3) bgr of the same moment, or None.
+            image: (H, W) grey or (H, W, 3) bgr of the same time, or None.
 
         Raises:
-            ValueError: ``silhouette`` or ``image`` has not the camera's size.
+            ValueError: the size of ``silhouette`` or ``image`` is not the camera's.
         """
         for name, pixels in (("silhouette", silhouette), ("image", image)):
             size = (self.camera.height, self.camera.width)
@@ -69,19 +69,19 @@ class SilhouetteTerm(ABC):
         """See :class:`~cardbox_tracker.estimation.cost.terms.Term`."""
 
     def look(self, silhouette: Silhouette) -> SilhouetteObservation:
-        """Observe a silhouette (H, W) by itself.
+        """Observe a silhouette (H, W) without further data.
 
         Raises:
-            ValueError: it has not the camera's size.
+            ValueError: its size is not the camera's.
         """
         return self.observe(self.frame(silhouette))
 
 
 def rows_above_hips(body: BodyModel, camera: Camera) -> int:
-    """Return the number of rows of the image, from its top, above the hips.
+    """Return the number of image rows above the hips.
 
-    The hips' row is taken where the torso stands; at the image's edges a pitched camera would see
-    the same height in the same row as well, since it turns about the rows' direction only.
+    Points of one height and level depth lie in one row also for a pitched camera, because the pitch
+    is a rotation about the direction of the rows.
     """
     placement = body.placement
     hip = camera.reference_to_optical(

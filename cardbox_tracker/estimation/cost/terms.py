@@ -2,20 +2,20 @@
 
 A tracker's cost is the silhouette's term (paper, equation (2)) and any further ones. A
 :class:`Term` is made once for a body before a camera. For each frame its :meth:`~Term.observe`
-returns what the term has to say about that frame, a :class:`TermObservation`, which never changes
-afterwards; so several filters and threads may ask it at the same time.
+returns a :class:`TermObservation`, the evidence of the term in this frame. An observation is
+constant, so several filters and threads may use it at the same time.
 
-A hierarchical filter rates first torsos and then the arms beside the torso it has found, so an
-observation is asked in three ways:
+A hierarchical filter first rates torsos and then arms beside the torso that it has found. So an
+observation has three methods:
 
-    observation.torsos_beside(arms)(torsos)         (N, 4) -> (N,)    arms stay where they are
-    observation.arms_beside(torso)(side, arms)      (N, 4) -> (N,)    the torso stays
+    observation.torsos_beside(arms)(torsos)         (N, 4) -> (N,)    the arms are fixed
+    observation.arms_beside(torso)(side, arms)      (N, 4) -> (N,)    the torso is fixed
     observation.postures(postures)                  (N, 12) -> (N,)
 
-The first call of the first two prepares what all particles share. The whole-body filter also finds
-how far the hips have moved along the line of sight and up; it asks for torsos without arms, and
-appends ``torso_x`` and ``torso_z`` to torsos, (N, 6) or (6,), and to postures, (N, 14). So a term
-reads d1..d4 and d1..d12 by their places and uses the last two if they are there. A new term is one
+The first call of the first two methods computes the values that all particles share. The whole-body
+filter also estimates ``torso_x`` and ``torso_z``. It rates torsos without arms, and appends these
+two values to torsos, (N, 6) or (6,), and to postures, (N, 14). So a term reads d1..d4 and d1..d12
+by index and uses the last two values if they are given. A new term is one
 new file with a settings class, see ``docs/extending.md``.
 """
 
@@ -38,10 +38,10 @@ Image = NDArray[np.uint8]
 DepthImage = NDArray[np.float32]
 
 USUAL_INTERVAL_S = 1.0 / 15.0
-"""Between frames of which no time is known."""
+"""Interval between frames without stamps, s."""
 
 ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
-"""Joints of each arm."""
+"""Slice of each arm's joints in a posture."""
 
 TorsoCosts = Callable[[FloatArray], FloatArray]
 """Takes torsos d1..d4, (N, 4), rad and metres; returns costs (N,), px."""
@@ -52,19 +52,19 @@ ArmCosts = Callable[[str, FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Frame:
-    """What one camera shows of the person at one time, prepared for filter and terms.
+    """The data of one camera at one time, prepared for filter and terms.
 
     Attributes:
-        silhouette: (H, W), 0 or 255, of the camera's size; not to be written to.
-        rows: rows that count, from the top: those above the hips.
+        silhouette: (H, W), 0 or 255, of the camera's size; do not write to it.
+        rows: number of rows that count, from the top to the hips.
         foreground_px: foreground pixels in those rows.
         image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
-        posture: of the frame before, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad and
-            metres; None where tracking starts.
-        depth_m: (H, W), metres along the optical axis, not finite or 0 where it is not known; None
+        posture: state of the previous frame, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad
+            and metres; None at the start of tracking.
+        depth_m: (H, W), metres along the optical axis; unknown depths are 0 or not finite; None
             without a depth image.
-        interval_s: since the frame before, s.
-        stamp_ns: when it was taken, ns; None where that is not known.
+        interval_s: time since the previous frame, s.
+        stamp_ns: time of the frame, ns; None if it is unknown.
     """
 
     silhouette: Silhouette
@@ -78,39 +78,39 @@ class Frame:
 
 
 class TermObservation(Protocol):
-    """What one term says of one frame; every cost is in pixels, float64."""
+    """The evidence of one term in one frame; all costs are in pixels, float64."""
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """Return what rates torsos.
+        """Return the function that rates torsos.
 
         Args:
-            arms: posture (12,) whose arms stay where they are in the image while the torsos move;
-                None if no arms are considered.
+            arms: posture (12,) whose arms keep their place in the image while the torsos move; None
+                to rate torsos without arms.
         """
 
     def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Return what rates the arms of a body whose torso is at ``torso``, (4,) or (6,)."""
+        """Return the function that rates arms beside the torso ``torso``, (4,) or (6,)."""
 
     def postures(self, postures: FloatArray) -> FloatArray:
         """Return the costs (N,) of whole postures, (N, 12) or (N, 14)."""
 
 
 class Term(Protocol):
-    """One reason why a posture costs something."""
+    """One summand of the cost of a posture."""
 
     def observe(self, frame: Frame) -> TermObservation:
-        """Return what this term says of ``frame``."""
+        """Return the observation of ``frame``."""
 
 
 class TermSettings(Protocol):
-    """The settings of a term, as ``TrackerConfig.terms`` holds them."""
+    """The settings of a term, an element of ``TrackerConfig.terms``."""
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term for a measured person before a working camera."""
+        """Return the term for a measured person and a working camera."""
 
 
 class Silence:
-    """A term, and its observation, that says nothing."""
+    """A term, and its observation, with zero costs."""
 
     def observe(self, frame: Frame) -> TermObservation:
         """See :class:`Term`."""
@@ -131,7 +131,7 @@ class Silence:
 
 @dataclass(frozen=True)
 class SumOfTerms:
-    """The observations of several terms as one: costs add up."""
+    """The sum of the observations of several terms."""
 
     parts: tuple[TermObservation, ...]
 
@@ -153,7 +153,7 @@ class SumOfTerms:
 
 
 def _total(costs: Iterator[FloatArray]) -> FloatArray:
-    """Sum of arrays (N,), in their order; the first one is written to."""
+    """Return the sum of arrays (N,) in their order; the first array is overwritten."""
     total = next(costs)
     for cost in costs:
         total += cost

@@ -1,7 +1,7 @@
 """Compiled sums of (1 - 2 f) over the pixels under any patch, read from row sums.
 
-One covered run a <= u < b of row v gives S(v, b) - S(v, a), so that a state costs the rows of its
-outline, never its area. The tracker's time is spent here and in the rasterisation.
+A covered run a <= u < b of row v contributes S(v, b) - S(v, a), so the time for a state grows with
+its rows and not with its area.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import Counts, Whole
 from cardbox_tracker.estimation.cost.rasterisation import Workspace
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 
-# An index of this type is never negative, so no code is made to count from an array's end.
+# With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 _Index = int | np.integer[Any]
 
@@ -34,14 +34,14 @@ def _insert(runs: Whole, n: int, start: np.int32, end: np.int32) -> None:
 
 @inlined_kernel
 def _run(sides: Whole, p: _Index, row: _Index) -> tuple[np.int32, np.int32]:
-    """First and end column of a patch in a row."""
+    """Return first and end column of a patch in a row."""
     a, b = sides[p, 0, row], sides[p, 1, row]
     return min(a, b), max(a, b)
 
 
 @inlined_kernel
 def _gain(row_sums: RowSums, row: _Index, start: _Index, end: _Index) -> np.int64:
-    """Sum of (1 - 2 f) over a run of a row: S(row, end) - S(row, start)."""
+    """Return the sum of (1 - 2 f) over a run of a row: S(row, end) - S(row, start)."""
     return np.int64(row_sums[row, _index(end)]) - np.int64(row_sums[row, _index(start)])
 
 
@@ -49,7 +49,7 @@ def _gain(row_sums: RowSums, row: _Index, start: _Index, end: _Index) -> np.int6
 def _join(
     sides: Whole, one: np.uint64, other: np.uint64, first: np.uint64, count: int, joined: Whole
 ) -> np.int32:
-    """Write the runs of two patches as one to ``joined``; above 0 if they are apart somewhere."""
+    """Write joined runs of two patches to ``joined``; return a value > 0 if there is a gap."""
     gap = np.int32(0)
     for i in range(count):
         row = first + _index(i)
@@ -63,7 +63,7 @@ def _join(
 
 @inlined_kernel
 def _packed(sides: Whole, p: _Index, row: _Index) -> np.uint64:
-    """A run as one number that orders runs by their start."""
+    """Return a run as one number that orders runs by their start."""
     start, end = _run(sides, p, row)
     return (_index(start) << _index(32)) | _index(end)
 
@@ -76,7 +76,7 @@ def _sum_four(
     end_row: int,
     row_sums: RowSums,
 ) -> tuple[np.int64, np.int64]:
-    """Sum (1 - 2 f) over the union of four patches in rows that all of them meet; also its area."""
+    """Return sum of (1 - 2 f) and area of the union of four patches, in rows that all four meet."""
     total = np.int64(0)
     area = np.int64(0)
     a, b, c, d = patches
@@ -84,7 +84,7 @@ def _sum_four(
     for row in range(_index(v), _index(end_row)):
         k, m = _packed(sides, a, row), _packed(sides, b, row)
         n, o = _packed(sides, c, row), _packed(sides, d, row)
-        # A sorting network, for the order is hard to predict.
+        # A sorting network has no branches that are hard to predict.
         k, m = min(k, m), max(k, m)
         n, o = min(n, o), max(n, o)
         k, n = min(k, n), max(k, n)
@@ -111,10 +111,10 @@ def _sum_many(
     row_sums: RowSums,
     runs: Whole,
 ) -> tuple[np.int64, np.int64]:
-    """Sum (1 - 2 f) over the union of ``n`` patches in rows that all of them meet; also its area.
+    """Return sum of (1 - 2 f) and area of the union of ``n`` patches, in rows that all meet.
 
-    The patches of one part come one after the other and overlap, so most rows need no more than
-    joining each to the one before; what does not join is kept, in order, for a sweep.
+    The patches of one part are consecutive and overlap, so in most rows each run is joined to the
+    previous one; other runs are sorted for a sweep.
     """
     total = np.int64(0)
     area = np.int64(0)
@@ -149,10 +149,10 @@ def _sum_many(
 
 @inlined_kernel
 def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64, np.int64]:
-    """Sum (1 - 2 f) over the union of the first ``count`` patches; also its area in pixels.
+    """Return sum of (1 - 2 f) and area, px, of the union of the first ``count`` patches.
 
-    The rows fall into bands within which the same patches are met, so that a row does not ask each
-    patch whether it reaches there.
+    The rows are divided into bands that meet the same patches, so that no row has to test all
+    patches.
     """
     sides, extent, active, joined = work.sides, work.extent, work.active, work.joined
     rows = row_sums.shape[0]
@@ -179,7 +179,7 @@ def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64,
             total += gain
             area += covered
         elif n_active > 2:
-            # A patch that is given twice adds nothing.
+            # A patch that is given twice has no effect.
             one, other = _index(active[0]), _index(active[1])
             third, fourth = _index(active[2]), _index(active[n_active - 1])
             gain, covered = _sum_four(sides, (one, other, third, fourth), v, band_end, row_sums)
@@ -194,7 +194,7 @@ def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64,
                 total += _gain(row_sums, row, begin, stop)
                 area += np.int64(stop) - np.int64(begin)
             if gap > 0:
-                # Somewhere they are apart: what lies between them does not count.
+                # The patches are apart in some row, and the gap does not count.
                 for between in range(_index(v), _index(band_end)):
                     begin, stop = _run(sides, one, between)
                     start, end = _run(sides, other, between)
@@ -208,9 +208,9 @@ def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64,
 
 @kernel
 def cover_patches(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowSums) -> None:
-    """Write the row sums without the gain of the pixels under the patches to ``covered``.
+    """Write the row sums without the pixels under the patches to ``covered``.
 
-    Over a run they stay level, and behind it they are lower by what the run gave.
+    They are constant over a run, and behind it they are lower by the sum of the run.
     """
     rows, columns = row_sums.shape
     for v in range(_index(rows)):

@@ -1,10 +1,10 @@
-"""A further camera as the tracker uses it: a level one of its own, which sees moved states.
+"""A further camera as an upright camera with transformed states.
 
-All the tracker's parts know one kind of camera: level but for its pitch, before a person who stands
-at a distance. Any camera is of that kind once its image is turned upright and what it sees is given
-in a level frame of its own, which is turned about the vertical and moved against the first one's. A
-state (14,) then becomes another one, with other ``torso_y``, ``torso_yaw``, ``torso_x`` and
-``torso_z``; roll, pitch and arms are the same. So a second camera needs no other kernels.
+All parts of the tracker assume an upright camera, level except for its pitch, before a person at a
+distance. A further camera becomes such a camera if its image is turned upright and states refer to
+its own level frame, which is rotated about the vertical and translated against the first camera's.
+This changes ``torso_y``, ``torso_yaw``, ``torso_x`` and ``torso_z`` of a state (14,); roll, pitch
+and arms are the same. So a further camera needs no other kernels.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS
+from cardbox_tracker.body.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z, YAW
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BodyModelError, CameraError
 from cardbox_tracker.vision.camera import Camera
@@ -26,9 +26,8 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 
 ImageArray = NDArray[np.uint8]
 
-_Y, _YAW, _X, _Z = 0, 3, N_JOINTS, N_JOINTS + 1
 _NO_FRACTIONS = np.empty(0, np.uint16)
-# Turned by less, an image stays as it is: a fifth of a pixel at the border of 320.
+# An image with less roll is not turned: the error at the border is a fifth of a pixel at 320 px.
 _UPRIGHT_RAD = 0.001
 
 
@@ -38,7 +37,7 @@ class OtherCamera:
 
     Attributes:
         camera: at the working resolution, without its pitch.
-        extrinsics: where it stands.
+        extrinsics: its pose relative to the first camera.
     """
 
     camera: Camera
@@ -47,17 +46,19 @@ class OtherCamera:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One body as a further camera sees it.
+    """One body before a further camera.
+
+    The state in the frame of this camera is ``turned`` @ (state of the first camera) + ``moved``.
 
     Attributes:
         body: the person, placed before that camera.
         camera: that camera, turned upright.
-        yaw_rad: how its level frame is turned about the vertical.
-        offset_m: from the first level frame into its own, after that turn, (3,).
-        turn: the pixel of the camera's image for each of the upright one, (H, W, 2) int16; None if
-            it stands upright.
-        turned: states (N, 14) of the first camera times this, (14, 14), plus
-        moved: this, (14,), are those that this camera has.
+        yaw_rad: rotation of its level frame about the vertical.
+        offset_m: translation from the first level frame into its own, after the rotation, (3,).
+        turn: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None
+            if the camera stands upright.
+        turned: (14, 14).
+        moved: (14,).
     """
 
     body: BodyModel
@@ -70,7 +71,7 @@ class View:
 
     @classmethod
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:
-        """Return the view of ``body``, which stands before ``first``, pitched as it stands.
+        """Return the view of ``body`` before ``first``, which includes its pitch.
 
         Raises:
             CameraError: the other camera looks straight up or down, or the person was measured
@@ -103,24 +104,25 @@ class View:
                 f"a camera with the extrinsics {other.extrinsics} does not have the person in "
                 f"front of it: {error}; check extrinsics and the order of the cameras"
             ) from None
-        # The hips are at x - distance, y, z + height; only x, y and the yaw change with the turn.
+        # The hips are at x - distance, y, z + height; the rotation only changes x, y and the yaw.
         c, s = cos(yaw_rad), sin(yaw_rad)
-        turned = np.eye(N_JOINTS + 2)
-        turned[_X, _X], turned[_Y, _X], turned[_X, _Y], turned[_Y, _Y] = c, s, -s, c
-        moved = np.zeros(N_JOINTS + 2)
-        moved[_X] = offset_m[0] + there.placement.distance_m - c * place.distance_m
-        moved[_Y] = offset_m[1] + s * place.distance_m
-        moved[_Z] = offset_m[2] + place.hip_height_m - there.placement.hip_height_m
-        moved[_YAW] = -yaw_rad
+        turned = np.eye(N_STATE)
+        turned[TORSO_X, TORSO_X], turned[TORSO_X, TORSO_Y] = c, -s
+        turned[TORSO_Y, TORSO_X], turned[TORSO_Y, TORSO_Y] = s, c
+        moved = np.zeros(N_STATE)
+        moved[TORSO_X] = offset_m[0] + there.placement.distance_m - c * place.distance_m
+        moved[TORSO_Y] = offset_m[1] + s * place.distance_m
+        moved[TORSO_Z] = offset_m[2] + place.hip_height_m - there.placement.hip_height_m
+        moved[YAW] = -yaw_rad
         return cls(there, upright, yaw_rad, offset_m, turn, turned, moved)
 
     def states(self, states: FloatArray) -> FloatArray:
-        """Return states (N, 14) or (14,) of the first camera as this one has them."""
+        """Return states (N, 14) or (14,) of the first camera in the frame of this camera."""
         moved: FloatArray = states @ self.turned + self.moved
         return moved
 
     def points(self, points_m: FloatArray) -> FloatArray:
-        """Return points (..., 3) of the first camera's level frame in that of this one, metres."""
+        """Return points (..., 3) of the first level frame in this camera's level frame, metres."""
         moved: FloatArray = points_m @ _about_vertical(self.yaw_rad).T + self.offset_m
         return moved
 
@@ -133,9 +135,9 @@ class View:
         """Return an image (H, W) or (H, W, 3) of the camera turned upright.
 
         Args:
-            image: of the camera.
-            is_mask: what is beyond the image is 0, not like its border.
-            box: column, row, width and height of what is asked for; the rest is 0.
+            image: image of the camera.
+            is_mask: whether pixels beyond the image are 0 instead of the nearest border pixel.
+            box: column, row, width and height of the needed part; the rest is 0.
         """
         if self.turn is None:
             return image
@@ -146,7 +148,7 @@ class View:
             if not width:
                 return np.zeros((*turn.shape[:2], *image.shape[2:]), np.uint8)
             turn = turn[top : top + height, left : left + width]
-        # The nearest pixel does for colours, too, which are averaged over 3x3 anyway.
+        # The nearest pixel suffices for colours, too, because they are averaged over 3x3 pixels.
         turned = cv2.remap(image, turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
         if box is None:
             return np.asarray(turned, np.uint8)
@@ -164,7 +166,8 @@ class View:
     def line_of_sight(self, bearing: float) -> tuple[FloatArray, FloatArray]:
         """Return the camera's place and the level direction (x, y) of a line of sight, each (2,).
 
-        Metres in the first camera's level frame; ``bearing`` is aside over ahead.
+        Both are in the first camera's level frame, metres. ``bearing`` is the lateral coordinate
+        divided by the depth.
         """
         level = _about_vertical(self.yaw_rad)
         place = -level.T @ self.offset_m
@@ -173,24 +176,24 @@ class View:
 
 
 def _about_vertical(yaw_rad: float) -> FloatArray:
-    """Return what turns a frame by ``yaw_rad`` about Z: coordinates in the turned one, (3, 3)."""
+    """Return the matrix (3, 3) of coordinates in a frame that is rotated by ``yaw_rad`` about Z."""
     c, s = cos(yaw_rad), sin(yaw_rad)
     return np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
 
 
 def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, NDArray[np.int16] | None]:
-    """Return the camera turned back by ``roll_rad`` about its axis, and the turn of its pixels."""
+    """Return the camera without its roll ``roll_rad``, and the source of each upright pixel."""
     if abs(roll_rad) < _UPRIGHT_RAD:
         return camera, None
     c, s = cos(roll_rad), sin(roll_rad)
-    # The nearer of landscape and portrait keeps most of the image.
+    # The orientation (landscape or portrait) that needs less rotation keeps most of the image.
     if abs(s) > abs(c):
         upright = replace(
             camera, width=camera.height, height=camera.width, fx=camera.fy, fy=camera.fx
         )
     else:
         upright = camera
-    # In raw pixels: K R K'^-1, with the middle of the upright image at the middle of the raw one.
+    # The homography is K R K'^-1; the middle of the upright image maps to that of the raw image.
     linear = np.array([(c * camera.fx, -s * camera.fx), (s * camera.fy, c * camera.fy)])
     linear /= np.array([upright.fx, upright.fy])
     middle = 0.5 * np.array([camera.width - 1.0, camera.height - 1.0])

@@ -1,8 +1,8 @@
-"""Ratings of whole bodies against one silhouette after the other.
+"""Ratings of whole bodies with one camera, one silhouette at a time.
 
 :mod:`cardbox_tracker.estimation.cost.whole_body_kernels` defines the rating. Rows down to a hand's
-breadth below hanging hands count, but not the columns of the legs there; so the rows and columns
-that count depend on the place where the hips were found last.
+breadth below hanging hands count, except for the columns of the legs. So the pixels that count
+depend on the last place of the hips.
 """
 
 from __future__ import annotations
@@ -45,33 +45,31 @@ from cardbox_tracker.vision.camera import Camera
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-# The neck is drawn this far into the head, as a fraction of the head's height: an outline has no
-# gap below the jaw.
+# Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
 _NECK_INTO_HEAD = 0.25
 _TORSO_OF_TERMS = [*range(TORSO_ANGLES.stop), TORSO_X, TORSO_Z]
 _BOTH_ARMS, _TRUNK = (False, True, True), (True, False, False)
 
 
 class WholeBodyCost:
-    """Ratings of states (N, 14) of one body before one camera; sees one silhouette at a time.
+    """Ratings of states (N, 14) of one body before one camera with the present silhouette.
 
     Attributes:
         body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
-        parts: of these, the measured parts, (6, 6), metres.
-        girdle: of these, (5,).
-        place: of these, the place of the hips.
-        view: of these, the camera.
-        pitch_rad: how far the camera looks down.
-        is_measured: the body was measured, not guessed from proportions.
+        parts: measured parts of ``body``, (6, 6), metres.
+        girdle: girdle of ``body``, (5,).
+        place: place of the hips of ``body``.
+        view: camera of ``body``.
+        pitch_rad: pitch of the camera, rad, positive downwards.
+        is_measured: whether the body was measured, not estimated from proportions.
         frontal_px: pixels of the model in the front reference posture.
         silhouette_px: foreground pixels that count in the present silhouette.
-        anchor: x and z of the last frame and the home of x, metres, and the expected yaw, rad;
-            (4,).
+        anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
         terms: observations of further terms in the present frame.
     """
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
-        """Prepare for one body before one camera, pitched as it stands."""
+        """Prepare for one body and one camera, which includes the pitch."""
         self._model, self._camera, self._config = body, camera, config
         self.parts, shoulder = shape_of(body.sizes, config.neck_to_head)
         self.girdle = np.array(
@@ -89,7 +87,7 @@ class WholeBodyCost:
         self.body: BodyTuple = self.parts, drawn, self.girdle, self.place, self.view
         self._rules = _rules(config)
         self._gmm = np.array(load_gmm())
-        # Sums along a row fit 16 bits for any image narrower than 32768 px, and stay in cache.
+        # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
         kind = np.int16 if camera.width < 2**15 else np.int32
         shape = (camera.height, camera.width + 1)
         self._beside_arm: int | None = None
@@ -101,7 +99,7 @@ class WholeBodyCost:
         self.frontal_px = max(1, int(self.bodies(front)[2][0]))
 
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
-        """Take a silhouette (H, W) of a person whose hips are about where ``state`` (14,) says."""
+        """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
         config, camera = self._config, self._camera
         hip = self.hips(state, camera)
         depth_m = max(float(hip[2]), 1e-3)
@@ -139,12 +137,12 @@ class WholeBodyCost:
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
 
     def bearing(self) -> float:
-        """Bearing of the silhouette's median column, aside over ahead."""
+        """Bearing of the silhouette's median column: lateral coordinate divided by depth."""
         column = median_column(self._seen)
         return (float(column) - self._camera.cx) / self._camera.fx
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
-        """Rate torsos (N,), with the arms of a state drawn where they are in the image."""
+        """Rate torsos (N,); the arms of the state ``arms_of`` keep their place in the image."""
         self._beside_arm = None
         gain = kernels.cover(arms_of, _BOTH_ARMS, self.body, self._seen, self._beside)
         ratings = np.empty(len(states))
@@ -162,7 +160,7 @@ class WholeBodyCost:
         self._arm_terms = [term.arms_beside(torso[_TORSO_OF_TERMS]) for term in self.terms]
 
     def uncovered(self, arm: int) -> NDArray[Any]:
-        """Row sums beside the fixed torso and the other arm than ``arm``, 0 left or 1 right."""
+        """Return the row sums outside of the fixed torso and the arm opposite to ``arm``."""
         if self._beside_arm != arm:
             drawn = True, arm == 1, arm == 0
             kernels.cover(self._torso, drawn, self.body, self._seen, self._beside)
@@ -226,7 +224,7 @@ class WholeBodyCost:
 
     @property
     def rows(self) -> int:
-        """Rows of the present silhouette that count, from the top."""
+        """Number of rows of the present silhouette that count, from the top."""
         return len(self._seen)
 
     @property
@@ -235,7 +233,7 @@ class WholeBodyCost:
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
-    """Return the intersection over union of silhouette and model, of which some pixels differ."""
+    """Return the intersection over union of silhouette and model from their numbers of pixels."""
     twice_either = float(silhouette_px + model_px + differing_px)
     return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0
 

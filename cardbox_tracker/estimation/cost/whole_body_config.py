@@ -1,7 +1,6 @@
-"""Settings of the whole-body rating: what is drawn, and which postures are usual.
+"""Settings of the whole-body rating: the drawn model and the priors.
 
-Unless a text names another source, values come from trials on recorded sessions with motion capture
-or scripted truth (``docs/research``).
+Values without a source were chosen on recorded sessions with ground truth (``docs/research``).
 """
 
 from __future__ import annotations
@@ -16,23 +15,29 @@ from cardbox_tracker.settings import Settings, restarting
 class WholeBodyCostConfig(Settings):
     """The drawn model, the part of the image that counts, and the priors.
 
-    A prior is a sum of squares, each of a value in its unit and none above its cap, so that an
-    unusual posture that the image shows clearly is found all the same.
+    A prior is a sum of squared values, each divided by its unit and limited by a cap, so that a
+    clear image outweighs the prior of an unusual posture.
     """
 
     neck_to_head: float = restarting(
         0.65, "width of the neck as a fraction of the head's", limits=(0.0, 1.0)
     )
-    # Where a person bows or comes nearer, trousers and skirt fill the rows below the hips.
+    # If a person bows or comes nearer, trousers or skirt fill the rows below the hips.
     waist_extension_m: float = restarting(
-        0.35, "how far below the middle of the hips the waist is drawn", unit="m", limits=(0.0, 1.0)
+        0.35,
+        "distance by which the drawn waist extends below the middle of the hips",
+        unit="m",
+        limits=(0.0, 1.0),
     )
-    # Keypoint "hand" is the middle of a fist; recorded hands are mostly open.
+    # The keypoint "hand" is the middle of a fist, but hands are mostly open.
     fingers_m: float = restarting(
-        0.05, "how far beyond the hand a forearm is drawn", unit="m", limits=(0.0, 0.3)
+        0.05,
+        "distance by which the drawn forearm extends beyond the keypoint of the hand",
+        unit="m",
+        limits=(0.0, 0.3),
     )
-    # Clavicle and shoulder blade: about a third of an arm's elevation, of which part moves the
-    # joint; the gain is fitted to motion capture.
+    # Clavicle and shoulder blade contribute about a third of an arm's elevation, and a part of it
+    # moves the joint; the gain was fitted to motion capture.
     clavicle: float = restarting(
         0.43,
         "radius of the circle on which the girdle lifts a shoulder joint, as a fraction of the "
@@ -40,7 +45,7 @@ class WholeBodyCostConfig(Settings):
         limits=(0.0, 1.0),
     )
     lift_gain: float = restarting(
-        0.18, "how far it is lifted, rad per rad of elevation", limits=(0.0, 1.0)
+        0.18, "lift on this circle, rad per rad of elevation", limits=(0.0, 1.0)
     )
     lift_from_deg: float = restarting(
         30.0,
@@ -50,35 +55,36 @@ class WholeBodyCostConfig(Settings):
     )
     below_hips_m: float = restarting(
         0.35,
-        "how far below the hips rows of the image count, so that hanging hands do",
+        "distance below the hips up to which rows of the image count, so that hanging hands count",
         unit="m",
         limits=(0.0, 1.0),
     )
     legs: float = restarting(
         0.75,
-        "half width of what is left out below the hips, as a fraction of the waist's width",
+        "half width of the ignored columns below the hips, as a fraction of the waist's width",
         limits=(0.0, 3.0),
     )
     weight: float = restarting(
-        0.012, "weight of a prior's unit, as a share of the silhouette's pixels", limits=(0.0, 1.0)
+        0.012,
+        "weight of the priors, as a fraction of the silhouette's pixels per unit",
+        limits=(0.0, 1.0),
     )
     roll_deg: float = restarting(20.0, "unit of the torso's roll", unit="deg", limits=(0.1, 180.0))
-    # Postures are measured against the front reference, which is where a person rests. With 3, the
-    # median of motion capture, a person at rest is found leaning 5 degrees forward and 5 cm too far
-    # away, for the two hardly change the outline together.
+    # Postures are relative to the front reference, in which a person rests. With a positive value,
+    # a person at rest would lean forward and be too far away, which hardly changes the outline.
     pitch_rest_deg: float = restarting(
         0.0, "pitch of a person at rest", unit="deg", limits=(-30.0, 30.0)
     )
-    # A bow and leaning back lower the head alike in the image, but people bow.
+    # Leaning forward and back lower the head alike in the image, but people lean forward.
     pitch_forward_deg: float = restarting(
-        13.0, "unit of the pitch beyond it", unit="deg", limits=(0.1, 180.0)
+        13.0, "unit of a pitch above this value", unit="deg", limits=(0.1, 180.0)
     )
     pitch_back_deg: float = restarting(
-        8.0, "unit of the pitch below it", unit="deg", limits=(0.1, 180.0)
+        8.0, "unit of a pitch below this value", unit="deg", limits=(0.1, 180.0)
     )
     yaw_deg: float = restarting(14.0, "unit of the torso's yaw", unit="deg", limits=(0.1, 180.0))
     angle_cap: float = restarting(
-        9.0, "most that one of the torso's angles costs", limits=(0.1, 1000.0)
+        9.0, "largest cost of one of the torso's angles", limits=(0.1, 1000.0)
     )
     x_step_m: float = restarting(
         0.06,
@@ -92,10 +98,10 @@ class WholeBodyCostConfig(Settings):
         unit="m",
         limits=(0.001, 10.0),
     )
-    step_cap: float = restarting(2.0, "most that a motion costs", limits=(0.1, 1000.0))
+    step_cap: float = restarting(2.0, "largest cost of a motion", limits=(0.1, 1000.0))
     x_home_m: float = restarting(
         0.08,
-        "unit of the torso's distance from where it mostly was along the line of sight",
+        "unit of the torso's distance from its usual place along the line of sight",
         unit="m",
         limits=(0.001, 10.0),
     )
@@ -105,12 +111,14 @@ class WholeBodyCostConfig(Settings):
         unit="m",
         limits=(0.001, 10.0),
     )
-    home_cap: float = restarting(4.0, "most that such a distance costs", limits=(0.1, 1000.0))
+    home_cap: float = restarting(4.0, "largest cost of such a distance", limits=(0.1, 1000.0))
     penetration: float = restarting(
         3.0,
-        "cost of hand, forearm or elbow on the axis of trunk or head; less towards the surface",
+        "cost of a hand, forearm or elbow on the axis of trunk or head; 0 at the surface",
         limits=(0.0, 1000.0),
     )
     unknown_nats: float = restarting(
-        FLOOR_NATS, "most that the learned prior of an arm costs", limits=(0.1, 50.0)
+        FLOOR_NATS,
+        "largest cost of the learned prior of an arm",
+        limits=(0.1, 50.0),
     )

@@ -37,11 +37,11 @@ from cardbox_tracker.estimation.cost.union import cover_patches, sum_union
 
 
 class Observed(NamedTuple):
-    """A silhouette, or a part of it beside which something else is drawn.
+    """A silhouette, or the part of it outside of parts that are already drawn.
 
     Attributes:
         row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
-        base_px: cost of drawing nothing more, px.
+        base_px: cost without further parts, px.
         scale: 1 / (pixels of the silhouette).
     """
 
@@ -130,7 +130,7 @@ def rate_bodies(
 
 @kernel
 def cover(state: Floats, drawn: Drawn, body: BodyTuple, row_sums: RowSums, covered: RowSums) -> int:
-    """Write the row sums beside the ``drawn`` parts of a state to ``covered``; return their gain.
+    """Write the row sums outside of the ``drawn`` parts of a state; return the gain of the parts.
 
     The gain is the sum of (1 - 2 f) under these parts.
     """

@@ -1,6 +1,6 @@
 """Compiled proposals of arms, from the arms that fitted so far and from the silhouette.
 
-Random numbers are arguments, unit normal or uniform in 0..1.
+Callers pass the random numbers, unit normal or uniform in 0..1.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from cardbox_tracker.estimation.cost.kinematics import (
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.filtering.joint_moves import NumbersTuple
 
-# Shoulder and hand of an arm that reaches for a pixel are at least so far apart beyond the
-# difference of its bones, and the arm is never quite straight; m.
+# Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
+# difference and the sum of the bones' lengths, m.
 _FOLDED_M, _STRETCHED_M = 0.05, 0.001
-# Probability of the nearer one of the two points at a distance: people gesture to the front.
+# Probability of the nearer one of two points: people gesture to the front.
 _NEARER = 0.8
-# An elbow hangs down and outwards: the direction (forwards, outwards, up) it has without a turn.
+# Direction (forwards, outwards, up) of an elbow that hangs down.
 _ELBOW_HANGS = (-0.2, 0.4, -1.0)
 _ELBOW_TURNS_RAD = 1.2 * pi
-# The tip of an arm is looked for on a grid of this many pixels, within this times the arm's length
-# from the shoulder; if fewer points of the grid are uncovered, there is none.
+# Search of the tip of an arm: spacing of the grid, px; radius in arm lengths from the shoulder;
+# least number of uncovered points.
 _GRID_PX, _REACH, _FEWEST_TIPS = 3, 1.1, 3
 _INWARDS_PX = 3.0
 
@@ -50,13 +50,13 @@ class ArmPlan(NamedTuple):
     """Kinds and numbers of proposals.
 
     Attributes:
-        sources: states of the pool around whose arms arms are proposed.
-        sigma_rad: noise of these.
+        sources: number of states of the pool whose arms are varied.
+        sigma_rad: noise of varied arms, rad.
         mirrors: number of arms mirrored in depth.
         tips: number of arms that reach for uncovered foreground.
-        banked: number of arms out of ``bank``.
-        bank: likely arms, (K, 4).
-        limits: lowest and highest angles, (4, 2).
+        banked: number of arms from ``bank``.
+        bank: samples of the prior, (K, 4), rad.
+        limits: lowest and highest angles, (4, 2), rad.
     """
 
     sources: int
@@ -72,12 +72,12 @@ ArmPlanTuple = tuple[int, float, int, int, int, Floats, Floats]
 
 
 class Ray(NamedTuple):
-    """A line of sight that a hand may lie on.
+    """A line of sight to a hand, and the arm's shoulder.
 
     Attributes:
         shoulder: in the optical frame, (3,), metres.
         direction: unit vector, (3,).
-        rotation: of the torso, (3, 3).
+        rotation: rotation of the torso, (3, 3).
     """
 
     shoulder: Floats
@@ -96,7 +96,7 @@ def _mirror(
 ) -> None:
     """Mirror upper arm (bit 0 of ``flips``) and forearm (bit 1) of an arm (4,) along ``ray`` (3,).
 
-    ``ray`` is the line of sight in the torso's frame, a unit vector; the outline stays nearly.
+    ``ray`` is the line of sight in the torso's frame, a unit vector. The outline hardly changes.
     """
     limb_directions(angles, side, directions)
     for half in range(2):
@@ -118,19 +118,19 @@ def _reach(
     arm_limits: Floats,
     directions: Floats,
 ) -> None:
-    """Write the angles (4,) of an arm whose hand is on a ray.
+    """Write the angles (4,) of an arm whose hand is on a ray, by two-bone inverse kinematics.
 
-    Two-bone inverse kinematics. The distance r from the shoulder to the hand is the first of
-    ``uniforms`` (3,) of the way from the nearest possible one to the whole arm; the second chooses
-    one of the two points of the ray at that distance. With bones a and b the elbow lies on a circle
-    about the line from shoulder to hand, at cos = (a^2 + r^2 - b^2) / (2 a r); the third chooses
-    its place on the circle.
+    The first of ``uniforms`` (3,) determines the distance r from the shoulder to the hand between
+    the least possible distance and the straight arm; the second selects one of the two points of
+    the ray at this distance. With bones a and b, the elbow lies on a circle around the line from
+    shoulder to hand, at cos = (a^2 + r^2 - b^2) / (2 a r) from it; the third determines its place
+    on the circle.
     """
     shoulder, ray, rotation = towards
     stretch, which, turn = uniforms[0], uniforms[1], uniforms[2]
     a, b = parts[UPPER_ARM, HEIGHT], parts[FOREARM, HEIGHT]
     along = shoulder[0] * ray[0] + shoulder[1] * ray[1] + shoulder[2] * ray[2]
-    # From the shoulder to the point of the ray that is nearest to it.
+    # Vector from the shoulder to its nearest point of the ray.
     squares = 0.0
     for j in range(3):
         squares += (along * ray[j] - shoulder[j]) ** 2
@@ -153,7 +153,7 @@ def _reach(
     ux, uy, uz = ux / length, uy / length, uz / length
     cosine = min(max((a * a + reach * reach - b * b) / (2.0 * a * reach), -1.0), 1.0)
     sine = sqrt(1.0 - cosine * cosine)
-    # v and w span the circle of the elbow; v is where it hangs.
+    # v and w span the plane of the elbow's circle; v points to a hanging elbow.
     vx, vy, vz = _ELBOW_HANGS[0], _ELBOW_HANGS[1] * side, _ELBOW_HANGS[2]
     dot = ux * vx + uy * vy + uz * vz
     vx, vy, vz = vx - dot * ux, vy - dot * uy, vz - dot * uz
@@ -185,16 +185,16 @@ def propose_arms(
 ) -> Floats:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of ``pool`` (M, 14).
 
-    The first is that of the first state, the next ones lie around those of the first states. The
-    last are, from the end: mirrored in depth, of the first four states; reaching for the end of the
-    uncovered foreground, if there is any; out of the bank.
+    The first arm is that of the first state; then follow varied arms of the best states. The last
+    arms are, from the end: arms of the first four states mirrored in depth; arms that reach for the
+    end of the uncovered foreground, if there is any; arms from the bank.
 
     Args:
         pool: states, the best first.
         arm: 0 left, 1 right.
         plan: fields of :class:`ArmPlan`.
-        uncovered: row sums beside trunk and other arm.
-        body: of the person.
+        uncovered: row sums outside of trunk and other arm.
+        body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
         numbers: fields of :class:`~.joint_moves.Numbers`, (N, 4) and (N, 3).
     """
     sources, sigma_rad, mirrors, tips, banked, bank, arm_limits = plan
@@ -239,7 +239,7 @@ def propose_arms(
     length_px = (parts[UPPER_ARM, HEIGHT] + parts[FOREARM, HEIGHT]) * fx / shoulder[2]
     count, tip_u, tip_v = farthest_uncovered(uncovered, u, v, _REACH * length_px)
     if count >= _FEWEST_TIPS:
-        # The hand keypoint lies somewhat before the end of the outline.
+        # The keypoint of the hand lies before the end of the outline.
         far = sqrt((u - tip_u) ** 2 + (v - tip_v) ** 2) + 1e-9
         inwards = min(_INWARDS_PX / far, 1.0)
         tip_u, tip_v = tip_u + inwards * (u - tip_u), tip_v + inwards * (v - tip_v)
@@ -262,11 +262,14 @@ def propose_arms(
 def farthest_uncovered(
     uncovered: RowSums, u: float, v: float, reach_px: float
 ) -> tuple[int, float, float]:
-    """Find the foreground that the model leaves uncovered, farthest from the pixel (u, v).
+    """Find the farthest uncovered foreground from the pixel (u, v).
 
-    ``uncovered`` (rows, W + 1) are row sums, level under what is covered. A point of the grid
-    counts if four of the five pixels around it in its row are foreground and so is the point above
-    or below. Returns how many there are within ``reach_px``, and column and row of the farthest.
+    ``uncovered`` (rows, W + 1) are row sums, which are constant over covered pixels. A point of the
+    grid counts if four of the five pixels around it in its row are foreground, and the same is true
+    for the point above or below.
+
+    Returns:
+        Number of points within ``reach_px``, and column and row of the farthest one.
     """
     rows, width = uncovered.shape[0], uncovered.shape[1] - 1
     count, best = 0, -1.0

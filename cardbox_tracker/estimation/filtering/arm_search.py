@@ -1,4 +1,4 @@
-"""The whole-body filter's search of one arm beside the torso that was found."""
+"""The whole-body filter's search of one arm beside a fixed torso."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 
-# Noise around the best arms, as a share of that of all.
+# Noise around the best arms, as a fraction of the usual noise.
 _AGAIN_NOISE = 0.45
 
 
 class ArmSearch:
-    """Searches arms (N, 4) before all cameras of a cost, whose torso is fixed.
+    """Searches arms (N, 4) with all cameras of a cost, beside its fixed torso.
 
     Attributes:
-        spreads_m: of left elbow and hand, right elbow and hand, in the last frame, metres.
+        spreads_m: deviations of left elbow and hand, right elbow and hand, in the last frame, m.
     """
 
     def __init__(self, cost: MultiViewCost, plan: SearchPlan) -> None:
-        """Prepare to search by ``cost``."""
+        """Prepare for searches with ``cost``."""
         self._cost, self._config, self._candidates = cost, plan.config, plan.candidates
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Forget the last frame."""
         self.spreads_m: list[float] = [0.0, 0.0, 0.0, 0.0]
 
     def __call__(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
 
         Args:
-            pool: states (M, 14), the best first, to whose torso the arms belong.
+            pool: states (M, 14) with this torso, the best first.
             arm: 0 left, 1 right.
             draws: random numbers.
         """
@@ -61,9 +61,9 @@ class ArmSearch:
     def _proposed(
         self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
     ) -> FloatArray:
-        """Return arms (N, 4): each camera that sees proposes its part, for what is uncovered there.
+        """Return arms (N, 4), of which each camera that shows the person proposes an equal part.
 
-        Mirrored arms are mirrored along that camera's line of sight.
+        Each camera uses its own uncovered foreground and line of sight.
         """
         cost, times = self._cost, self._candidates
         seeing: Sequence[int] = cost.seeing
@@ -86,10 +86,10 @@ class ArmSearch:
         return self.promising(arms, arm)
 
     def promising(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return the one of each ``candidates`` arms (N, 4) that seems to cost least."""
+        """Return the arm with the least approximate cost of each ``candidates`` arms (N, 4)."""
         if self._candidates == 1:
             return arms
-        # Neighbours are of one kind, so each kind stays.
+        # Neighbouring arms are of one kind of proposal, so all kinds remain.
         costs = self._cost.arms_by_points(arms, arm).reshape(-1, self._candidates)
         best: FloatArray = arms[self._candidates * np.arange(len(costs)) + costs.argmin(axis=1)]
         return best

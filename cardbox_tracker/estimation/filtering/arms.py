@@ -1,4 +1,4 @@
-"""Arms that the whole-body filter tries before one camera."""
+"""Arm proposals of the whole-body filter for one camera."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.filtering import arm_proposals
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[LEFT_ARM])
-"""Lowest and highest angles of an arm, shape (4, 2)."""
+"""Lowest and highest angles of an arm, (4, 2), rad."""
 
 
 @cache
@@ -41,10 +41,10 @@ def propose_arms(
         pool: states (M, 14) before the camera of ``cost``, the best first.
         arm: 0 left, 1 right.
         config: numbers of mirrored, reaching and likely arms.
-        cost: of one camera, its torso fixed.
-        numbers: unit normal, (N, 4), and uniform in 0..1, (N, 3).
-        share: these numbers are divided by this, the number of cameras,
-        times: and then multiplied by this, the candidates for each rated arm.
+        cost: cost of one camera with a fixed torso.
+        numbers: random numbers, unit normal (N, 4) and uniform in 0..1 (N, 3).
+        share: number of cameras, by which the numbers of ``config`` are divided.
+        times: candidates per rated arm, by which they are multiplied.
     """
     mirrors, tips, banked = (
         times * (count // share)

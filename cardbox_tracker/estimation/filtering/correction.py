@@ -1,15 +1,15 @@
-"""A corrector that has learned where joints are, given a result and how it was found.
+"""Corrector that predicts the places of joints with a recurrent network.
 
-An outline is nearly the same for many depths, and the filter's result is one of them. Its error
-depends on average on the posture found, on other postures that fit, on where the cameras stand, and
-on the frames before. A recurrent network has learned that dependence from rendered recordings with
-ground truth (``tools/make_correction.py``; the data file names them); another one has learned from
-recordings of several cameras. Its hidden state also tells motion from noise, so that the result is
-steadier without the delay of a filter.
+An outline is nearly the same for many depths, and the filter's result is one of them. Its mean
+error depends on the posture, on other postures that fit, on the poses of the cameras, and on
+previous frames. The recurrent network is trained on rendered recordings with ground truth
+(``tools/make_correction.py``; the data file names them); a second network is trained on recordings
+of several cameras. The hidden state also separates motion from noise, so that the result is
+steadier without the delay of a low-pass filter.
 
-The network sees one arm as if it were the left one, so both arms share it. For each arm it answers
-where the middle of the shoulders is beside the place found, and where elbow and hand are beside
-that, in metres along the axes of the optical frame.
+Both arms share the network, whose input is a left arm or a mirrored right arm. Its outputs for each
+arm are the displacement of the middle of the shoulders from the result, and the displacements of
+elbow and hand from this middle, in metres along the axes of the optical frame.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from cardbox_tracker.body.posture import N_JOINTS, ROLL
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -36,27 +37,26 @@ from cardbox_tracker.estimation.filtering.search_features import SEARCH_FEATURES
 from cardbox_tracker.vision.camera import Camera
 
 DATA, DATA_OF_SEVERAL = "correction.npz", "correction_views.npz"
-"""Names of the data files of the networks: for one camera, with or without depth, and several."""
-# The angles among the values of a state.
-_ANGLES = slice(1, 12)
+"""Data files of the networks for one camera (with or without depth) and for several cameras."""
+_ANGLES = slice(ROLL, N_JOINTS)
 _LEAST_BONE_M = 1e-6
 _NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
 N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES
-"""Inputs of the network: the result's, the search's, then those of the depth image."""
+"""Inputs of the network: features of the result, of the search, and of the depth image."""
 N_ANSWERS = 9
 """Outputs of the network: x, y, z of the middle of the shoulders, elbow and hand."""
 
 
 def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
-    """Return keypoints (6, 3) towards where the network says that they are, metres.
+    """Return the keypoints (6, 3) after the network's correction, metres in the optical frame.
 
-    Bones keep their lengths: what is said of an elbow is a direction from the shoulder as moved,
-    what is said of a hand one from that elbow.
+    Bones keep their lengths: the corrected elbow only gives a direction from the corrected
+    shoulder, and the corrected hand gives a direction from the resulting elbow.
 
     Args:
         keypoints_m: (6, 3), metres in the optical frame.
-        answers_m: of the left arm and of the mirrored right one, (2, 9): the middle of the
-            shoulders, elbow and hand, x, y, z of each.
+        answers_m: outputs for the left arm and the mirrored right arm, (2, 9): x, y, z of the
+            middle of the shoulders, elbow and hand.
     """
     result = np.empty((6, 3))
     _move(keypoints_m, answers_m, result)
@@ -70,7 +70,7 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
     for arm in range(2):
         first = 3 * arm
         for axis in range(3):
-            # The right arm is seen in a mirror.
+            # The outputs for the right arm are mirrored.
             other = -answers_m[1, axis] if axis == 0 else answers_m[1, axis]
             middle = 0.5 * (answers_m[0, axis] + other)
             for joint in range(first, first + 3):
@@ -80,9 +80,9 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
             length, reach = 0.0, 0.0
             for axis in range(3):
                 length += (keypoints_m[end, axis] - keypoints_m[begin, axis]) ** 2
-                said = answers_m[arm, 3 * bone + axis]
-                said = -said if arm == 1 and axis == 0 else said
-                ahead[axis] = result[end, axis] + said - result[begin, axis]
+                answer = answers_m[arm, 3 * bone + axis]
+                answer = -answer if arm == 1 and axis == 0 else answer
+                ahead[axis] = result[end, axis] + answer - result[begin, axis]
                 reach += ahead[axis] ** 2
             scale = sqrt(length) / max(sqrt(reach), _LEAST_BONE_M)
             for axis in range(3):
@@ -90,7 +90,7 @@ def _move(keypoints_m: Any, answers_m: Any, result: Any) -> None:
 
 
 class NetworkCorrector:
-    """A :class:`~.corrector.Corrector` that asks a recurrent network.
+    """A :class:`~.corrector.Corrector` with a recurrent network.
 
     Attributes:
         features: input of the network in the last frame, (2, F).
@@ -98,9 +98,9 @@ class NetworkCorrector:
     """
 
     def __init__(self, cost: WholeBodyCost, camera: Camera, network: RecurrentNetwork) -> None:
-        """Prepare for the body of ``cost`` before ``camera``, the first one."""
+        """Prepare for the body of ``cost`` before the first camera ``camera``."""
         self._cost, self._camera, self._network = cost, camera, network
-        # Who comes back is the same person, so nothing resets it.
+        # A person who comes back is the same one, so the hidden state is never reset.
         self._hidden = network.initial_hidden(2)
         self._deviations = load_network(DATA_OF_DEVIATIONS)
         self.features = self.result_features = np.empty((2, 0))
@@ -121,7 +121,7 @@ class NetworkCorrector:
         return moved(found.keypoints_m, answers_m)
 
     def deviations(self, corrected: Result) -> FloatArray:
-        """See :class:`~.corrector.Corrector`: those of the angles are learned."""
+        """See :class:`~.corrector.Corrector`; the deviations of the angles are learned."""
         self.result_features = _features_of(corrected)
         stddev = corrected.stddev.copy()
         stddev[_ANGLES] = deviations_of(self._deviations, self.result_features[None])[0]
@@ -139,10 +139,10 @@ def _features_of(result: Result) -> FloatArray:
 
 
 def learned(cost: WholeBodyCost, camera: Camera, cameras: int) -> NetworkCorrector:
-    """Return the corrector of the package for one camera or several."""
+    """Return the package's corrector for a number of cameras."""
     return NetworkCorrector(cost, camera, network_for(cameras))
 
 
 def network_for(cameras: int) -> RecurrentNetwork:
-    """Return the package's network that corrects the results of this number of cameras."""
+    """Return the package's network for results of this number of cameras."""
     return load_recurrent_network(DATA if cameras == 1 else DATA_OF_SEVERAL)

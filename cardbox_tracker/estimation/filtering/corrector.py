@@ -1,4 +1,4 @@
-"""A corrector says where the joints of a result really are; it is the setting ``corrector``."""
+"""Interface of correctors, which improve a result's keypoints; see the setting ``corrector``."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class Result(NamedTuple):
     """A result of the whole-body filter in one frame.
 
     Attributes:
-        frame: silhouette, image, depth image, stamp and the interval to the frame before.
+        frame: silhouette, image, depth image, stamp and the interval to the previous frame.
         state: d1..d12, ``torso_x`` and ``torso_z``, (14,), rad and metres.
-        stddev: standard deviations of the state, from the spread of the particles, (14,).
+        stddev: standard deviations (14,) of the state, from the spread of the particles.
         keypoints_m: left shoulder, elbow, hand, then the right ones, (6, 3), metres in the optical
             frame of the first camera.
         iou: intersection over union of model and silhouette.
         search: the rated states, and the evidence for the result.
-        viewpoints: how the cameras see the person.
+        viewpoints: directions of the cameras, and quality of the body model.
     """
 
     frame: Frame
@@ -37,17 +37,17 @@ class Result(NamedTuple):
 
 
 class Corrector(Protocol):
-    """Corrects the results of one body; it may remember frames."""
+    """Corrects the results of one body; it may keep a state over frames."""
 
     def __call__(self, found: Result) -> FloatArray:
-        """Return where the keypoints are, (6, 3), metres in the optical frame.
+        """Return the corrected keypoints (6, 3), metres in the optical frame.
 
-        The tracker smooths them and poses the body to them, with the bones' own lengths.
+        The tracker smooths them and fits the posture to them; the bones keep their lengths.
         """
 
     def deviations(self, corrected: Result) -> FloatArray | None:
-        """Return standard deviations (14,) of the corrected result; None: as before it."""
+        """Return standard deviations (14,) of the corrected result; None keeps the filter's."""
 
 
 MakeCorrector = Callable[[WholeBodyCost, Camera, int], Corrector]
-"""Takes the body as the first camera sees it, that camera, and the number of cameras."""
+"""Takes the body's cost before the first camera, this camera, and the number of cameras."""

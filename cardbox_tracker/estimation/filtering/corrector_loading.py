@@ -1,4 +1,4 @@
-"""The corrector that the setting ``corrector`` names: the package's, none, or one from a file."""
+"""Selection of a corrector by the setting ``corrector``: the package's, none, or from a file."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _EXPECTED = "expected learned, none, FILE.npz or MODULE:FUNCTION"
 
 
 def load_corrector(name: str) -> MakeCorrector | None:
-    """Return what makes the named corrector; None if nothing is to be corrected.
+    """Return the factory of the named corrector; None for ``none``.
 
     Args:
         name: ``learned``, ``none``, the path of a network as ``tools/make_correction.py`` writes
-            it, or ``MODULE:FUNCTION``: a function as :data:`~.corrector.MakeCorrector` in a Python
-            module on the import path. Only name modules whose code you trust: it is executed.
+            it, or ``MODULE:FUNCTION``: a :data:`~.corrector.MakeCorrector` function in a Python
+            module on the import path. The code of the module is executed, so it must be trusted.
 
     Raises:
-        CardboxError: there is no such corrector, or the file is no network of this kind.
+        CardboxError: the corrector does not exist, or the file is not a network of this kind.
     """
     if name == "none":
         return None

@@ -1,4 +1,4 @@
-"""The hierarchical filter as a tracker uses it: cycles a frame, new searches, how well it fits."""
+"""Adapter of the hierarchical filter to the tracker: cycles per frame, start, recovery, fit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.posture import clip_to_limits, reference_posture
+from cardbox_tracker.body.posture import TORSO_Y, clip_to_limits, reference_posture
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
@@ -17,7 +17,7 @@ from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
 from cardbox_tracker.vision.rasterisation import render
 
-# Somebody sideways shows about half the area of the front view, at the image's border less.
+# A person from the side has about half the area of the front view, and less at the border.
 _PERSON_FRACTION = 0.25
 _RECOVERY_CYCLES = 4
 _RECOVERY_NOISE = 2.0
@@ -26,9 +26,9 @@ MakeHierarchy = Callable[[TrackerConfig, int, np.random.Generator], Hierarchical
 
 
 class Cycles:
-    """A :class:`~cardbox_tracker.estimation.filtering.pose_filter.PoseFilter` after the paper.
+    """The paper's filter as :class:`~cardbox_tracker.estimation.filtering.pose_filter.PoseFilter`.
 
-    That is its algorithm "Online Motion Tracking".
+    It runs the algorithm "Online Motion Tracking".
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Cycles:
         ``make_hierarchy`` takes settings, pixels of an image and random numbers.
 
         Raises:
-            ValueError: there are ``views``: the paper's filter has one camera.
+            ValueError: there are ``views``, but the paper's filter has one camera.
         """
         if views:
             raise ValueError("the filter hierarchical has one camera; whole_body takes several")
@@ -53,7 +53,7 @@ class Cycles:
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
         self._keypoints = CompiledKeypoints(body, camera)
         self._reference = reference_posture("front")
-        self._reference[0] = body.placement.lateral_m
+        self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self._started = False
@@ -100,18 +100,18 @@ class Cycles:
         return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, posture, iou)
 
     def _start(self, frame: Frame, observation: SumOfTerms) -> None:
-        """Start around the front reference where the person stands, then settle."""
+        """Start around the front reference at the person's place, then run the first cycles."""
         self._started = True
         reference = self._reference.copy()
         if self._config.relocalize:
-            reference[0] = self._lateral_m(frame.silhouette)
+            reference[TORSO_Y] = self._lateral_m(frame.silhouette)
         self.hierarchy.initialize(observation, clip_to_limits(reference))
         if self._config.relocalize:
             for _ in range(_RECOVERY_CYCLES):
                 self.hierarchy.iterate(observation, _RECOVERY_NOISE)
 
     def _lateral_m(self, silhouette: Silhouette) -> float:
-        """``torso_y`` under which the silhouette's median column lies."""
+        """Return ``torso_y`` of the silhouette's median column, metres."""
         camera = self._term.camera
         columns = np.count_nonzero(silhouette[: self._term.rows], axis=0).cumsum()
         middle = int(np.searchsorted(columns, columns[-1] / 2))

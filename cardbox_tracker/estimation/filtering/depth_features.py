@@ -1,7 +1,7 @@
-"""Features of a depth image for the learned corrector: how far behind the result its surface is.
+"""Depth features of the learned corrector: distances of the measured surface from the joints.
 
-The term of the depth (:mod:`cardbox_tracker.estimation.cost.depth`) has chosen among the states
-with it; the remaining distances at shoulder, elbow and hand say where the result is still wrong.
+The search already uses the depth image (:mod:`cardbox_tracker.estimation.cost.depth`); the
+remaining distances at shoulder, elbow and hand indicate errors of the result.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ from cardbox_tracker.vision.camera import Camera
 
 _JOINTS = 3
 DEPTH_FEATURES = 2 * _JOINTS
-"""How many numbers :func:`features_of_depth` returns for an arm."""
+"""Number of features of an arm from :func:`features_of_depth`."""
 
-# How far the square around a joint reaches whose pixels count, m; how many have to be known.
+# Half side of the square of pixels around a joint, m; least number of known depths in it.
 _NEAR_M, _LEAST_PIXELS = 0.03, 4
-# Farther away it is another part of the body, or the wall.
+# Limit of the distance, m; a farther surface is another part or the wall.
 _MOST_M = 0.3
 
 
 def features_of_depth(frame: Frame, camera: Camera, keypoints_m: FloatArray) -> FloatArray:
-    """Return what a network sees, (2, F), of the left arm and of the right one.
+    """Return the features (2, F) of the left and the right arm.
 
-    Of shoulder, elbow and hand: how far the surface there is behind the joint, metres, at most
-    0.3, and then, of each, 1 where that is known and 0 elsewhere. All are 0 without a depth image.
+    The features are the distances of the surface behind shoulder, elbow and hand, metres, at most
+    0.3, and then, for each joint, 1 if the distance is known, else 0. Without a depth image, all
+    features are 0.
 
     Args:
         frame: silhouette and depth image, (H, W).
-        camera: of both.
-        keypoints_m: of the result, (6, 3), metres in the optical frame.
+        camera: camera of both.
+        keypoints_m: keypoints of the result, (6, 3), metres in the optical frame.
     """
     features = np.zeros((2, DEPTH_FEATURES))
     if frame.depth_m is None:
@@ -45,7 +46,7 @@ def features_of_depth(frame: Frame, camera: Camera, keypoints_m: FloatArray) -> 
             for at, most in ((round(u), camera.width), (round(v), camera.height))
         )
         behind_m = frame.depth_m[rows, columns] - z
-        # The wall is beside the person, and 0 is unknown.
+        # Pixels outside of the silhouette show the wall, and 0 is an unknown depth.
         known = behind_m[(frame.silhouette[rows, columns] > 0) & (np.abs(behind_m) < 2 * _MOST_M)]
         if known.size >= _LEAST_PIXELS:
             arm, of_arm = divmod(joint, _JOINTS)

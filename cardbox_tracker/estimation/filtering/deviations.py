@@ -1,11 +1,10 @@
-"""Learned standard deviations: how wrong results like this one are.
+"""Learned standard deviations of a result's angles.
 
-The spread of the particles says how well other postures would fit, not how wrong the model, the
-silhouette and the correction of the result are. A small neural network has learned from rendered
-recordings with ground truth how large the errors of the angles are on average, given the posture
-found, the spread and the fit (``tools/make_deviations.py``; the data file names the recordings).
-It answers with logarithms, of which the exponentials are deviations: 2 of them hold 95 % of the
-errors of the recordings.
+The spread of the particles measures the fit of other postures, not the errors of model, silhouette
+and correction. A small neural network, trained on rendered recordings with ground truth, predicts
+the size of the angles' errors from posture, spread and fit (``tools/make_deviations.py``; the data
+file names the recordings). Its outputs are logarithms of deviations, scaled so that 95 % of the
+errors of the recordings are below two deviations.
 """
 
 from __future__ import annotations
@@ -16,18 +15,18 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.filtering.networks import Network
 
 DATA = "deviations.npz"
-"""Name of the network's data file."""
+"""Data file of the network."""
 TORSO = 3
-"""The first answers are of roll, pitch and yaw of the torso, the others of one arm."""
-# Beyond these, rad, the recordings say nothing.
+"""Number of outputs for roll, pitch and yaw of the torso, which precede those of one arm."""
+# Range of the deviations in the recordings, rad.
 _LIMITS_RAD = (0.01, 1.5)
 
 
 def deviations_of(network: Network, features: FloatArray) -> FloatArray:
-    """Return the deviations of the 11 angles of ``JOINT_NAMES[1:]``, (n, 11), rad.
+    """Return the deviations (n, 11) of the angles ``JOINT_NAMES[1:]``, rad.
 
     Args:
-        network: of the data file.
+        network: network of the data file.
         features: (n, 2, F), see :func:`~.result_features.features_of`.
     """
     logarithms = network(features.reshape(-1, features.shape[2]))

@@ -1,4 +1,4 @@
-"""Random numbers of a search, drawn at once, since a call costs more than the numbers."""
+"""Random numbers of a search, which are drawn in one call because each call is slow."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
-# Uniform numbers for a torso, an arm, and a state of the last rounds.
+# Uniform numbers per torso, per arm, and per state of the last rounds.
 _OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
 
 
 class Draws:
-    """Hands out the numbers of one search: normal ones, and uniform ones in 0..1."""
+    """Supplies the normal numbers and the uniform numbers in 0..1 of one search."""
 
     def __init__(self, rng: np.random.Generator, config: WholeBodyConfig, candidates: int) -> None:
-        """Draw.
+        """Draw all numbers.
 
         Args:
             rng: source of the numbers.
             config: numbers of torsos, arms and states that are rated.
-            candidates: number of arms that are proposed for each one that is rated.
+            candidates: number of proposed arms per rated arm.
         """
         c, together = config, config.rounds * config.together
         arms, near = (2 * candidates * count for count in (c.arms, c.arms_again))

@@ -1,8 +1,8 @@
 """The hierarchical particle filter: first the torso, then both arms (paper, section III-B).
 
-The torso filter rates torso, waist and head. Each arm filter then rates its arm beside the torso
-just found, so the two arms do not depend on each other. Two threads for them would save nothing
-with the paper's particles.
+The torso filter rates torso, waist and head. Each arm filter then rates its arm beside the
+estimated torso, so the two arms do not depend on each other. All filters run in one thread, because
+with the paper's particles a second thread saves no time.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, TORSO
+from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, TORSO, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.terms import ARMS, TermObservation
@@ -21,25 +21,25 @@ from cardbox_tracker.estimation.filtering.particle_filter import CostFunction, P
 _REFERENCE_AREA_PX = 320 * 240
 
 RunFilter = Callable[[ParticleFilter, CostFunction, slice], None]
-"""Moves one filter of a few joints by one step: filter, costs of its particles, its joints."""
+"""Runs one step of a filter; takes the filter, the costs of its particles, and its joints."""
 
 
 class HierarchicalFilter:
-    """Three particle filters on one observation; see ``PoseFilter`` for its methods."""
+    """Three particle filters that share one observation."""
 
     def __init__(self, config: TrackerConfig, image_px: int, rng: np.random.Generator) -> None:
-        """Set the filters up; :meth:`initialize` gives them particles.
+        """Create the filters; :meth:`initialize` creates their particles.
 
         Args:
             config: settings.
-            image_px: pixels of an image, to scale what the settings say of 320x240.
-            rng: split into one stream a filter.
+            image_px: pixels of an image; settings that refer to 320x240 are scaled to it.
+            rng: split into one stream per filter.
         """
         self._config = config
         self._scale = image_px / _REFERENCE_AREA_PX
         streams = rng.spawn(3)
         torso_noise = np.full(4, config.torso.rotation_noise_rad)
-        torso_noise[0] = config.torso.translation_noise_m
+        torso_noise[TORSO_Y] = config.torso.translation_noise_m
         arm_noise = np.full(4, config.arm.rotation_noise_rad)
         self.torso = ParticleFilter(
             config.torso, config.strategy, torso_noise, JOINT_LIMITS[TORSO], streams[0]
@@ -72,7 +72,7 @@ class HierarchicalFilter:
         self._run(observation, run)
 
     def _run(self, observation: TermObservation, run: RunFilter) -> None:
-        """Let ``run`` move the torso's filter, then those of the arms beside that torso."""
+        """Call ``run`` for the torso's filter, then for the arms' filters beside that torso."""
         average = self._config.average
         posture = np.empty(N_JOINTS)
         arms = self._estimate if self._config.torso_beside_arms else None

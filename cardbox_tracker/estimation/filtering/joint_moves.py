@@ -1,6 +1,6 @@
 """Compiled moves of whole states.
 
-Random numbers are arguments, unit normal or uniform in 0..1.
+Callers pass the random numbers, unit normal or uniform in 0..1.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cardbox_tracker.body.posture import (
 from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
 
-# In a round of all joints, this part of the noise stays in a move by a difference.
+# Fraction of the noise that is added to a move by a difference.
 _NOISE_OF_DIFFERENCE = 0.2
 _LEFT, _RIGHT = FIRST_ANGLES
 
@@ -40,7 +40,7 @@ class Numbers(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Diffusion of a state.
+    """Noise of a state.
 
     Attributes:
         sigma: deviations, (14,).
@@ -59,14 +59,14 @@ NoiseTuple = tuple[Floats, Floats, float]
 
 @inlined_kernel
 def clip_state(state: Floats, limits: Floats) -> None:
-    """Move a state (14,) into its ``limits`` (14, 2)."""
+    """Clip a state (14,) to its ``limits`` (14, 2)."""
     for d in range(N_STATE):
         state[d] = min(max(state[d], limits[d, 0]), limits[d, 1])
 
 
 @inlined_kernel
 def pivot(state: Floats, source: Floats, lever_m: float) -> None:
-    """Move a turned torso as if it had turned about the shoulders, ``lever_m`` above the hips."""
+    """Move a rotated torso so that the shoulders, ``lever_m`` above the hips, keep their place."""
     state[TORSO_Y] += lever_m * (sin(state[ROLL]) - sin(source[ROLL]))
     state[TORSO_X] -= lever_m * (sin(state[PITCH]) - sin(source[PITCH]))
 
@@ -77,8 +77,8 @@ def combine(
 ) -> Floats:
     """Return ``torso`` (14,) with the best of both arms, (2 n, 14).
 
-    The i-th left with the i-th right arm for the best n of them, then the best one with the second
-    to the n/2 + 1-th, and the other way round.
+    The first n states pair the i-th best left arm with the i-th best right arm. The others pair the
+    best left arm with the second to the (n/2 + 1)-th best right arm, and vice versa.
     """
     lefts = np.argsort(left_ratings, kind="mergesort")
     rights = np.argsort(right_ratings, kind="mergesort")
@@ -107,9 +107,9 @@ def move_all(
 ) -> Floats:
     """Return states (N, 14) around ``sources`` (M, 14), all joints moved together.
 
-    Every second one turns about the shoulders. In the first half one moves its torso alone, the
-    next its left arm, the next its right arm, in turn. The last ``differing`` move by the
-    difference of two sources, which follows the directions in which the fit is flat (differential
+    Every second state rotates about the shoulders. In the first half, states in turn move only the
+    torso, only the left arm, and only the right arm. The last ``differing`` states move by the
+    difference of two sources, which follows the flat directions of the cost (differential
     evolution). ``numbers`` are fields of :class:`Numbers`, (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise

@@ -1,4 +1,4 @@
-"""Where the person stands in a frame, before any posture is searched."""
+"""Estimation of the person's place in a frame before the search of the posture."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.filtering.walking import Walk
 
-# Deviation of where lines of sight meet: medians of outlines are not the same point of a body.
+# Deviation of the intersection, m: median columns of two cameras show different body points.
 _CROSSING_M = 0.1
-# Lines of sight that are less apart, as the sine of the angle between them, do not measure x.
+# Least sine of the angle between lines of sight that determine x.
 _LEAST_ANGLE = 0.05
 
 
 class Location(NamedTuple):
-    """Where the person seems to stand.
+    """Estimated place of the person.
 
     Attributes:
-        bearing: of the silhouette's middle in the first camera, aside over ahead.
-        step_m: how far the middle moved across the first camera's image since the last frame.
-        x_m: ``torso_x`` where the lines of sight meet; None where that is not looked for.
-        x_stddev_m: its standard deviation; None where a single line says little of it.
+        bearing: lateral coordinate over depth of the silhouette's middle in the first camera.
+        step_m: lateral motion of the middle since the last frame, metres.
+        x_m: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
+        x_stddev_m: standard deviation of ``x_m``; None if the lines do not determine it.
     """
 
     bearing: float
@@ -37,7 +37,7 @@ class Location(NamedTuple):
 
 
 class Locator:
-    """Follows where the person stands, and which way they walk."""
+    """Tracks the place and the walking direction of the person."""
 
     def __init__(
         self, cost: MultiViewCost, distance_m: float, views: Sequence[View], crosses: bool
@@ -45,33 +45,33 @@ class Locator:
         """Prepare.
 
         Args:
-            cost: it tells the bearings.
-            distance_m: of the hips from the first camera, in the body model.
-            views: of the further cameras.
-            crosses: whether lines of sight are crossed.
+            cost: source of the bearings.
+            distance_m: distance of the hips from the first camera in the body model.
+            views: views of the further cameras.
+            crosses: whether the intersection of the lines of sight is computed.
         """
         self._cost, self._distance_m = cost, distance_m
         self._views, self._crosses = views, crosses
         self.forget()
 
     def forget(self) -> None:
-        """Begin with somebody of whom nothing is known."""
+        """Forget the person."""
         self._walk = Walk()
 
     @property
     def yaw_rad(self) -> float:
-        """Yaw of the torso that the way across the image suggests."""
+        """Expected yaw of the torso from the lateral motion."""
         return self._walk.yaw_rad
 
     def locate(
         self, frames: Sequence[Frame], seeing: Sequence[int], before: FloatArray
     ) -> Location:
-        """Return where the person is.
+        """Return the place of the person.
 
         Args:
-            frames: of all cameras, which the cost has seen.
-            seeing: cameras that see the person, by their number.
-            before: the state (14,) of the frame before.
+            frames: frames of all cameras, whose silhouettes the cost has.
+            seeing: indices of the cameras that show the person.
+            before: state (14,) of the previous frame.
         """
         costs, step_m = self._cost.costs, 0.0
         bearings = {number: costs[number].bearing() for number in seeing}
@@ -95,14 +95,14 @@ class Locator:
 def crossing_of(
     lines: Iterable[tuple[FloatArray, FloatArray]], before: FloatArray
 ) -> tuple[float, float]:
-    """Return the point (x, y) where lines meet; of a single line, the point nearest to ``before``.
+    """Return the intersection (x, y) of lines; of a single line, the point nearest to ``before``.
 
-    Least squares of the distances from all lines, and a little of that from ``before``.
+    The point minimizes the sum of the squared distances from all lines, plus a small multiple of
+    the squared distance from ``before``.
 
     Args:
-        lines: a point and the direction, a unit vector, of each, (2,), in the first camera's level
-            frame, metres.
-        before: where the person was, (2,), metres.
+        lines: point (2,) and unit direction (2,) of each line, metres in the first level frame.
+        before: previous place of the person, (2,), metres.
     """
     normal, right = _LEAST_ANGLE**2 * np.eye(2), _LEAST_ANGLE**2 * before
     for place, ahead in lines:

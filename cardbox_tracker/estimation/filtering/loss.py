@@ -1,9 +1,8 @@
-"""How far to believe a whole-body estimate: the chance that it is wrong, and deviations.
+"""Confidence of a whole-body estimate: probability of loss, and calibrated deviations.
 
-The chance is a logistic regression on 37,518 frames of 22 recorded sessions with three seeds; in
-1.8 % of them the keypoints are wrong by more than 30 cm on average. Wrong and right frames weigh
-alike: above 0.5 a frame looks more like the wrong ones. With the coefficients fitted to the other
-21 sessions, 78 % of the wrong frames of a session and 12 % of all its frames are above 0.6.
+An estimate is lost if its keypoints are wrong by more than 30 cm on average. The probability is a
+logistic regression on recorded sessions with ground truth, in which lost and other frames have the
+same total weight (``tools/make_loss.py``).
 """
 
 from __future__ import annotations
@@ -15,22 +14,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import PITCH, TORSO_X, YAW
+from cardbox_tracker.body.posture import (
+    LEFT_ARM,
+    N_STATE,
+    PITCH,
+    RIGHT_ARM,
+    ROLL,
+    TORSO_X,
+    TURNS,
+    YAW,
+)
 from cardbox_tracker.body.sizes import FloatArray
 
 
 class Evidence(NamedTuple):
-    """Evidence that a result is right or wrong; shares are of the silhouette's pixels.
+    """Evidence for or against a result; numbers of pixels are divided by the silhouette's.
 
     Attributes:
-        residual: share in which model and silhouette differ.
-        left_over: silhouette beside the model, as a share.
-        outside: model beside the silhouette, as a share.
-        area: pixels of the silhouette over those of the model in the front posture.
-        prior: what the priors cost the best state.
+        residual: pixels in which model and silhouette differ.
+        left_over: pixels of the silhouette that the model does not cover.
+        outside: pixels of the model outside of the silhouette.
+        area: pixels of the silhouette divided by those of the model in the front posture.
+        prior: cost of the best state by the priors.
         arm_m: mean deviation of elbows and hands in the torso's frame, m.
-        stddev: deviations of the states, weighted by fit, (14,).
-        mean: their mean, (14,).
+        stddev: standard deviations of the weighted states, (14,).
+        mean: mean of the best states, (14,).
         age: frames since the search began.
     """
 
@@ -43,6 +51,22 @@ class Evidence(NamedTuple):
     stddev: FloatArray
     mean: FloatArray
     age: int
+
+
+class Pixels(NamedTuple):
+    """Numbers of pixels.
+
+    Attributes:
+        silhouette: pixels of the silhouette.
+        frontal: pixels of the model in the front posture.
+        differing: pixels in which the model in the mean state and the silhouette differ.
+        mean: pixels of the model in the mean state.
+    """
+
+    silhouette: int
+    frontal: int
+    differing: float
+    mean: float
 
 
 INTERCEPT = -3.936
@@ -61,63 +85,52 @@ COEFFICIENTS: Mapping[str, float] = MappingProxyType(
         "freshness": 0.323,
     }
 )
-"""Of the logistic regression, by the names that :func:`features_of_loss` returns in this order."""
+"""Coefficients of the logistic regression by feature, in the order of :func:`features_of_loss`."""
 _AREA_LIMITS = (0.1, 3.0)
 _PRIOR_LIMITS = (-0.2, 0.3)
 _FRESH_FRAMES = 15.0
-# Share of the chance before in the one that is judged.
+# Weight of the previous probability in the smoothed one.
 _MEMORY = 0.5
 
-# Deviations of the states tell how far a joint can move before the fit becomes worse, not how wrong
-# model and silhouette are: they are too small by these factors, and have a floor. Of the angles'
-# errors on five recorded sessions with motion capture 92 % (arms) to 95 % (torso) are below two
-# deviations.
+# Deviations of the states do not include errors of model and silhouette. These factors and floors,
+# chosen on motion capture, make two deviations cover about 95 % of the errors.
 _PLACE_GAIN, _PLACE_FLOOR_M = 2.0, 0.02
 _TORSO_GAIN, _ROLL_FLOOR_RAD, _PITCH_YAW_FLOOR_RAD = 2.0, 0.06, 0.15
 _ARM_GAIN, _ARM_FLOOR_RAD = 3.0, 0.20
-_GAINS = np.array([_PLACE_GAIN, *[_TORSO_GAIN] * 3, *[_ARM_GAIN] * 8, *[_PLACE_GAIN] * 2])
-_FLOORS = np.array(
-    [
-        *(_PLACE_FLOOR_M, _ROLL_FLOOR_RAD, _PITCH_YAW_FLOOR_RAD, _PITCH_YAW_FLOOR_RAD),
-        *[_ARM_FLOOR_RAD] * 8,
-        *(_PLACE_FLOOR_M, _PLACE_FLOOR_M),
-    ]
-)
+_GAINS, _FLOORS = np.full(N_STATE, _PLACE_GAIN), np.full(N_STATE, _PLACE_FLOOR_M)
+_GAINS[TURNS], _FLOORS[TURNS] = _TORSO_GAIN, _PITCH_YAW_FLOOR_RAD
+_FLOORS[ROLL] = _ROLL_FLOOR_RAD
+for _arm in (LEFT_ARM, RIGHT_ARM):
+    _GAINS[_arm], _FLOORS[_arm] = _ARM_GAIN, _ARM_FLOOR_RAD
 
 
 def evidence_of(
-    silhouette_px: int,
-    frontal_px: int,
-    cost_px: float,
-    area_px: float,
+    pixels: Pixels,
     rating: float,
     arm_m: float,
     stddev: FloatArray,
     mean: FloatArray,
     age: int,
 ) -> Evidence:
-    """Return the evidence that the pixels of silhouette and mean give, and the best ``rating``.
+    """Return the evidence from numbers of pixels and the search.
 
     Args:
-        silhouette_px: pixels of the silhouette.
-        frontal_px: those of the model in the front posture.
-        cost_px: those in which the mean and the silhouette differ.
-        area_px: those of the mean.
-        rating: of the best state.
-        arm_m: see :class:`Evidence`, as for the rest.
-        stddev: deviations, (14,).
-        mean: mean state, (14,).
-        age: frames.
+        pixels: numbers of pixels.
+        rating: rating of the best state.
+        arm_m: see :class:`Evidence`.
+        stddev: see :class:`Evidence`, (14,).
+        mean: see :class:`Evidence`, (14,).
+        age: see :class:`Evidence`.
     """
-    common = 0.5 * (silhouette_px + area_px - cost_px)
-    # Of somebody at the border nothing may be left above the hips.
-    silhouette_px = max(silhouette_px, 1)
-    residual = cost_px / silhouette_px
+    common = 0.5 * (pixels.silhouette + pixels.mean - pixels.differing)
+    # A person at the border may have no pixels above the hips.
+    silhouette_px = max(pixels.silhouette, 1)
+    residual = pixels.differing / silhouette_px
     return Evidence(
         residual=residual,
         left_over=(silhouette_px - common) / silhouette_px,
-        outside=(area_px - common) / silhouette_px,
-        area=silhouette_px / frontal_px,
+        outside=(pixels.mean - common) / silhouette_px,
+        area=silhouette_px / pixels.frontal,
         prior=rating - residual,
         arm_m=arm_m,
         stddev=stddev,
@@ -127,12 +140,12 @@ def evidence_of(
 
 
 def log_area(evidence: Evidence) -> float:
-    """Return the logarithm of the area, which counts between a tenth and three."""
+    """Return the logarithm of the area after clipping to 0.1..3."""
     return log(min(max(evidence.area, _AREA_LIMITS[0]), _AREA_LIMITS[1]))
 
 
 def freshness(evidence: Evidence) -> float:
-    """Return how fresh a search is: 1 in its first frame, 1/e after 15 frames."""
+    """Return exp(-age / 15): 1 in the first frame of a search, 1/e after 15 frames."""
     return exp(-evidence.age / _FRESH_FRAMES)
 
 
@@ -155,7 +168,7 @@ def features_of_loss(evidence: Evidence) -> dict[str, float]:
 
 
 def chance_of_loss(evidence: Evidence) -> float:
-    """Return the chance, 0 to 1, that the keypoints are wrong by more than 30 cm on average."""
+    """Return the probability that the keypoints are wrong by more than 30 cm on average."""
     logit = INTERCEPT
     for name, value in features_of_loss(evidence).items():
         logit += COEFFICIENTS[name] * value
@@ -163,22 +176,22 @@ def chance_of_loss(evidence: Evidence) -> float:
 
 
 def remembered(chance: float, before: float | None) -> float:
-    """Return the chance that is judged: half of it is that of the frame before."""
+    """Return the smoothed probability: the mean of ``chance`` and the one ``before``."""
     return chance if before is None else _MEMORY * before + (1.0 - _MEMORY) * chance
 
 
 def state_stddev(stddev: FloatArray) -> FloatArray:
-    """Return calibrated deviations (14,) from those of the states (14,)."""
+    """Return calibrated standard deviations (14,) from those of the states (14,)."""
     calibrated: FloatArray = np.hypot(_GAINS * stddev, _FLOORS)
     return calibrated
 
 
 def calibrated_deviations(deviations: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return deviations (n, 14) from a result, as far apart as :func:`state_stddev` says.
+    """Return differences (n, 14) from a result with the deviations of :func:`state_stddev`.
 
     Args:
-        deviations: of states drawn by their weights from the mean, (n, 14).
-        rng: source of what the floors add.
+        deviations: differences of states, drawn by their weights, from the mean, (n, 14).
+        rng: source of the noise that the floors add.
     """
     calibrated: FloatArray = _GAINS * deviations + _FLOORS * rng.standard_normal(deviations.shape)
     return calibrated

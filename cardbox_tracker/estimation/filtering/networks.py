@@ -1,4 +1,4 @@
-"""Small neural networks that were learned from recordings, and the data files they are in."""
+"""Small trained neural networks and their data files."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ Layer = tuple[FloatArray, FloatArray]
 
 Read = TypeVar("Read")
 
-# The package's own have 1 MB.
+# Limit of a file's size; the package's networks have 1 MB.
 _MOST_BYTES = 64 * 2**20
 _MADE_BY = "as tools/make_correction.py writes them"
 
 
 class Network(NamedTuple):
-    """Some networks of the same shape, whose answers are averaged.
+    """An ensemble of feed-forward networks of the same shape, whose answers are averaged.
 
     Attributes:
-        mean: of the features, (F,).
-        scale: their deviations, (F,).
-        most: scaled features beyond this count as this.
-        weights: of each layer, (networks, inputs, outputs).
-        biases: of each layer, (networks, 1, outputs).
-        unit: of the answers, (A,).
+        mean: means of the features, (F,).
+        scale: standard deviations of the features, (F,).
+        most: limit of the absolute scaled features.
+        weights: weights of each layer, (networks, inputs, outputs).
+        biases: biases of each layer, (networks, 1, outputs).
+        unit: factors of the answers, (A,).
     """
 
     mean: FloatArray
@@ -48,17 +48,17 @@ class Network(NamedTuple):
         """Return the answers, (n, A), to features (n, F)."""
         scaled = scaled_features(features, self.mean, self.scale, self.most)
         answers = np.zeros((len(features), len(self.unit)))
-        # For two rows the layers of numpy's products take longer than the products.
+        # For two rows, compiled code is faster than calls of numpy.
         _add_answers(scaled, self.weights, self.biases, answers)
         answers *= self.unit / len(self.weights[0])
         return answers
 
 
 class RecurrentNetwork(NamedTuple):
-    """Some recurrent networks of the same shape, whose answers are averaged.
+    """An ensemble of recurrent networks of the same shape, whose answers are averaged.
 
-    A linear layer, a gated recurrent unit with ``nodes`` hidden values (Cho et al. 2014, in the
-    form of cuDNN, where the reset gate acts after the product), and two linear layers:
+    The layers are a linear layer, a gated recurrent unit with ``nodes`` hidden values (Cho et al.
+    2014; as in cuDNN, the reset gate acts after the product), and two linear layers:
 
         v = relu(input_layer(scaled features))
         r, u = sigmoid of the first two parts of gru_input(v) + gru_hidden(hidden)
@@ -67,14 +67,14 @@ class RecurrentNetwork(NamedTuple):
         answers = output_layers[1](relu(output_layers[0]([hidden, v])))
 
     Attributes:
-        mean: of the features, (F,).
-        scale: their deviations, (F,).
-        most: scaled features beyond this count as this.
+        mean: means of the features, (F,).
+        scale: standard deviations of the features, (F,).
+        most: limit of the absolute scaled features.
         input_layer: weights (networks, F, inputs) and biases (networks, 1, inputs).
-        gru_input: the same, (networks, inputs, 3 nodes).
-        gru_hidden: the same, (networks, nodes, 3 nodes).
-        output_layers: the same of the last two layers.
-        unit: of the answers, (A,).
+        gru_input: weights (networks, inputs, 3 nodes) and biases.
+        gru_hidden: weights (networks, nodes, 3 nodes) and biases.
+        output_layers: weights and biases of the last two layers.
+        unit: factors of the answers, (A,).
     """
 
     mean: FloatArray
@@ -114,7 +114,7 @@ def _add_answers(
     biases: tuple[FloatArray, ...],
     answers: FloatArray,
 ) -> None:
-    """Add the answers of all networks of a :class:`Network`, without the unit, to (n, A)."""
+    """Add the answers (n, A) of all networks of a :class:`Network`, without the unit."""
     for network in range(weights[0].shape[0]):
         for row in range(features.shape[0]):
             values = features[row]
@@ -135,7 +135,7 @@ def _add_answers(
 def scaled_features(
     features: FloatArray, mean: FloatArray, scale: FloatArray, most: float
 ) -> FloatArray:
-    """Return features (..., F) beside their ``mean`` in units of ``scale``, at most ``most``."""
+    """Return (features - ``mean``) / ``scale``, (..., F), limited to -``most``..``most``."""
     scaled: FloatArray = np.clip((features - mean) / scale, -most, most)
     return scaled
 
@@ -147,7 +147,7 @@ def _linear(inputs: FloatArray, layer: Layer) -> FloatArray:
 
 
 def _sigmoid(values: FloatArray) -> FloatArray:
-    # Without an overflow, whatever the value.
+    # This form has no overflow for any value.
     result: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * values))
     return result
 
@@ -170,7 +170,7 @@ def _packaged(name: str, read: Callable[[Path], Read]) -> Read:
 
 
 def read_network(path: Path) -> Network:
-    """Return the network in a file that ``tools/networks.py`` has written."""
+    """Return the network in a file written by ``tools/networks.py``."""
     data = _arrays(path, np.float64)
     layers = sum(name.startswith("weights") for name in data)
     return Network(
@@ -184,10 +184,10 @@ def read_network(path: Path) -> Network:
 
 
 def read_recurrent_network(path: Path) -> RecurrentNetwork:
-    """Return the recurrent network in a file that ``tools/networks.py`` has written.
+    """Return the recurrent network in a file written by ``tools/networks.py``.
 
     Raises:
-        CardboxError: it cannot be read, or is no such network; the text says which array is wrong.
+        CardboxError: the file cannot be read or is no such network; the text names the wrong array.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -213,7 +213,7 @@ def read_recurrent_network(path: Path) -> RecurrentNetwork:
 
 
 def _check_shapes(path: Path, network: RecurrentNetwork, data: dict[str, FloatArray]) -> None:
-    """Raise CardboxError unless all numbers are finite and each layer fits the one before."""
+    """Raise CardboxError unless all numbers are finite and the shapes of the layers agree."""
     answers = network.unit.size
     try:
         networks, features, inputs = network.input_layer[0].shape

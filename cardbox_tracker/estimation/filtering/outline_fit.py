@@ -1,9 +1,10 @@
 """Fit of states to the silhouette's outline.
 
-The filter counts pixels, and hair, clothes and fingers, which the model lacks, count as much as a
-torso that is too far away. Distances between outlines with robust weights tell them apart
-(:mod:`cardbox_tracker.estimation.cost.outline_fit_kernels`). The state moves by little, so that it
-does not change to another posture that looks alike. Corrections are smoothed over time.
+The filter counts pixels, so hair, clothes and fingers, which the model lacks, have the same weight
+as an error of the torso's distance. Distances between outlines with robust weights separate both
+(:mod:`cardbox_tracker.estimation.cost.outline_fit_kernels`). The fit only moves the state slightly,
+so that it does not change to another posture with a similar outline. Corrections are smoothed over
+time.
 """
 
 from __future__ import annotations
@@ -30,16 +31,16 @@ from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.vision.camera import Camera
 
-# Deviations of a state around the filter's: angles in rad, places in m.
+# Standard deviations of the prior around the filter's state: angles in rad, places in m.
 _STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])
-# Share of the last correction in the next one, against jitter.
+# Weight of the last correction in the next one, against jitter.
 _KEPT = 0.6
-# Around the silhouette, more than the distance at which distances are cut off.
+# Margin around the silhouette, larger than the limit of the distances.
 _MARGIN_PX = 12
 
 
 class _Lens:
-    """One camera, the transform of states into its frame, and its silhouette of this frame."""
+    """One camera, the transform of states to its frame, and its present silhouette."""
 
     def __init__(
         self, cost: WholeBodyCost, camera: Camera, turned: FloatArray, moved: FloatArray
@@ -50,7 +51,7 @@ class _Lens:
         self._lens = np.array([small.fx, small.fy, small.cx, small.cy])
 
     def look(self, silhouette: Silhouette, state: FloatArray) -> bool:
-        """Take a silhouette of a person about where ``state`` (14,) is; False if it is empty."""
+        """Set the silhouette of a person near ``state`` (14,); return False if it is empty."""
         camera = self._small
         if silhouette.shape != (camera.height, camera.width):
             size = camera.width, camera.height
@@ -78,7 +79,7 @@ class OutlineFit:
     """Fits states of one body before one camera or several.
 
     Attributes:
-        seeing: numbers of the cameras that count; the first one is 0.
+        seeing: indices of the cameras that are used; the first camera is 0.
     """
 
     def __init__(
@@ -88,12 +89,12 @@ class OutlineFit:
         steps: int,
         others: Sequence[tuple[WholeBodyCost, View]] = (),
     ) -> None:
-        """Prepare for the body of ``cost`` before ``camera``; ``steps`` of 0 change nothing.
+        """Prepare for the body of ``cost`` before ``camera``.
 
         Args:
-            cost: of the first camera.
-            camera: the first one.
-            steps: number of Gauss-Newton steps.
+            cost: cost of the first camera.
+            camera: the first camera.
+            steps: number of Gauss-Newton steps; with 0 the fit returns the state unchanged.
             others: costs of the further cameras, and their views of the body.
         """
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))
@@ -102,15 +103,15 @@ class OutlineFit:
         self.forget()
 
     def forget(self) -> None:
-        """Forget the last corrections: the next state is of another person or place."""
+        """Forget the last correction, before a state of another person or place."""
         self._correction: FloatArray | None = None
         self._frames: Sequence[Frame] | None = None
         self._looking: list[_Lens] = []
 
     def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
-        """Return a state (14,) that fits the outlines of the cameras' silhouettes better.
+        """Return the state (14,) after a fit to the outlines of the cameras' silhouettes.
 
-        With a depth image, which shows the distance better than an outline, the state stays.
+        With a depth image, which determines the distance better, the state is not changed.
         """
         if self._steps == 0 or frames[0].depth_m is not None:
             return state.copy()
@@ -120,7 +121,7 @@ class OutlineFit:
         return np.clip(state + self._correction, *STATE_LIMITS.T)
 
     def fitted(self, frames: Sequence[Frame], state: FloatArray, steps: int) -> FloatArray:
-        """Return the state (14,) that fits the silhouettes of these frames alone."""
+        """Return the state (14,) that fits the silhouettes of these frames, without smoothing."""
         if frames is not self._frames:
             self._looking = [
                 self._lenses[number]
@@ -149,7 +150,7 @@ def signed_distances(
 ) -> tuple[int, int, NDArray[np.float32]]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
-    They are cut off at ``FAR_PX`` either way.
+    They are limited to -``FAR_PX``..``FAR_PX``.
 
     Returns:
         The first column and row of the window around the foreground above ``end_row``, and the

@@ -1,6 +1,6 @@
 """One particle filter over a few joints (paper, algorithm "Online Motion Tracking").
 
-An iteration is: resample, propagate, clip, evaluate. The initial particles are
+Each iteration resamples, propagates, clips and evaluates the particles. The initial particles are
 d_ref + N(0, sigma_beta^2 E).
 """
 
@@ -22,14 +22,14 @@ from cardbox_tracker.estimation.filtering.resampling import Indices, resample
 
 FloatArray = NDArray[np.float64]
 CostFunction = Callable[[FloatArray], FloatArray]
-"""Particles (N, D) -> costs (N,), px."""
+"""Takes particles (N, D); returns costs (N,), px."""
 
 SPREAD_PX = 60.0
-"""Particles this much costlier than the best weigh 1/e in mean and deviation, px at 320x240."""
+"""Difference of costs to the best particle at which a weight is 1/e, px at 320x240."""
 
 
 class ParticleFilter:
-    """N particles over D joints; all its randomness comes from the generator it is given."""
+    """N particles over D joints; the given generator is the only source of randomness."""
 
     def __init__(
         self,
@@ -39,14 +39,14 @@ class ParticleFilter:
         limits: FloatArray,
         rng: np.random.Generator,
     ) -> None:
-        """Set the filter up; :meth:`initialize` gives it particles.
+        """Create the filter; :meth:`initialize` creates its particles.
 
         Args:
-            config: numbers of Table I.
-            strategy: a name of :mod:`cardbox_tracker.estimation.filtering.resampling`.
+            config: settings of Table I.
+            strategy: name of a strategy in :mod:`cardbox_tracker.estimation.filtering.resampling`.
             noise: sigma_beta of each joint, (D,), rad and metres.
             limits: lowest and highest value of each joint, (D, 2).
-            rng: the source of noise.
+            rng: source of the noise.
         """
         self.config = config
         self.strategy = strategy
@@ -59,7 +59,7 @@ class ParticleFilter:
     def initialize(
         self, posture: FloatArray, evaluate: CostFunction, noise_scale: float = 1.0
     ) -> None:
-        """Start with particles around ``posture`` (D,), itself among them, and rate them."""
+        """Create particles around ``posture`` (D,), including it, and rate them."""
         self.particles[:] = posture
         particles = self._propagated(np.arange(len(self.particles)), noise_scale)
         clip(particles, self._limits)
@@ -91,7 +91,7 @@ class ParticleFilter:
         self.particles, self.costs = particles, evaluate(particles)
 
     def _propagated(self, ancestors: Indices, noise_scale: float) -> FloatArray:
-        """Return the ancestors' places plus Gaussian noise, (N, D); the elite gets none."""
+        """Return the ancestors plus Gaussian noise, (N, D); the elite gets no noise."""
         steps = self._rng.standard_normal(self.particles.shape)
         if self.config.elite:
             steps[0] = 0.0
@@ -104,9 +104,9 @@ class ParticleFilter:
         return best
 
     def mean(self, count: int, spread_scale: float = 1.0) -> FloatArray:
-        """Return the mean (D,) of the ``count`` best particles; with 1 it is the best one.
+        """Return the weighted mean (D,) of the ``count`` best particles; with 1, the best one.
 
-        They are weighted by exp(-(W - W_best) / (``SPREAD_PX`` ``spread_scale``)).
+        The weights are exp(-(W - W_best) / (``SPREAD_PX`` ``spread_scale``)).
         """
         if count == 1:
             return self.best()
@@ -118,8 +118,8 @@ class ParticleFilter:
     def stddev(self, mean: FloatArray, spread_scale: float = 1.0) -> FloatArray:
         """Return the standard deviation (D,) of all particles around ``mean`` (D,).
 
-        They are weighted as for the mean, so it tells how far a joint can move before the fit
-        becomes worse.
+        The weights are those of :meth:`mean`, so a deviation measures how far a joint can move
+        until the fit becomes worse.
         """
         stddev: FloatArray = weighted_stddev(
             self.particles, self.costs, mean, SPREAD_PX * spread_scale

@@ -14,8 +14,8 @@ from cardbox_tracker.compiling import kernel
 def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
     """Turn ``steps`` (N, D) of unit noise into new particles, in place.
 
-    A new particle is its ancestor's place in ``particles`` (N, D) plus ``sigma`` (D,) times its
-    noise. ``ancestors`` is (N,).
+    A new particle is its ancestor in ``particles`` (N, D) plus ``sigma`` (D,) times its noise.
+    ``ancestors`` has the indices (N,) of the ancestors.
     """
     for i in range(steps.shape[0]):
         ancestor = ancestors[i]
@@ -25,7 +25,7 @@ def propagate(steps: Any, particles: Any, ancestors: Any, sigma: Any) -> None:
 
 @kernel
 def clip(particles: Any, limits: Any) -> None:
-    """Move every joint of ``particles`` (N, D) into its ``limits`` (D, 2), in place."""
+    """Clip every joint of ``particles`` (N, D) to its ``limits`` (D, 2), in place."""
     for i in range(particles.shape[0]):
         for d in range(particles.shape[1]):
             particles[i, d] = min(max(particles[i, d], limits[d, 0]), limits[d, 1])
@@ -33,9 +33,9 @@ def clip(particles: Any, limits: Any) -> None:
 
 @kernel
 def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any:
-    """Standard deviation (D,) around ``mean`` (D,) of particles (N, D) with ``costs`` (N,).
+    """Return the standard deviation (D,) of particles (N, D) around ``mean`` (D,).
 
-    They are weighted by exp(-(W - W_best) / spread).
+    With ``costs`` W (N,), the weights are exp(-(W - W_best) / spread).
     """
     best = costs.min()
     total = 0.0
@@ -52,7 +52,7 @@ def weighted_stddev(particles: Any, costs: Any, mean: Any, spread: float) -> Any
 
 @kernel
 def _cheapest(costs: Any, count: int) -> Any:
-    """Indices (``count``,), ascending, of the lowest ``costs`` (N,); of equals the first ones."""
+    """Return the indices (``count``,) of the lowest ``costs`` (N,); the first of equal costs."""
     limit = np.partition(costs, count - 1)[count - 1]
     ties = count
     for cost in costs:
@@ -71,9 +71,10 @@ def _cheapest(costs: Any, count: int) -> Any:
 
 @kernel
 def truncate(costs: Any, count: int) -> Any:
-    """Ancestors (N,): the best of ``costs`` (N,), the others of the ``count`` best, then the best.
+    """Return ancestors (N,): the best particle, the other survivors, then copies of the best.
 
-    Among equals the first ones survive.
+    The survivors are the ``count`` particles with the lowest ``costs`` (N,); of equal costs the
+    first ones survive.
     """
     best = np.argmin(costs)
     ancestors = np.full(costs.shape[0], best)
@@ -87,9 +88,9 @@ def truncate(costs: Any, count: int) -> Any:
 
 @kernel
 def weighted_mean(particles: Any, costs: Any, count: int, spread: float) -> Any:
-    """Mean (D,) of the ``count`` cheapest of the particles (N, D) with ``costs`` (N,).
+    """Return the weighted mean (D,) of the ``count`` best particles (N, D) by ``costs`` (N,).
 
-    They are weighted by exp(-(W - W_best) / spread).
+    The weights are exp(-(W - W_best) / spread).
     """
     best = costs.min()
     total = 0.0

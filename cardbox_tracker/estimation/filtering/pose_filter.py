@@ -1,4 +1,4 @@
-"""What a tracker asks of the filter that follows a posture."""
+"""Interface between the tracker and its particle filter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Presence(Enum):
 
 
 def presence_of(share: float, smallest: float, largest: float) -> Presence:
-    """Return what a silhouette is whose pixels are this share of the model's from the front."""
+    """Return the presence; ``share`` is the silhouette's area divided by the frontal model's."""
     if share < smallest:
         return Presence.NOBODY
     return Presence.TOO_MUCH if share > largest else Presence.PERSON
@@ -34,7 +34,7 @@ def presence_of(share: float, smallest: float, largest: float) -> Presence:
 
 @dataclass(frozen=True)
 class Fit:
-    """What a filter has found in a frame.
+    """The result of a filter in a frame.
 
     Attributes:
         posture: d1..d12, (12,), rad and metres.
@@ -42,15 +42,15 @@ class Fit:
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
         cost_px: pixels in which the drawn posture and the silhouette differ.
-        iou: their intersection over union.
-        is_uncertain: the posture may be wrong.
-        is_poor: it does not fit; several such frames in a row mean that the person was lost.
-        seen: what explains the image best, before the learned correction: (14,), or (12,) without
+        iou: intersection over union of drawn posture and silhouette.
+        is_uncertain: whether the posture may be wrong.
+        is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
+        seen: state that fits the image best, before the learned correction, (14,), or (12,) without
             an offset.
-        seen_iou: as ``iou``, of that.
+        seen_iou: ``iou`` of ``seen``.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
-        offset_stddev_m: their standard deviations, (2,), or None.
-        particles: of whole states, or None from a filter that has none.
+        offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
+        particles: particles of whole states; None if the filter has none.
     """
 
     posture: FloatArray
@@ -68,7 +68,7 @@ class Fit:
 
     @property
     def is_finite(self) -> bool:
-        """False if any of the values is not a finite number."""
+        """Whether all values are finite."""
         values = (self.posture, self.posture_stddev, self.keypoints_m, self.iou)
         return all(
             value is None or bool(np.isfinite(value).all())
@@ -77,39 +77,39 @@ class Fit:
 
 
 class PoseFilter(Protocol):
-    """Follows one person from frame to frame."""
+    """A filter that tracks one person over frames."""
 
     def look(self, frames: Sequence[Frame]) -> Presence:
-        """Take the frames of all cameras of one time; say whether they can show a person."""
+        """Set the frames of all cameras; return whether they can show a person."""
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
-        """Find the posture in the frames looked at last.
+        """Estimate the posture in the frames of the last call of :meth:`look`.
 
-        Without a person before, it starts around the front reference posture.
+        A new search starts around the front reference posture.
 
         Args:
-            frames: of the first camera, then of the further ones.
-            terms: of each camera's cost, beside that of the silhouette.
+            frames: frames of the first camera, then of the further cameras.
+            terms: further terms of the cost for each camera.
         """
 
     def ious(self) -> list[float | None]:
-        """Return how well the last result covers each camera's silhouette of that frame.
+        """Return the IoU of the last result and each camera's silhouette.
 
-        Intersection over union; None of a camera that saw nobody, or before the first result.
+        It is None for a camera that showed no person, and before the first result.
         """
 
     def forget(self) -> None:
-        """Start again with the next frame that is followed: the person has left."""
+        """Start a new search with the next frame, because the person has left."""
 
     def recover(self) -> None:
-        """Search widely from the next frame on: the person is there, but nothing fits."""
+        """Widen the search from the next frame on, because the person is lost."""
 
     def configure(self, config: TrackerConfig) -> None:
-        """Use other settings, of which none restarts."""
+        """Use other settings; settings that restart tracking are the same."""
 
 
 MakeFilter = Callable[
     [TrackerConfig, SilhouetteTerm, np.random.Generator, Sequence[View]], PoseFilter
 ]
-"""Takes settings, the silhouette's term, which has body and first camera, the source of random
-numbers, and how the further cameras see the body; returns a new filter."""
+"""Takes settings, the silhouette's term with body and first camera, the source of random numbers,
+and the views of the further cameras; returns a new filter."""

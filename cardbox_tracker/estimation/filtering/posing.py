@@ -1,4 +1,4 @@
-"""The posture whose keypoints are nearest to given ones, smoothed over time."""
+"""Fit of a posture to given keypoints, smoothed over time."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 
-# Place and arms move; the torso keeps its angles.
+# The fit changes place and arms; the torso keeps its angles.
 _STDDEV = np.array([0.1, 0.0, 0.0, 0.0, *[0.3] * (2 * ARM_ANGLES), 0.1, 0.1])
 _STEPS = 1
 
 
 class SmoothedPosing:
-    """Poses one body at keypoints; low-pass filters smooth these and the torso's angles."""
+    """Fits one body to keypoints; low-pass filters smooth the keypoints and the torso's angles."""
 
     def __init__(self, cost: WholeBodyCost, time_constant_s: float) -> None:
-        """Prepare for the body of ``cost``; a time constant of 0 smooths nothing."""
+        """Prepare for the body of ``cost``; with a time constant of 0 there is no smoothing."""
         self._cost = cost
         self._keypoints, self._turns = LowPass(time_constant_s), LowPass(time_constant_s)
 
     def forget(self) -> None:
-        """Begin anew: the next state may be of another place."""
+        """Forget the last values, because the next state may be at another place."""
         self._keypoints.forget()
         self._turns.forget()
 
     def __call__(self, state: FloatArray, keypoints_m: FloatArray, interval_s: float) -> FloatArray:
-        """Return the state (14,) near ``state`` whose keypoints are nearest to smoothed ones.
+        """Return the state (14,) near ``state`` with the best fit to the smoothed keypoints.
 
         Args:
-            state: (14,), from which the torso's angles are.
+            state: initial state (14,), from which the torso's angles are taken.
             keypoints_m: (6, 3), metres in the optical frame.
-            interval_s: since the frame before, s.
+            interval_s: time since the previous frame, s.
         """
         cost = self._cost
         posed = state.copy()

@@ -1,8 +1,8 @@
-"""Refines the result of the whole-body filter; its particles stay as they are.
+"""Post-processing of the whole-body filter's result; the particles are not changed.
 
 1. The result is fitted to the outlines of the silhouettes (:mod:`.outline_fit`).
-2. A corrector says where the joints are (:mod:`.corrector`).
-3. The body is posed at these joints, smoothed over time (:mod:`.posing`).
+2. A corrector improves the keypoints (:mod:`.corrector`).
+3. The posture is fitted to these keypoints, smoothed over time (:mod:`.posing`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Refinement:
 
     Attributes:
         outline: the fit to the outlines.
-        corrector: what the settings name; None if nothing corrects.
-        found: the result before the last correction; None before the first one.
+        corrector: corrector of the settings; None without a corrector.
+        found: result before the last correction; None before the first correction.
     """
 
     def __init__(
@@ -55,15 +55,15 @@ class Refinement:
         self.found: Result | None = None
 
     def see(self, seeing: Sequence[int]) -> None:
-        """Let only the cameras of these numbers count in this frame; the first one is 0."""
+        """Use only the cameras with these indices in this frame; the first camera is 0."""
         self.outline.seeing = tuple(seeing)
         yaws_rad = [self._yaws_rad[number] for number in seeing]
         self._viewpoints = Viewpoints.of(self._cost.pitch_rad, yaws_rad, self._cost.is_measured)
 
     def forget(self) -> None:
-        """Begin anew with outline and smoothing: the next state may be of another place.
+        """Forget outline and smoothing, because the next state may be at another place.
 
-        The corrector goes on: the learned one knows people who leave and come back.
+        The corrector keeps its state: the learned one is trained with people who come back.
         """
         self.outline.forget()
         self._posing.forget()
@@ -76,14 +76,14 @@ class Refinement:
         Args:
             frame: silhouette and, if there are any, image and depth image.
             fitted: the state that fits the outlines, (14,).
-            stddev: deviations of the state, (14,).
-            iou: of model and silhouette.
-            search: the search that found the state.
+            stddev: standard deviations of the state, (14,).
+            iou: intersection over union of model and silhouette.
+            search: result of the search.
         """
         if self.corrector is None:
             return fitted
         keypoints_m = self._cost.keypoints(fitted)
-        # Beside a further camera a depth image adds little, and the networks know no such case.
+        # The networks are not trained with a depth image in addition to a further camera.
         has_depth = frame.depth_m is not None and len(self._yaws_rad) == 1
         viewpoints = self._viewpoints._replace(has_depth=has_depth)
         self.found = Result(frame, fitted, stddev, keypoints_m, iou, search, viewpoints)
@@ -97,14 +97,14 @@ class Refinement:
         keypoints_m: FloatArray,
         iou: float,
     ) -> FloatArray:
-        """Return the deviations (14,) of the last result: the corrector's, or else ``stddev``.
+        """Return the standard deviations (14,) of the last result from corrector or filter.
 
         Args:
-            frame: as for :meth:`corrected`.
+            frame: see :meth:`corrected`.
             state: the corrected result, (14,).
-            stddev: the filter's deviations, (14,).
-            keypoints_m: of the state, (6, 3), metres in the optical frame.
-            iou: of model and silhouette.
+            stddev: standard deviations from the filter, (14,).
+            keypoints_m: keypoints of the state, (6, 3), metres in the optical frame.
+            iou: intersection over union of model and silhouette.
         """
         if self.corrector is None or self.found is None:
             return stddev

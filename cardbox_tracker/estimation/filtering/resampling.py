@@ -1,47 +1,48 @@
-"""How the particles of one iteration follow from those of the one before.
+"""Resampling: the choice of the particles that the next iteration starts from.
 
-Resampling chooses *ancestors*: for each new particle the index of the old one whose neighbourhood
-it is drawn from. The filter then adds noise to all but the first, which is kept as it is:
+Resampling chooses *ancestors*: for each new particle the index of the old particle around which it
+is drawn. The filter then adds noise to all particles except the first:
 
     d_1^k = d_best^{k-1},    d_i^k = d_ancestor(i)^{k-1} + N(0, sigma_beta^2 E),  i > 1
 
-That first particle is the *elite*. The paper keeps it in both of its strategies; without it
+The first particle is the *elite*. The paper keeps it in both of its strategies; without it
 (``elite=False``) all N ancestors are drawn, and all get noise, as in a textbook particle filter.
 
-There are two families. :func:`truncation` looks at the order of the costs alone:
+There are two families. :func:`truncation` only uses the order of the costs:
 
 ``drs``
     The paper's deterministic resampling. The particles are ranked by cost; the best e N survive,
-    each as its own ancestor, and the rest are redrawn around the single best one. No weights, no
-    random numbers. (The name is the paper's. It has nothing to do with "deterministic" schemes that
-    copy particles in proportion to weights, such as residual or fixed-offset systematic
-    resampling.) It is truncation selection with an elite, as evolution strategies have it, more
-    than a way of sampling from a posterior.
+    each as its own ancestor, and the rest are redrawn around the single best one. It uses neither
+    weights nor random numbers. It is the truncation selection with an elite of evolution
+    strategies, rather than a sampling from a posterior. The name is the paper's; other
+    "deterministic" schemes, such as residual or fixed-offset systematic resampling, copy particles
+    in proportion to weights.
 
-The others draw from weights exp(-W^2 / (2 sigma_gamma^2)), each a *scheme*, a function
+The others draw from weights exp(-W^2 / (2 sigma_gamma^2)). Each is a *scheme*, a function
 ``scheme(weights, n, rng)`` that returns ``n`` indices:
 
 ``srs``
-    Stratified resampling (Kitagawa 1996): one uniform number in each of n equal strata of the
-    cumulative weights. The paper's comparison.
+    Stratified resampling (Kitagawa 1996) draws one uniform number in each of n equal strata of the
+    cumulative weights. The paper compares ``drs`` with it.
 ``systematic``
-    The same with one uniform number for all strata (Carpenter, Clifford & Fearnhead 1999). The
-    fewest random numbers and, mostly, the least variance; what many libraries take by default.
+    Systematic resampling uses one uniform number for all strata (Carpenter, Clifford & Fearnhead
+    1999). It needs the fewest random numbers and usually has the least variance; many libraries use
+    it by default.
 ``residual``
-    floor(n w) copies of each particle, and independent draws for what is left over (Liu & Chen
-    1998).
+    Residual resampling makes floor(n w) copies of each particle and draws the rest independently
+    (Liu & Chen 1998).
 ``multinomial``
-    n independent draws (Gordon, Salmond & Smith 1993): the bootstrap filter, and the scheme with
-    the highest variance. For comparison only.
+    The bootstrap filter makes n independent draws (Gordon, Salmond & Smith 1993). This scheme has
+    the highest variance and serves only for comparison.
 
 Douc, Cappe & Moulines ("Comparison of resampling schemes for particle filtering", 2005) show that
 residual and stratified resampling never have more variance than multinomial; Gerber, Chopin &
-Whiteley ("Negative association, ordering and convergence of resampling methods", 2019) have the
-state of the theory. All four share the weights, and the weights decide: the paper's sigma_gamma is
-so wide that the schemes hardly differ (``docs/evaluation``).
+Whiteley ("Negative association, ordering and convergence of resampling methods", 2019) give the
+state of the theory. All four schemes share the weights, and with the paper's wide sigma_gamma they
+hardly differ (``docs/evaluation``).
 
-In doubt take ``drs``: with a few hundred particles it concentrates on what fits. A new scheme is a
-function here and its entry in ``SCHEMES``.
+``drs`` is the recommended strategy: with a few hundred particles it concentrates on states that
+fit. A new scheme is a function in this module and an entry in ``SCHEMES``.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 Scheme = Callable[[FloatArray, int, np.random.Generator], Indices]
-"""Takes weights (N,) that sum to 1, how many to draw, and the source of random numbers."""
+"""Takes normalized weights (N,), the number of draws, and the source of random numbers."""
 
 
 def stratified(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
@@ -72,12 +73,12 @@ def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices
 
 
 def multinomial(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
-    """Return ``n`` indices, drawn from the weights (N,) independent of each other."""
+    """Return ``n`` indices, drawn independently from the weights (N,)."""
     return _inverse_cdf(weights, rng.random(n))
 
 
 def residual(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
-    """Return floor(n w) copies of each index, and the rest of the ``n`` drawn from what remains."""
+    """Return floor(n w) copies of each index; the rest is drawn from the remaining weights."""
     copies = np.floor(n * weights).astype(np.intp)
     rest = n - int(copies.sum())
     if rest > 0:
@@ -88,7 +89,7 @@ def residual(weights: FloatArray, n: int, rng: np.random.Generator) -> Indices:
 
 
 def _inverse_cdf(weights: FloatArray, numbers: FloatArray) -> Indices:
-    """Psi = min {j | r <= L_j} for each r of ``numbers`` in [0, 1)."""
+    """Return Psi = min {j | r <= L_j} for each r of ``numbers`` in [0, 1)."""
     cumulative = np.cumsum(weights)
     cumulative[-1] = 1.0
     return np.searchsorted(cumulative, numbers)
@@ -102,16 +103,16 @@ SCHEMES: MappingProxyType[str, Scheme] = MappingProxyType(
         "multinomial": multinomial,
     }
 )
-"""Every scheme that draws from weights, by name."""
+"""Schemes that draw from weights, by name."""
 
 STRATEGIES: tuple[str, ...] = ("drs", *SCHEMES)
-"""Every name that ``strategy`` may have."""
+"""Allowed values of ``strategy``."""
 
 
 def gaussian_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
-    """Normalized weights (N,) of ``costs`` (N,): p = exp(-W^2 / (2 sigma_gamma^2)) / sum p.
+    """Return the weights p / sum p of ``costs`` W (N,) with p = exp(-W^2 / (2 sigma_gamma^2)).
 
-    Computed relative to the best particle, so that large costs do not make all of them 0.
+    They are computed relative to the best particle, so that large costs do not make all p 0.
     """
     exponents = -(costs.astype(np.float64) ** 2) / (2.0 * sigma_gamma_px**2)
     weights = np.exp(exponents - exponents.max())
@@ -120,10 +121,10 @@ def gaussian_weights(costs: FloatArray, sigma_gamma_px: float) -> FloatArray:
 
 
 def truncation(costs: FloatArray, survival_rate: float) -> Indices:
-    """Algorithm "DRS": ancestors (N,) from the order of ``costs`` (N,) alone.
+    """Return ancestors (N,) from the order of ``costs`` (N,) (paper, algorithm "DRS").
 
     The best particle comes first, with or without an elite; the other survivors keep their order,
-    so a partition does the work of a sort. Of equal costs the first ones survive.
+    so a partition suffices instead of a sort. Of equal costs the first ones survive.
     """
     # The product may fall short of a whole number by rounding, as 0.29 times 100 does.
     survivors = max(1, int(survival_rate * len(costs) + 1e-9))
@@ -143,11 +144,11 @@ def resample(
 
     Args:
         strategy: one of ``STRATEGIES``.
-        costs: of the present particles, (N,), px.
+        costs: costs of the present particles, (N,), px.
         survival_rate: e; only ``drs`` uses it.
         sigma_gamma_px: width of the weights; ``drs`` does not use it.
         rng: source of random numbers; ``drs`` draws none.
-        elite: the best particle takes the place of the first one drawn.
+        elite: whether the best particle replaces the first draw.
     """
     if strategy == "drs":
         return truncation(costs, survival_rate)

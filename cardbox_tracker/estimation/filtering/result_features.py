@@ -1,4 +1,4 @@
-"""Features of a result for the networks: one arm, as if it were the left one, and the torso."""
+"""Features of a result for the networks: torso and one arm, mirrored if it is the right one."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_STATE, YAW
+from cardbox_tracker.body.posture import MIRROR_SIGNS, MIRRORED, N_STATE, YAW
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 
-_OTHER_ARM = np.array([0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13])
-_MIRROR = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * 10])
 _OTHER_POINTS = np.array([3, 4, 5, 0, 1, 2])
-# Of each bone of both arms: where it begins and ends among the keypoints.
+# Keypoints at begin and end of each bone of both arms.
 _BEGIN, _END = np.array([0, 1, 3, 4]), np.array([1, 2, 4, 5])
 _HAND = 2
-# First columns of the features: unit vectors of four bones, the hand beside the middle of the
-# shoulders, both squared, how far aside the hand is, the state and its deviations.
+# First columns: unit vectors of four bones and their squares; hand relative to the middle of the
+# shoulders, its squares, its absolute lateral distance; state and deviations.
 BONES, BONE_SQUARES, HAND, HAND_SQUARES, HAND_ASIDE = 0, 12, 24, 27, 30
 STATE, STDDEV = 31, 31 + N_STATE
 # The other columns.
@@ -27,22 +25,22 @@ IOU = STDDEV + N_STATE
 YAW_SIZE, PITCH, ASIDE, AHEAD, SLANTING, IS_MEASURED, HAS_DEPTH = range(IOU + 1, IOU + 8)
 FEATURES = HAS_DEPTH + 1
 OF_CAMERAS = slice(ASIDE, FEATURES)
-"""Columns that hardly ever change: what the cameras show, and whether the body was measured."""
+"""Columns that hardly change over time: directions of the cameras, and quality of the body."""
 
 
 class Viewpoints(NamedTuple):
-    """How a person was seen, and how well known the body is.
+    """Directions of the cameras, and quality of the body model.
 
-    A camera shows what lies across its line of sight, so the squares of the lines' directions,
-    summed over the cameras that see, say what is shown of all directions on the floor.
+    A camera measures positions across its line of sight. The sum of the outer products of these
+    level directions over the cameras describes how well each level direction is measured.
 
     Attributes:
-        pitch_rad: how far the first camera looks down.
-        aside: how much is shown of what is aside, as the first camera sees it: 1 of it alone.
-        ahead: the same of depth: 0 of the first camera alone.
-        slanting: the product of both; its sign is the side of a further camera.
-        is_measured: the body was measured, not guessed from proportions.
-        has_depth: a single camera has a depth image, too.
+        pitch_rad: pitch of the first camera, rad, positive downwards.
+        aside: element of this sum for the first camera's lateral direction; 1 with one camera.
+        ahead: element for the first camera's depth; 0 with one camera.
+        slanting: off-diagonal element; its sign is the side of a further camera.
+        is_measured: whether the body was measured, not estimated from proportions.
+        has_depth: whether a single camera also has a depth image.
     """
 
     pitch_rad: float
@@ -54,7 +52,7 @@ class Viewpoints(NamedTuple):
 
     @classmethod
     def of(cls, pitch_rad: float, yaws_rad: Sequence[float], is_measured: bool) -> Viewpoints:
-        """Return that of cameras turned by ``yaws_rad`` about the vertical: 0 is the first one."""
+        """Return the viewpoints of cameras with these yaws about the vertical; the first has 0."""
         lines = [(cos(yaw_rad), sin(yaw_rad)) for yaw_rad in yaws_rad]
         return cls(
             pitch_rad,
@@ -72,17 +70,17 @@ def features_of(
     ious: FloatArray,
     viewpoints: Viewpoints,
 ) -> FloatArray:
-    """Return what a network sees, (n, 2, F): the left arm, and the right one mirrored.
+    """Return the features (n, 2, F) for the left arm and the mirrored right arm.
 
     Args:
         states: results of the filter, (n, 14).
-        stddevs: their deviations, (n, 14).
-        keypoints_m: (n, 6, 3), metres in the optical frame.
-        ious: of model and silhouette, (n,).
-        viewpoints: of all of them.
+        stddevs: standard deviations of the states, (n, 14).
+        keypoints_m: keypoints of the states, (n, 6, 3), metres in the optical frame.
+        ious: intersections over union of model and silhouette, (n,).
+        viewpoints: viewpoints of all results.
     """
     features = np.empty((len(states), 2, FEATURES))
-    _fill(states, stddevs, keypoints_m, ious, *viewpoints, features)
+    _fill(states, stddevs, keypoints_m, ious, tuple(viewpoints), features)
     return features
 
 
@@ -92,15 +90,11 @@ def _fill(
     stddevs: Any,
     keypoints_m: Any,
     ious: Any,
-    pitch_rad: float,
-    aside: float,
-    ahead: float,
-    slanting: float,
-    is_measured: bool,
-    has_depth: bool,
+    viewpoints: tuple[Any, ...],
     features: Any,
 ) -> None:
     """Write :func:`features_of` to ``features``."""
+    pitch_rad, aside, ahead, slanting, is_measured, has_depth = viewpoints
     for n in range(len(states)):
         for arm in range(2):
             row = features[n, arm]
@@ -123,8 +117,8 @@ def _fill(
             row[HAND_ASIDE] = abs(row[HAND])
             for i in range(N_STATE):
                 if arm:
-                    row[STATE + i] = states[n, _OTHER_ARM[i]] * _MIRROR[i]
-                    row[STDDEV + i] = stddevs[n, _OTHER_ARM[i]]
+                    row[STATE + i] = states[n, MIRRORED[i]] * MIRROR_SIGNS[i]
+                    row[STDDEV + i] = stddevs[n, MIRRORED[i]]
                 else:
                     row[STATE + i], row[STDDEV + i] = states[n, i], stddevs[n, i]
             row[IOU] = ious[n]

@@ -1,7 +1,7 @@
 """Features of the search of a frame for the learned corrector.
 
-Where the rated states have their elbows and hands says which other postures explain the silhouette
-nearly as well, and the evidence of loss says how well the best one does.
+The spread of elbows and hands over the rated states indicates other postures that fit nearly as
+well; the evidence of :mod:`.loss` measures the fit of the best posture.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.loss import Evidence, freshness, log_area
 
-# States that weigh less than this, beside 1 of the best, do not count.
+# Least relative weight of a state that counts.
 _LEAST_WEIGHT = 1e-4
-# Left elbow and hand, right elbow and hand among the keypoints; shoulders.
+# Indices of left elbow and hand, right elbow and hand in the keypoints; then of the shoulders.
 _MOVING = np.array([1, 2, 4, 5])
 _LEFT, _RIGHT = 0, 3
 # First columns: means and deviations of elbows and hands, then of the middle of the shoulders.
@@ -28,18 +28,18 @@ MIDDLE_MEAN, MIDDLE_DEVIATION = 2 * DEVIATIONS, 2 * DEVIATIONS + 3
 # Columns of the evidence of loss.
 OF_EVIDENCE = slice(MIDDLE_DEVIATION + 3, MIDDLE_DEVIATION + 11)
 SEARCH_FEATURES = OF_EVIDENCE.stop
-"""How many numbers :func:`features_of_search` returns for an arm."""
+"""Number of features of an arm from :func:`features_of_search`."""
 
 
 class Search(NamedTuple):
-    """What the search of a frame has found.
+    """The result of the search of a frame.
 
     Attributes:
-        states: that were rated, (N, 14).
-        ratings: of them, (N,); each weighs exp(-rating / ``spread``).
-        spread: difference of ratings that changes a weight by e.
-        evidence: how well their mean fits.
-        chance: that it is wrong, see :mod:`.loss`.
+        states: rated states, (N, 14).
+        ratings: ratings of the states, (N,); each state has the weight exp(-rating / ``spread``).
+        spread: difference of ratings that changes a weight by the factor e.
+        evidence: evidence for or against the mean state.
+        chance: probability of loss, see :mod:`.loss`.
     """
 
     states: FloatArray
@@ -50,14 +50,14 @@ class Search(NamedTuple):
 
 
 def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray) -> FloatArray:
-    """Return what a network sees, (2, F): for the left arm, and for the right one mirrored.
+    """Return the features (2, F) for the left arm and the mirrored right arm.
 
-    Places are of elbow and hand of the arm, then of the other arm, beside the middle of the
-    shoulders: their mean over the states beside the result, and their deviations, metres.
+    For elbow and hand of the arm, then of the other arm, relative to the middle of the shoulders,
+    they are the mean over the states minus the result, and the deviations, metres.
 
     Args:
-        search: what was found.
-        cost: that has rated it.
+        search: result of the search.
+        cost: cost that has rated the states.
         result_m: keypoints of the result, (6, 3), metres in the optical frame.
     """
     features = np.empty((2, SEARCH_FEATURES))
@@ -85,7 +85,7 @@ def _fill(
     body: Any,
     features: Any,
 ) -> None:
-    """Write the places of :func:`features_of_search` to ``features`` (2, F)."""
+    """Write means and deviations of :func:`features_of_search` to ``features`` (2, F)."""
     count = len(_MOVING)
     sums, squares = np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
     points, seen, total, best = np.empty((6, 3)), np.empty((count + 1, 3)), 0.0, ratings.min()
@@ -103,7 +103,7 @@ def _fill(
     _beside_middle(result_m, seen)
     for arm in range(2):
         for j in range(count + 1):
-            # The arm of the row first; the middle stays the last.
+            # The row's own arm comes first, and the middle of the shoulders last.
             source = j if j == count or arm == 0 else (j + 2) % count
             of_mean = MIDDLE_MEAN if j == count else MEANS + 3 * j
             of_deviation = MIDDLE_DEVIATION if j == count else DEVIATIONS + 3 * j
@@ -117,7 +117,7 @@ def _fill(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _beside_middle(points: Any, seen: Any) -> None:
-    """Write elbows and hands beside the shoulders' middle, then the middle, to ``seen`` (5, 3)."""
+    """Write elbows and hands relative to mid-shoulder, then mid-shoulder, to ``seen`` (5, 3)."""
     for axis in range(3):
         middle = 0.5 * (points[_LEFT, axis] + points[_RIGHT, axis])
         for j in range(len(_MOVING)):

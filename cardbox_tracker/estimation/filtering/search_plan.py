@@ -1,7 +1,7 @@
-"""What the whole-body filter does differently with one camera and with several: all of it here.
+"""Parameters of the whole-body search that depend on the number of cameras.
 
-Several outlines leave less of the fit flat than one, so other steps are worth their time.
-``docs/research/two-cameras.md`` says what was tried.
+Several outlines determine a posture better than one, so other steps are efficient
+(``docs/research/two-cameras.md``).
 """
 
 from __future__ import annotations
@@ -10,25 +10,24 @@ from dataclasses import dataclass, replace
 
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
-# Of the rounds of all joints: the fraction of states that moves by differences, and how the noise
-# shrinks from one round to the next.
+# Rounds of all joints: fraction of states that move by differences, and factor on the noise from
+# one round to the next.
 _DIFFERING, _ROUND_DECAY = 0.8, 0.8
-# Share of the arms near the best ones that does as well as all of them where the most promising are
-# chosen.
+# Fraction of the arms near the best ones that suffices if the most promising arms are selected.
 _NEAR_ARMS = 0.6
 
 
 @dataclass(frozen=True)
 class SearchPlan:
-    """How a frame is searched.
+    """Parameters of the search of a frame.
 
     Attributes:
         config: settings of the filter.
-        candidates: arms that are proposed for each one that is rated.
-        crosses: somebody upright is looked for where the lines of sight meet.
-        fits_outlines: before all joints move together, a few states that differ are fitted to all
-            outlines by Gauss-Newton steps.
-        keeps_result: the fitted result of a frame is among the survivors.
+        candidates: number of proposed arms per rated arm.
+        crosses: whether an upright person is proposed at the intersection of the lines of sight.
+        fits_outlines: whether a few different states are fitted to all outlines by Gauss-Newton
+            steps before all joints move together.
+        keeps_result: whether the fitted result of a frame is among the survivors.
     """
 
     config: WholeBodyConfig

@@ -1,4 +1,4 @@
-"""Compiled choice and averages of rated states."""
+"""Compiled selection and averages of rated states."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
 from cardbox_tracker.estimation.cost.kinematics import angles_in, pose_arm, side_of
 
-# Metres that a radian of yaw or pitch counts when states are compared.
+# Metres per radian of yaw or pitch in the distance between states.
 _RADIAN_M = 0.3
 Indices = NDArray[np.int64]
 
@@ -21,9 +21,9 @@ Indices = NDArray[np.int64]
 def spread_of_arm(
     arms: Floats, ratings: Floats, side: float, spread: float, parts: Floats, girdle: Floats
 ) -> tuple[float, float]:
-    """Return the deviations of elbow and hand in the torso's frame, m, weighted by fit.
+    """Return the weighted deviations of elbow and hand in the torso's frame, metres.
 
-    Arms (N, 4) weigh exp(-(rating - best) / ``spread``).
+    The weights of the arms (N, 4) are exp(-(rating - best) / ``spread``).
     """
     points, directions = np.empty((3, 3)), np.empty(6)
     best = ratings.min()
@@ -58,8 +58,9 @@ def choose_apart(
 ) -> Indices:
     """Return up to ``most`` indices: the best ``alike``, then the best that differ from all chosen.
 
-    States (N, 14) differ if elbows and hands in the torso's frame, its place and its turns, at
-    0.3 m a radian, are ``apart_m`` away, as the root of the summed squares.
+    Two states (N, 14) differ if their Euclidean distance is at least ``apart_m``. It includes
+    elbows and hands in the torso's frame, ``torso_x``, ``torso_y``, yaw and pitch, with a factor of
+    0.3 m per radian.
     """
     order = np.argsort(ratings, kind="mergesort")
     chosen = np.empty(most, np.int64)
@@ -109,7 +110,7 @@ def mean_and_spread(
 ) -> tuple[Floats, Floats]:
     """Return the mean (14,) of the best ``count`` states, and deviations (14,) of all around it.
 
-    States (N, 14) weigh exp(-(rating - best) / ``spread``).
+    The weights of the states (N, 14) are exp(-(rating - best) / ``spread``).
     """
     order = np.argsort(ratings, kind="mergesort")
     best = ratings[order[0]]

@@ -1,6 +1,6 @@
 """Compiled proposals of torsos.
 
-Random numbers are arguments, unit normal or uniform in 0..1.
+Callers pass the random numbers, unit normal or uniform in 0..1.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from cardbox_tracker.estimation.filtering.joint_moves import (
     pivot,
 )
 
-# Explorers of the torso: half of them bow by this range, two fifths turn anywhere, the others turn
-# to the other side; all of them move towards the camera or away with this deviation, m.
+# Explorers: half of them bow within this range, two fifths get any yaw, the others mirror the yaw;
+# the distance of all has this deviation, m.
 _BOW_FROM_RAD, _BOW_RANGE_RAD = -5.0 * pi / 180.0, 60.0 * pi / 180.0
 _BOWING, _BOWING_OR_TURNING = 0.5, 0.9
 _EXPLORERS_X_M = 0.06
-# This part of the upright torsos is turned anywhere, as people are who walk in; the others face the
-# camera with this deviation, rad.
+# Fraction of the upright torsos with any yaw, since people walk in sideways; deviation of the yaw
+# of the others, which face the camera, rad.
 _FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
 
 
 class Upright(NamedTuple):
-    """Torsos that stand upright where the silhouette is.
+    """Upright torsos at the place of the silhouette.
 
     Attributes:
-        number: of them.
-        state: with arms that hang, (14,).
-        x_deviation_m: of their distance.
-        direction: of the silhouette, aside over ahead.
-        distance_m: of the person in the body model.
+        number: number of torsos.
+        state: state with hanging arms, (14,).
+        x_deviation_m: deviation of ``torso_x``, metres.
+        direction: bearing of the silhouette: lateral coordinate over depth.
+        distance_m: distance of the person in the body model.
     """
 
     number: int
@@ -76,17 +76,17 @@ def propose_torsos(
 ) -> Floats:
     """Return states (N, 14) with new torsos around ``survivors`` (M, 14), whose arms they keep.
 
-    Every second one turns about the shoulders. Half of either kind moves by ``step_m``, the step of
-    the silhouette, since a walking person moves further than the noise. The last ``explorers`` bow,
-    turn or turn over; the last of them stand upright. ``numbers`` are (N, 14) and (N, 2).
+    Every second torso rotates about the shoulders. Half of either kind moves by ``step_m``, the
+    step of the silhouette, because a walking person moves further than the noise. The last
+    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright.
 
     Args:
         survivors: states of the last frame.
         noise: fields of :class:`~.joint_moves.Noise`.
-        step_m: aside.
-        explorers: number of them.
+        step_m: lateral step, metres.
+        explorers: number of explorers.
         upright: fields of :class:`Upright`.
-        numbers: fields of :class:`~.joint_moves.Numbers`.
+        numbers: fields of :class:`~.joint_moves.Numbers`, (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
     fresh, fresh_state, fresh_x_m, sight, distance_m = upright
@@ -111,7 +111,7 @@ def propose_torsos(
                 state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * value
             else:
                 state[YAW] = -state[YAW]
-            # The noise of the arms is not used here.
+            # The random numbers of the arms are not used otherwise.
             state[TORSO_X] += _EXPLORERS_X_M * normals[i, FIRST_ANGLES[0]]
         else:
             for d in range(N_STATE):
@@ -139,8 +139,8 @@ def pool_of(
 ) -> Floats:
     """Return ``survivors`` (M, 14) and the best ``count`` of ``torsos`` twice, (M + 2 count, 14).
 
-    First with the arms they carry along, then with those of the state ``arms_of`` (14,), which stay
-    fixed in space.
+    The torsos come first with their own arms, and then with the arms of the state ``arms_of``
+    (14,), which stay fixed in space.
     """
     m = survivors.shape[0]
     order = np.argsort(ratings, kind="mergesort")

@@ -1,6 +1,6 @@
-"""Which way somebody faces who walks through the image: where they are going.
+"""Expected yaw of a person who walks through the image: people face the direction of travel.
 
-An outline from the side is nearly alike for both directions; the way across the image is not.
+An outline from the side is nearly the same for both directions, but the motion is not.
 """
 
 from __future__ import annotations
@@ -9,38 +9,38 @@ from math import copysign, radians
 
 from cardbox_tracker.estimation.cost.terms import Silhouette
 
-# Way that counts, m: half of it is swaying, all of it is walking.
+# Lateral motion of a walking person, m; a person who sways moves up to half of it.
 _WAY_M = 0.25
-# Share of the way that is forgotten from one frame to the next.
+# Decay of the lateral motion per frame.
 _FORGOTTEN = 0.05
-# Somebody who walks across is seen nearly from the side.
+# A person who walks sideways is seen nearly from the side.
 _ASIDE_RAD = radians(80.0)
 
 
 class Walk:
-    """Follows somebody across the image.
+    """Tracks the lateral motion of a person.
 
     Attributes:
-        way_m: the way made lately, towards positive ``torso_y``, metres.
+        way_m: decaying sum of the recent motion, positive towards positive ``torso_y``, metres.
     """
 
     def __init__(self) -> None:
-        """Begin with somebody of whom nothing is known."""
+        """Begin without a person."""
         self._bearing: float | None = None
         self.way_m = 0.0
 
     def see(self, silhouette: Silhouette, bearing: float, ahead_m: float) -> float:
-        """Take the next silhouette (H, W).
+        """Update with the next silhouette.
 
-        Somebody who is first seen at a border of the image is assumed to come in.
+        A person who first appears at a border of the image is assumed to walk in.
 
         Args:
-            silhouette: the foreground.
-            bearing: of its middle, aside over ahead.
-            ahead_m: how far away the person is.
+            silhouette: (H, W), 0 or 255.
+            bearing: lateral coordinate over depth of its middle.
+            ahead_m: distance of the person, metres.
 
         Returns:
-            How far the middle moved since the last silhouette, metres.
+            Lateral motion of the middle since the last silhouette, metres.
         """
         if self._bearing is None:
             step_m = 0.0
@@ -55,6 +55,6 @@ class Walk:
 
     @property
     def yaw_rad(self) -> float:
-        """Yaw of the torso that the way suggests: 0 unless somebody walks."""
+        """Expected yaw of the torso, rad; 0 unless the person walks."""
         walking = max(0.0, 2.0 * abs(self.way_m) / _WAY_M - 1.0)
         return copysign(_ASIDE_RAD * walking, self.way_m)

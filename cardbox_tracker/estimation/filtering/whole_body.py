@@ -1,10 +1,10 @@
 """The whole-body filter: a few dozen whole postures survive from frame to frame.
 
-A frame is searched in stages, each with the best of the one before: torsos, then each arm beside
-the best torso, then all joints together (``docs/architecture.md``). Proposals are in
-:mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
-:mod:`cardbox_tracker.estimation.cost.multi_view`, and :mod:`.search_plan` has all that depends on
-the number of cameras.
+A frame is searched in stages, each of which starts with the best states of the previous one:
+torsos, then each arm beside the best torso, then all joints together (``docs/architecture.md``).
+Proposals are in :mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
+:mod:`cardbox_tracker.estimation.cost.multi_view`. :mod:`.search_plan` has all parameters that
+depend on the number of cameras.
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from cardbox_tracker.body.posture import (
-    N_JOINTS,
+    LEFT_ARM,
+    PLACE,
+    POSTURE,
+    RIGHT_ARM,
     STATE_LIMITS,
     TORSO_X,
+    TORSO_Y,
     TORSO_Z,
 )
 from cardbox_tracker.body.sizes import FloatArray
@@ -44,23 +48,24 @@ from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 
 _HOME_LIMIT_M = 0.7
-# Deviation of x of torsos that stand upright: larger while the search is young.
+# Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-# Before all joints move together, so many states, of which so many are alike and the others so far
-# apart, m, are moved by so many Gauss-Newton steps.
+# Fit of several states to the outlines: number of states, number of similar states, least distance
+# of the others, m; Gauss-Newton steps.
 _FITTED, _FIT_STEPS = (3, 1, 0.1), 2
-_STEP_M = 0.05  # across the image: the legs leave the columns where they were
+# Lateral step, m, after which the legs have left their last columns.
+_STEP_M = 0.05
 
 
 class WholeBodyFilter:
-    """Follows states (14,) of the first camera; a :class:`~.pose_filter.PoseFilter`.
+    """Tracks states (14,) of the first camera; a :class:`~.pose_filter.PoseFilter`.
 
-    A state is d1..d12, ``torso_x`` and ``torso_z``. :attr:`refine` post-processes the result. Of
-    several cameras, any may see nobody for a while.
+    A state is d1..d12, ``torso_x`` and ``torso_z``. :attr:`refine` post-processes the result. Each
+    of several cameras may show no person for a while.
 
     Attributes:
-        states: of the last frame, (N, 14).
-        ratings: theirs, (N,); the lower, the better.
+        states: rated states of the last frame, (N, 14).
+        ratings: ratings of the states, (N,); lower is better.
         refine: fits the result to the outlines, corrects it, and estimates its deviations.
     """
 
@@ -71,7 +76,7 @@ class WholeBodyFilter:
         rng: np.random.Generator,
         views: Sequence[View] = (),
     ) -> None:
-        """Prepare, and compile what is not yet; see ``MakeFilter``."""
+        """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
         self._views = tuple(views)
         self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
         self._config = c = plan.config
@@ -79,7 +84,7 @@ class WholeBodyFilter:
         self._use_body(silhouette)
         self._sigma = c.noise()
         self._torso_sigma = self._sigma.copy()
-        self._torso_sigma[4:12] = 0.0
+        self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
         self.forget()
 
@@ -91,7 +96,7 @@ class WholeBodyFilter:
         self._arm = ArmSearch(cost, self._plan)
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
         self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
-        # From the hips to the torso's top: about where the shoulders are.
+        # The height of the torso's top above the hips is about that of the shoulders.
         self._lever_m = float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])
 
     def forget(self) -> None:
@@ -107,21 +112,21 @@ class WholeBodyFilter:
         self._chance: float | None = None
 
     def recover(self) -> None:
-        """See :class:`~.pose_filter.PoseFilter`: the search goes on, and somebody upright joins it.
+        """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
 
-        To forget would cost more than it brings where silhouettes stay poor.
+        The survivors are kept, because the silhouettes may stay poor for a while.
         """
         self._is_lost = True
-        # A wrong result is not mixed with the next one.
+        # A wrong result must not be smoothed into the next one.
         self._output = None
         self.refine.forget()
 
     def configure(self, config: TrackerConfig) -> None:
-        """See :class:`~.pose_filter.PoseFilter`: every other setting of this filter restarts."""
+        """See :class:`~.pose_filter.PoseFilter`; all other settings of this filter restart it."""
         self._lost_iou = config.lost_iou
 
     def look(self, frames: Sequence[Frame]) -> Presence:
-        """See :class:`~.pose_filter.PoseFilter`: a person is there if any camera sees one."""
+        """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
         limits = self._config.smallest_person, self._config.largest_person
         found = [presence_of(c.silhouette_px / c.frontal_px, *limits) for c in self._cost.costs]
@@ -138,11 +143,11 @@ class WholeBodyFilter:
             self._home_m = 0.0
             self._survivors[-1] = self._reference
             place_m = location.bearing * self._body.placement.distance_m
-            self._survivors[-1, 0] = np.clip(place_m, *STATE_LIMITS[0])
+            self._survivors[-1, TORSO_Y] = np.clip(place_m, *STATE_LIMITS[TORSO_Y])
         moved = self._survivors[0].copy()
-        moved[0] += location.step_m
+        moved[TORSO_Y] += location.step_m
         if self._is_new or abs(location.step_m) > _STEP_M:
-            # Now it is known where the legs are.
+            # The pixels of the legs depend on the place of the person.
             self._cost.see([frame.silhouette for frame in frames], moved)
             self._cost.choose(self._seeing)
         self._age += not self._is_new
@@ -152,7 +157,7 @@ class WholeBodyFilter:
         return self._fit(frames)
 
     def _observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Location:
-        """See what the terms say of the frames, and where the person is."""
+        """Set the observations of the terms, and return the place of the person."""
         seeing, cost = self._seeing, self._cost
         self.refine.see(seeing)
         location = self._locator.locate(frames, seeing, self._survivors[0])
@@ -185,7 +190,7 @@ class WholeBodyFilter:
         self._together(frames, states, ratings, draws)
 
     def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
-        """Return whole states (N, 14): the survivors, and the best of other torsos with arms."""
+        """Return states (N, 14): the survivors, and the best new torsos with arms."""
         config, cost = self._config, self._cost
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
         fresh = self._reference.copy()
@@ -204,13 +209,13 @@ class WholeBodyFilter:
         pool = torso_proposals.pool_of(
             self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
-        # Their arms hang; those of the last frame, with which torsos are rated, would hide it.
+        # Upright torsos keep their hanging arms; they were rated with the arms of the last frame.
         return np.concatenate([pool, torsos[len(torsos) - upright :]])
 
     def _together(
         self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray, draws: Draws
     ) -> None:
-        """Move all joints of the best together; then choose who survives."""
+        """Move all joints of the best states together; then choose the survivors."""
         config, cost = self._config, self._cost
         if self._plan.fits_outlines:
             fitted = self._fitted(frames, states, ratings)
@@ -240,7 +245,7 @@ class WholeBodyFilter:
     def _fitted(
         self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray
     ) -> FloatArray:
-        """Return a few states (N, 14) that differ, fitted to all outlines."""
+        """Return a few different states (N, 14) after a fit to all outlines."""
         cost, outline = self._cost, self.refine.outline
         kept = state_choice.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
         fitted = [outline.fitted(frames, state, _FIT_STEPS) for state in states[kept]]
@@ -252,7 +257,7 @@ class WholeBodyFilter:
         return states[state_choice.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:
-        """Return the smoothed mean of the best states, and how far to believe it."""
+        """Return the refined mean of the best states with its confidence."""
         config, cost, frame = self._config, self._cost, frames[0]
         rated = self.states, self.ratings
         mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
@@ -262,8 +267,9 @@ class WholeBodyFilter:
         fitted = self.refine.outline(frames, self._output)
         _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
         fit_iou = iou_of(total, areas_px[1], costs_px[1])
-        seen = total, cost.frontal_px, costs_px[0], areas_px[0], float(self.ratings.min())
-        evidence = loss.evidence_of(*seen, sum(self._arm.spreads_m) / 4, stddev, mean, self._age)
+        pixels = loss.Pixels(total, cost.frontal_px, costs_px[0], areas_px[0])
+        rating, arm_m = float(self.ratings.min()), sum(self._arm.spreads_m) / 4
+        evidence = loss.evidence_of(pixels, rating, arm_m, stddev, mean, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         search = Search(*rated, config.spread, evidence, self._chance)
         result = self.refine.corrected(frame, fitted, spread, fit_iou, search)
@@ -271,20 +277,20 @@ class WholeBodyFilter:
         iou = iou_of(total, area_px, cost_px)
         self._result = result
         if self._plan.keeps_result:
-            # The last survivor is the worst one.
+            # The fitted result replaces the worst survivor, which is the last one.
             self._survivors[-1] = fitted
         keypoints_m = cost.keypoints(result)
         deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
         return Fit(
-            posture=result[:N_JOINTS],
-            posture_stddev=deviations[:N_JOINTS],
+            posture=result[POSTURE],
+            posture_stddev=deviations[POSTURE],
             keypoints_m=keypoints_m,
             cost_px=int(cost_px),
             iou=iou,
             is_uncertain=self._chance > config.uncertain_from,
             is_poor=self._chance > config.lost_from or fit_iou < self._lost_iou,
-            offset_m=result[N_JOINTS:],
-            offset_stddev_m=deviations[N_JOINTS:],
+            offset_m=result[PLACE],
+            offset_stddev_m=deviations[PLACE],
             seen=fitted,
             seen_iou=fit_iou,
             particles=Particles(*rated, mean, config.spread, deviations / spread),

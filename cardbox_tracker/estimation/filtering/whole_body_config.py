@@ -1,4 +1,4 @@
-"""Settings of the whole-body filter: how it searches, and when it doubts what it found."""
+"""Settings of the whole-body filter: numbers of states, noise, post-processing, thresholds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import Settings, restarting
 
-# Numbers of states that `effort` scales, and the least that the search needs of each.
+# Numbers of states that `effort` scales, and their least values.
 _LEAST_TOTALS = MappingProxyType(
     {"survivors": 4, "torsos": 2, "arms": 2, "arms_again": 1, "together": 2, "average": 1}
 )
@@ -34,58 +34,73 @@ _LEAST_PARTS = MappingProxyType(
 
 @dataclass(frozen=True)
 class WholeBodyConfig(Settings):
-    """Numbers of states, noise, and thresholds; see ``docs/architecture.md`` for the steps.
+    """Settings of the whole-body filter; ``docs/architecture.md`` explains the stages.
 
     Attributes:
-        cost: what is drawn and which postures are usual.
+        cost: settings of the rating.
     """
 
     cost: WholeBodyCostConfig = WholeBodyCostConfig()
     effort: float = restarting(
-        1.0, "factor on all numbers of states: time against accuracy", limits=(0.25, 4.0)
+        1.0,
+        "factor on all numbers of states; more states are slower and more accurate",
+        limits=(0.25, 4.0),
     )
     survivors: int = restarting(32, "states kept from frame to frame", limits=(4, 1000))
     alike: int = restarting(
-        12, "survivors that may be alike; the others differ from all better ones", limits=(1, 1000)
+        12,
+        "survivors that may be similar; each other one differs from all better ones",
+        limits=(1, 1000),
     )
     apart_m: float = restarting(
-        0.12, "how far apart survivors are to differ", unit="m", limits=(0.0, 10.0)
+        0.12, "least distance of different survivors", unit="m", limits=(0.0, 10.0)
     )
-    torsos: int = restarting(70, "torsos tried", limits=(2, 100_000))
+    torsos: int = restarting(70, "torsos that are rated", limits=(2, 100_000))
     torso_explorers: int = restarting(
-        16, "of these, those that bow or turn anywhere", limits=(0, 100_000)
+        16, "number of the torsos that bow or turn by any angle", limits=(0, 100_000)
     )
     fresh_torsos: int = restarting(
         8,
-        "of these, those that stand upright where the silhouette is; all of them at first",
+        "number of the torso_explorers that stand upright at the place of the silhouette; at "
+        "first, all of them do",
         limits=(0, 100_000),
     )
     best_torsos: int = restarting(
         12,
-        "best torsos that are rated with arms: carried along, and fixed in space",
+        "best torsos that are rated with arms, both moved along and fixed in space",
         limits=(1, 1000),
     )
-    arms: int = restarting(90, "arms tried on either side", limits=(2, 100_000))
-    arm_mirrors: int = restarting(8, "of these, survivors mirrored in depth", limits=(0, 100_000))
+    arms: int = restarting(90, "arms that are rated per side", limits=(2, 100_000))
+    arm_mirrors: int = restarting(
+        8,
+        "number of the arms that are survivors mirrored in depth",
+        limits=(0, 100_000),
+    )
     arm_tips: int = restarting(
         10,
-        "of these, those that reach for foreground that the model leaves uncovered",
+        "number of the arms that reach for foreground that the model leaves uncovered",
         limits=(0, 100_000),
     )
     banked_arms: int = restarting(
-        20, "of these, those drawn from the learned prior", limits=(0, 100_000)
+        20,
+        "number of the arms that are drawn from the learned prior",
+        limits=(0, 100_000),
     )
-    best_arms: int = restarting(20, "best arms around which others are tried", limits=(1, 100_000))
-    arms_again: int = restarting(50, "arms tried around the best ones", limits=(1, 100_000))
+    best_arms: int = restarting(20, "best arms around which others are rated", limits=(1, 100_000))
+    arms_again: int = restarting(
+        50, "arms that are rated around the best ones", limits=(1, 100_000)
+    )
     paired_arms: int = restarting(
-        12, "best arms of either side that are paired", limits=(1, 100_000)
+        12, "best arms of either side that are combined", limits=(1, 100_000)
     )
     rounds: int = restarting(2, "rounds in which all joints move together", limits=(0, 100))
-    together: int = restarting(36, "states of such a round", limits=(2, 100_000))
-    # Differences of survivors follow the directions in which the fit is flat (Storn & Price,
+    together: int = restarting(36, "states in such a round", limits=(2, 100_000))
+    # Differences of survivors follow flat directions of the cost (Storn & Price,
     # "Differential Evolution", 1997).
     differing: float = restarting(
-        0.4, "of these, the fraction that moves by the difference of two others", limits=(0.0, 1.0)
+        0.4,
+        "fraction of these states that move by the difference of two others",
+        limits=(0.0, 1.0),
     )
     difference_scale: float = restarting(0.6, "factor on such a difference", limits=(0.0, 2.0))
     y_noise_m: float = restarting(0.02, "noise of the torso's y", unit="m", limits=(0.0, 1.0))
@@ -104,74 +119,83 @@ class WholeBodyConfig(Settings):
         0.22, "noise of an arm's angles", unit="rad", limits=(0.0, 3.2)
     )
     together_noise: float = restarting(
-        0.3, "factor on the noise of the first round of all joints", limits=(0.0, 1.0)
+        0.3,
+        "factor on the noise of the first round of all joints",
+        limits=(0.0, 1.0),
     )
     round_decay: float = restarting(
         0.6, "factor on the noise from one round to the next", limits=(0.0, 1.0)
     )
     home_rate: float = restarting(
-        0.02, "how fast the home of the torso's x follows it, a frame", limits=(0.0, 1.0)
+        0.02,
+        "weight of a frame in the low-pass filter of the torso's usual x",
+        limits=(0.0, 1.0),
     )
     average: int = restarting(
         150, "best states whose weighted mean is the result", limits=(1, 1_000_000)
     )
     spread: float = restarting(
         0.02,
-        "states this much worse than the best, as a share of the silhouette's pixels, weigh 1/e "
-        "in mean and deviation",
+        "difference to the best rating, as a fraction of the silhouette's pixels, at which the "
+        "weight of a state is 1/e",
         limits=(1e-6, 10.0),
     )
-    # With 0.6 hands that move fast lagged behind.
+    # Larger values delay fast hands.
     smoothing: float = restarting(
-        0.3, "share of the last result in the next one", limits=(0.0, 0.99)
+        0.3,
+        "weight of the last result in the next one",
+        limits=(0.0, 0.99),
     )
     outline_steps: int = restarting(
         2,
-        "Gauss-Newton steps that fit the result to the outlines of silhouettes; without "
-        "depth images",
+        "Gauss-Newton steps of the fit of the result to the outlines; not used with depth images",
         limits=(0, 20),
     )
     corrector: str = restarting(
         "learned",
-        "corrects the result. learned: the package's network; none: nothing; FILE.npz: a network "
-        "of the same kind; MODULE:FUNCTION: Python code, see docs/extending.md",
+        "corrector of the result. learned: the package's network; none: no corrector; FILE.npz: a "
+        "network of the same kind; MODULE:FUNCTION: Python code, see docs/extending.md",
     )
     learned_deviations: bool = restarting(
         True,
-        "deviations of the angles are those that the corrector knows, if it knows any; false: "
-        "those of the particles",
+        "use the corrector's standard deviations of the angles, if it has any; false: use those "
+        "of the particles",
     )
     output_smoothing_s: float = restarting(
         0.08,
-        "time constant of a low-pass filter on corrected results, which delays them by about as "
-        "much; 0: none",
+        "time constant of the low-pass filter on corrected results, and about their delay; 0: no "
+        "filter",
         unit="s",
         limits=(0.0, 10.0),
     )
     start_passes: int = restarting(
-        3, "searches on the first silhouette of a person", limits=(1, 100)
+        3, "searches in the first silhouette of a person", limits=(1, 100)
     )
-    # Somebody sideways shows about half the area of the front view, a step away less.
+    # A person from the side has about half the area of the front view, and less a step away.
     smallest_person: float = restarting(
         0.12,
-        "less foreground is nobody, as a fraction of the model's in the front posture",
+        "least foreground of a person, as a fraction of the model's area in the front posture",
         limits=(0.0, 1.0),
     )
-    # Beyond it the light has changed, or several people are there.
+    # With more foreground, the light has changed, or there are several people.
     largest_person: float = restarting(
-        2.5, "more foreground is not one person, as a fraction of the same", limits=(1.0, 1000.0)
+        2.5,
+        "most foreground of a person, as a fraction of the same area",
+        limits=(1.0, 1000.0),
     )
     uncertain_from: float = restarting(
-        0.55, "chance of loss above which the state is uncertain", limits=(0.0, 1.0)
+        0.55,
+        "probability of loss above which the state is uncertain",
+        limits=(0.0, 1.0),
     )
     lost_from: float = restarting(
         0.95,
-        "chance of loss above which a frame counts for lost_frames; 1: never",
+        "probability of loss above which a frame counts for lost_frames; 1: never",
         limits=(0.0, 1.0),
     )
 
     def noise(self) -> FloatArray:
-        """Return the deviations of a state's noise, (14,), metres and rad."""
+        """Return the standard deviations (14,) of a state's noise, metres and rad."""
         torso = [self.y_noise_m, self.roll_noise_rad, self.pitch_noise_rad, self.yaw_noise_rad]
         return np.array([*torso, *[self.arm_noise_rad] * 8, self.x_noise_m, self.z_noise_m])
 
@@ -179,11 +203,11 @@ class WholeBodyConfig(Settings):
         """Return the settings with ``effort`` times as many states, and an effort of 1.
 
         Raises:
-            ValueError: a number of states is out of range then; the text names it and ``effort``.
+            ValueError: a scaled number is out of range; the text names it and ``effort``.
         """
         if self.effort == 1.0:
             return self
-        # Totals are rounded up and parts down, so parts stay within their totals.
+        # Totals are rounded up and parts down, so that parts do not exceed their totals.
         totals: dict[str, Any] = {
             name: max(least, math.ceil(self.effort * getattr(self, name)))
             for name, least in _LEAST_TOTALS.items()
@@ -201,7 +225,7 @@ class WholeBodyConfig(Settings):
         """Check the ranges.
 
         Raises:
-            ValueError: a value is out of range, or values do not go together; the text says which.
+            ValueError: a value is out of range, or values contradict each other; the text names it.
         """
         super().__post_init__()
         special = self.arm_mirrors + self.arm_tips + self.banked_arms

@@ -28,41 +28,43 @@ class InitializationConfig(Settings):
     )
     camera_pitch_rad: float = setting(
         0.0,
-        "how far the camera looks down; travels to the tracker in the body model",
+        "pitch of the camera, positive downwards; the body model stores it for the tracker",
         unit="rad",
         limits=(-MAX_PITCH_RAD, MAX_PITCH_RAD),
     )
     side_turn: str = setting(
         "left",
-        "which way the person turns for the side reference, as they see it",
+        "direction in which the person turns for the side reference, as seen by the person",
         choices=SIDE_TURNS,
     )
     hypotheses: int = setting(500, "hypotheses M of the estimation", limits=(10, 100000))
-    max_rounds: int = setting(100, "rounds of a step of the estimation at most", limits=(1, 10000))
+    max_rounds: int = setting(
+        100, "largest number of rounds of an estimation step", limits=(1, 10000)
+    )
     sigma_alpha_m: float = setting(
         0.05, "initial noise of the sizes (paper)", unit="m", limits=(1e-4, 1.0)
     )
     accuracy_m: float = setting(
-        0.002, "a step ends when its noise has shrunk below this", unit="m", limits=(0.0, 1.0)
+        0.002, "noise of the sizes at which a step ends", unit="m", limits=(0.0, 1.0)
     )
     prior: float = setting(
         0.003,
-        "cost of a size one standard deviation off, as a fraction of the silhouette's pixels",
+        "cost of one standard deviation of a size, as a fraction of the silhouette's pixels",
         limits=(0.0, 1.0),
     )
     min_iou: float = setting(
         0.6,
-        "a measurement is refused if the mean fit (IoU) of the references is below this",
+        "least mean fit (IoU) of the references; a measurement with less is refused",
         limits=(0.0, 1.0),
     )
     # Wrong postures can have a larger IoU, so this does not replace the check of the postures.
     least_iou: float = setting(
         0.55,
-        "a measurement is refused if the fit (IoU) of any reference is below this",
+        "least fit (IoU) of each reference; a measurement with less is refused",
         limits=(0.0, 1.0),
     )
     check_postures: bool = setting(
-        True, "refuse references whose outline shows another posture than was asked for"
+        True, "refuse references that show another posture than the requested one"
     )
     seed: int = setting(0, "seed of the random draws", limits=(0, 2**31 - 1))
 

@@ -28,8 +28,11 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     N_JOINTS,
+    PITCH,
     REFERENCE_NAMES,
     RIGHT_ARM,
+    ROLL,
+    TORSO_Y,
     reference_posture,
 )
 from cardbox_tracker.body.proportions import sizes_of_stature
@@ -169,7 +172,7 @@ class _Search:
             self._seen[name] = CompiledSilhouette(self._start, camera).look(silhouette)
             self._asked[name] = reference_posture(name, config.side_turn)
             self._postures[name] = self._asked[name].copy()
-            self._postures[name][0] = lateral_m(silhouette, camera, config.distance_m)
+            self._postures[name][TORSO_Y] = lateral_m(silhouette, camera, config.distance_m)
         self._rounds = dict.fromkeys(SUBSETS, 0)
         self._history: dict[str, list[tuple[float, ...]]] = {subset: [] for subset in SUBSETS}
 
@@ -181,7 +184,7 @@ class _Search:
         size_mask[_BONES] = 0.0
         loose = _loose_joints(name)
         posture_noise = np.where(loose, _LOOSE_ANGLE_RAD, 0.0)
-        posture_noise[0] = _PLACE_NOISE_M
+        posture_noise[TORSO_Y] = _PLACE_NOISE_M
         sizes, posture = self._sizes, self._postures[name]
         best = float(self._rate(name, sizes[None], posture[None])[0])
         scale = 1.0
@@ -231,7 +234,7 @@ class _Search:
         body = start.with_values(
             sizes=np.round(self._sizes, 4),
             hip_height_m=round(float(start.placement.hip_height_m), 4),
-            lateral_m=round(float(self._postures["front"][0]), 4),
+            lateral_m=round(float(self._postures["front"][TORSO_Y]), 4),
         )
         iou = {}
         for name, silhouette in self._references.items():
@@ -255,11 +258,11 @@ def _loose_joints(name: str) -> FloatArray:
     """Return 1 for each joint (12,) that is estimated in the reference, else 0."""
     loose = np.zeros(N_JOINTS)
     if name == "side":
-        loose[2] = 1.0  # leaning
+        loose[PITCH] = 1.0
         for arm in (LEFT_ARM, RIGHT_ARM):
             loose[arm] = (0.0, 1.0, 0.0, 1.0)
     else:
-        loose[1] = 1.0
+        loose[ROLL] = 1.0
         for arm in (LEFT_ARM, RIGHT_ARM):
             loose[arm] = (1.0, 0.0, 1.0, 0.0)
     return loose

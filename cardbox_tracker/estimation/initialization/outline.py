@@ -42,8 +42,8 @@ class LevelArm:
     Attributes:
         tip_m: Y of the fingertips.
         armpit_m: Y of the trunk's edge.
-        slope: of the axis, Z = slope Y + height.
-        height_m: of the axis at Y = 0.
+        slope: slope of the axis, Z = slope Y + height.
+        height_m: height of the axis at Y = 0.
         thickness_m: median height of the arm's outline between elbow and wrist.
     """
 

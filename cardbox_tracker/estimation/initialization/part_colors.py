@@ -35,7 +35,15 @@ from cardbox_tracker.body.appearance import (
 )
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_JOINTS, reference_posture
+from cardbox_tracker.body.posture import (
+    ELBOW_ABDUCTION,
+    FIRST_ANGLES,
+    N_JOINTS,
+    ROLL,
+    SHOULDER_ABDUCTION,
+    TORSO_Y,
+    reference_posture,
+)
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Image, Silhouette
@@ -125,7 +133,7 @@ def seen_appearance(
         silhouette: (H, W) of the person.
         body: the person at the current place.
         camera: working camera with the pitch of the body model.
-        posture: of the person, (12,).
+        posture: posture of the person, (12,).
 
     Returns:
         None if head or torso are not visible.
@@ -202,10 +210,11 @@ def fit_posture(
     rng = np.random.default_rng(seed)
     seen = CompiledSilhouette(body, camera).look(silhouette)
     best = reference_posture(name)
-    best[0] = body.placement.lateral_m
+    best[TORSO_Y] = body.placement.lateral_m
     sigma = np.zeros(N_JOINTS)
-    sigma[0], sigma[1] = _PLACE_M, _ROLL_RAD
-    sigma[[4, 6, 8, 10]] = _ABDUCTION_RAD
+    sigma[TORSO_Y], sigma[ROLL] = _PLACE_M, _ROLL_RAD
+    for first in FIRST_ANGLES:
+        sigma[[first + SHOULDER_ABDUCTION, first + ELBOW_ABDUCTION]] = _ABDUCTION_RAD
     for _ in range(_ROUNDS):
         postures = best + sigma * rng.standard_normal((_POSTURES, N_JOINTS))
         postures[0] = best

@@ -117,7 +117,7 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
     Args:
         body: measured by ``camera`` at an assumed distance.
         camera: camera of silhouettes and depth, including its pitch.
-        references: by the names of the reference postures ``front`` and ``arms``.
+        references: silhouettes and depths by reference posture, ``front`` and ``arms``.
 
     Raises:
         InitializationError: the depth images do not show the person.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_JOINTS, POSTURE
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import Estimate
@@ -192,14 +193,14 @@ def _run(
     n = len(session.stamps_ns)
     states = np.full(n, "", dtype="<U16")
     keypoints = np.full((n, 6, 3), np.nan)
-    postures, stddevs = np.full((n, 12), np.nan), np.full((n, 12), np.nan)
+    postures, stddevs = np.full((n, N_JOINTS), np.nan), np.full((n, N_JOINTS), np.nan)
     for i, stamp in enumerate(session.stamps_ns.tolist()):
         estimate = estimates.get(stamp)
         if estimate is None:
             continue
         states[i] = estimate.state
         if estimate.posture is not None and estimate.keypoints_m is not None:
-            keypoints[i], postures[i] = estimate.keypoints_m, estimate.posture[:12]
+            keypoints[i], postures[i] = estimate.keypoints_m, estimate.posture[POSTURE]
         if estimate.posture_stddev is not None:
-            stddevs[i] = estimate.posture_stddev[:12]
+            stddevs[i] = estimate.posture_stddev[POSTURE]
     return SessionRun(body, failure, states, keypoints, postures, stddevs, np.array(milliseconds))
