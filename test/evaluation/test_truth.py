@@ -121,5 +121,5 @@ def test_error_by_hand(tmp_path: Path) -> None:
 
 def test_estimates_of_another_session_are_refused(tmp_path: Path) -> None:
     truth = load_ground_truth(write(tmp_path, truth_data()))
-    with pytest.raises(CardboxError, match="another session"):
+    with pytest.raises(CardboxError, match="ground truth"):
         tracking_error({1: np.zeros((6, 3))}, truth)
