@@ -46,7 +46,7 @@ def test_synthesize_replaces_a_recording_with_force(
 ) -> None:
     called: dict[str, object] = {}
 
-    def synthesize(output: Path, **options: object) -> None:
+    def synthesize(*_: object, **options: object) -> None:
         called.update(options)
 
     monkeypatch.setattr("cardbox_tracker.simulation.session.synthesize_session", synthesize)
