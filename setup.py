@@ -34,6 +34,8 @@ TEST = [
 VIEW = ["rerun-sdk>=0.41,<0.42"]
 # Inverse kinematics of a robot's hand; a joint map needs none of these.
 RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
+# Runs the networks of the person detector; 'cardbox detector --install' gets their files.
+DETECTOR = ["ai-edge-litert>=1.4,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
 
@@ -93,6 +95,7 @@ setup(
         "retarget": RETARGET,
         "learn": LEARN,
         "experiments": EXPERIMENTS,
+        "detector": DETECTOR,
     },
     entry_points={
         "console_scripts": [

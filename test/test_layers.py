@@ -19,6 +19,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("compiling", "errors", "files", "interrupts", "progress", "settings", "small_yaml"),
     ("body",),
     ("vision", "description"),
+    ("detection",),
     ("estimation",),
     ("ergonomics", "retargeting"),
     ("drawing",),

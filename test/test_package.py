@@ -21,7 +21,7 @@ import cardbox_tracker
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
 CORE = (
-    *("body", "vision", "estimation", "description", "ergonomics", "retargeting"),
+    *("body", "vision", "detection", "estimation", "description", "ergonomics", "retargeting"),
     "drawing",
 )
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
@@ -252,6 +252,7 @@ def outside(folder: Path) -> set[str]:
 
 def test_what_is_imported_is_declared() -> None:
     distributions = {
+        "ai_edge_litert": "ai-edge-litert",
         "cv2": "opencv-python-headless",
         "pink": "pin-pink",
         "pinocchio": "pin",

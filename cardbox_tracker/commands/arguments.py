@@ -13,6 +13,7 @@ from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.depth_silhouettes import Within
+    from cardbox_tracker.recordings.detector_silhouettes import Detector
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 
@@ -73,21 +74,37 @@ def add_depth(parser: argparse.ArgumentParser) -> None:
         help="in place of --background: limit of the depth in the images of --depth, metres; "
         "choose it between the person and the wall",
     )
+    parser.add_argument(
+        "--silhouettes",
+        choices=("background", "detector"),
+        default="background",
+        help="source of the silhouettes: the difference from the empty scene, or the mask of a "
+        "person detector, which needs no empty scene ('cardbox detector --install')",
+    )
 
 
-def background_of(options: argparse.Namespace) -> TimeSpan | Within:
-    """Return the source of the silhouettes: the span of the empty scene, or a depth limit.
+def silhouettes_of(options: argparse.Namespace) -> TimeSpan | Within | Detector:
+    """Return the source of the silhouettes: an empty scene, a depth limit, or the detector.
 
     Raises:
-        CardboxError: neither or both are given.
+        CardboxError: none or several are given, or the detector is not installed.
     """
     from cardbox_tracker.recordings.depth_silhouettes import Within
+    from cardbox_tracker.recordings.detector_silhouettes import Detector
     from cardbox_tracker.recordings.recording import STEREO
 
-    if (options.within is None) == (options.background is None):
+    given = (options.background is not None) + (options.within is not None)
+    if options.silhouettes == "detector":
+        if given:
+            raise CardboxError(
+                "--silhouettes detector takes the place of --background and --within: leave them "
+                "out"
+            )
+        return Detector.installed()
+    if given != 1:
         raise CardboxError(
-            "expected either --background T0:T1, seconds during which nobody is in view, or "
-            "--within M with depth images"
+            "expected either --background T0:T1, seconds during which nobody is in view, --within "
+            "M with depth images, or --silhouettes detector, which needs neither"
         )
     if options.within is None:
         span: TimeSpan = options.background

@@ -14,8 +14,8 @@ from cardbox_tracker.commands.arguments import (
     add_recording,
     add_references,
     add_seed,
-    background_of,
     print_remarks,
+    silhouettes_of,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.errors import CardboxError
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> None:
     with (
         open_recording(
             options.recording,
-            background_of(options),
+            silhouettes_of(options),
             options.cameras,
             options.extrinsics,
             options.depth if options.distance is None else None,

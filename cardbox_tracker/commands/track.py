@@ -13,8 +13,8 @@ from cardbox_tracker.commands.arguments import (
     add_recording,
     add_retired,
     add_seed,
-    background_of,
     print_remarks,
+    silhouettes_of,
     time,
 )
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
@@ -138,7 +138,7 @@ def track_inputs(
         )
     with open_recording(
         options.recording,
-        background_of(options),
+        silhouettes_of(options),
         options.cameras,
         options.extrinsics,
         options.depth,

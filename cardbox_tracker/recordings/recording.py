@@ -17,6 +17,7 @@ from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
+from cardbox_tracker.recordings.detector_silhouettes import Detector, DetectorSilhouetteSource
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import DepthImage
@@ -149,7 +150,7 @@ class Recording:
 @contextmanager
 def open_recording(
     path: str | os.PathLike[str],
-    background: TimeSpan | Within,
+    background: TimeSpan | Within | Detector,
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
     depth: str | None = None,
@@ -158,8 +159,8 @@ def open_recording(
 
     Args:
         path: a recording as :class:`BagReader` takes it.
-        background: span without a person in any image; with one camera alternatively the depth
-            limit that cuts out the person.
+        background: span without a person in any image, or the detector whose masks are the
+            silhouettes; with one camera alternatively the depth limit that cuts out the person.
         cameras: namespaces, the first camera's first; empty if the recording has one camera.
         extrinsics: file of the poses, see :func:`load_extrinsics`.
         depth: see :class:`Recording`.
@@ -182,12 +183,19 @@ def open_recording(
         bags = [stack.enter_context(BagReader(path)) for _ in names or ("",)]
         found = extrinsics_of(bags[0], names, extrinsics)
         sources = [
-            DepthSilhouetteSource(bag, background, name)
-            if isinstance(background, Within)
-            else SilhouetteSource(bag, background, camera=name)
-            for bag, name in zip(bags, names or (None,), strict=True)
+            _source(bag, background, name) for bag, name in zip(bags, names or (None,), strict=True)
         ]
         yield Recording(names or ("",), sources, found, depth)
+
+
+def _source(
+    bag: BagReader, background: TimeSpan | Within | Detector, camera: str | None
+) -> SilhouetteSource:
+    if isinstance(background, Within):
+        return DepthSilhouetteSource(bag, background, camera)
+    if isinstance(background, Detector):
+        return DetectorSilhouetteSource(bag, background, camera)
+    return SilhouetteSource(bag, background, camera=camera)
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:

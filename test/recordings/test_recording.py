@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 import yaml
 
+from cardbox_tracker.detection.model_files import ModelFiles
+from cardbox_tracker.detection.pose_network import Detection
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
+from cardbox_tracker.recordings import detector_silhouettes
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.depth_silhouettes import Within
@@ -179,3 +182,37 @@ def test_a_camera_without_an_image_gives_an_empty_observation(sources: Recording
     seen = [taken.observations for taken in sources.frames(0.55)]
     assert [one[1].silhouette is None for one in seen] == [False, True, False, False]
     assert all(one[0].stamp_ns is not None for one in seen)
+
+
+def test_the_masks_of_a_detector_are_the_silhouettes(
+    two: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[tuple[Path, Path]] = []
+
+    class Network:
+        """Finds somebody in the upper half of images that are not flat."""
+
+        def __init__(self, *models: Path) -> None:
+            started.append(models)
+
+        def forget(self) -> None:
+            pass
+
+        def __call__(self, image: np.ndarray) -> Detection | None:
+            assert image.ndim == 3
+            if image.std() < 10:
+                return None
+            mask = np.zeros(image.shape[:2], np.uint8)
+            mask[: len(mask) // 2] = 128
+            return Detection(np.zeros((33, 2)), np.ones(33), mask)
+
+    monkeypatch.setattr(detector_silhouettes, "PoseNetwork", Network)
+    detector = detector_silhouettes.Detector(ModelFiles(tmp_path / "a", tmp_path / "b"))
+    with open_recording(two, detector, ["one"]) as source:
+        frames = list(source.first.frames())
+        # Of ten images the first six show the empty scene.
+        assert [bool(frame.silhouette.any()) for frame in frames] == [False] * 6 + [True] * 4
+        assert frames[-1].silhouette.mean() == pytest.approx(255 / 2)
+        assert "6 images" in source.first.remarks[-1]
+        assert len(list(source.frames(0.65))) == 3
+    assert started == [detector.models]
