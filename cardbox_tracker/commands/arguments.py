@@ -13,7 +13,8 @@ from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
     from cardbox_tracker.recordings.depth_silhouettes import Within
-    from cardbox_tracker.recordings.detector_silhouettes import Detector
+    from cardbox_tracker.recordings.detector import Detector
+    from cardbox_tracker.recordings.point_table import PointTable
     from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 
@@ -74,12 +75,24 @@ def add_depth(parser: argparse.ArgumentParser) -> None:
         help="in place of --background: limit of the depth in the images of --depth, metres; "
         "choose it between the person and the wall",
     )
+
+
+def add_detector(parser: argparse.ArgumentParser) -> None:
+    """Add ``--silhouettes`` and ``--detector``."""
     parser.add_argument(
         "--silhouettes",
         choices=("background", "detector"),
-        default="background",
+        default=None,
         help="source of the silhouettes: the difference from the empty scene, or the mask of a "
-        "person detector, which needs no empty scene ('cardbox detector --install')",
+        "person detector, which needs no empty scene ('cardbox detector --install'); with "
+        "--detector mediapipe and neither --background nor --within, the mask is the default",
+    )
+    parser.add_argument(
+        "--detector",
+        default=None,
+        metavar="mediapipe|FILE.csv",
+        help="also use 2D points of the person's joints: those of MediaPipe's networks ('cardbox "
+        "detector --install'), or a table that any detector has written (docs/detectors.md)",
     )
 
 
@@ -90,11 +103,14 @@ def silhouettes_of(options: argparse.Namespace) -> TimeSpan | Within | Detector:
         CardboxError: none or several are given, or the detector is not installed.
     """
     from cardbox_tracker.recordings.depth_silhouettes import Within
-    from cardbox_tracker.recordings.detector_silhouettes import Detector
+    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
     from cardbox_tracker.recordings.recording import STEREO
 
     given = (options.background is not None) + (options.within is not None)
-    if options.silhouettes == "detector":
+    chosen = options.silhouettes
+    if chosen is None and not given and options.detector == MEDIAPIPE:
+        chosen = "detector"
+    if chosen == "detector":
         if given:
             raise CardboxError(
                 "--silhouettes detector takes the place of --background and --within: leave them "
@@ -112,6 +128,28 @@ def silhouettes_of(options: argparse.Namespace) -> TimeSpan | Within | Detector:
     if options.depth in (None, STEREO):
         raise CardboxError("--within needs the topic of depth images: give --depth TOPIC")
     return Within(options.depth, options.within)
+
+
+def points_of(options: argparse.Namespace) -> Detector | PointTable | None:
+    """Return the source of the 2D points that ``--detector`` names; None without the option.
+
+    Raises:
+        CardboxError: the detector is not installed, or there is no such table.
+    """
+    from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.recordings.point_table import PointTable
+
+    if options.detector is None:
+        return None
+    if options.detector == MEDIAPIPE:
+        return Detector.installed()
+    path = Path(options.detector)
+    if not path.is_file():
+        raise CardboxError(
+            f"--detector is {options.detector!r}; expected {MEDIAPIPE}, or the file of a table of "
+            "points (docs/detectors.md)"
+        )
+    return PointTable(path)
 
 
 def add_references(parser: argparse.ArgumentParser) -> None:

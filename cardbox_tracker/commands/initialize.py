@@ -11,6 +11,7 @@ from cardbox_tracker.commands.arguments import (
     add_camera_pitch,
     add_cameras,
     add_depth,
+    add_detector,
     add_recording,
     add_references,
     add_seed,
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_recording(parser, needs_background=False)
     add_cameras(parser)
     add_depth(parser)
+    add_detector(parser)
     add_references(parser)
     parser.add_argument(
         "--distance",

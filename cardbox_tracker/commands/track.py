@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 from cardbox_tracker.commands.arguments import (
     add_cameras,
     add_depth,
+    add_detector,
     add_preset,
     add_recording,
     add_retired,
     add_seed,
+    points_of,
     print_remarks,
     silhouettes_of,
     time,
@@ -60,6 +62,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
     add_recording(parser, required, needs_background=False)
     add_cameras(parser)
     add_depth(parser)
+    add_detector(parser)
     parser.add_argument(
         "--model",
         type=Path,
@@ -142,6 +145,7 @@ def track_inputs(
         options.cameras,
         options.extrinsics,
         options.depth,
+        points_of(options),
     ) as source:
         total_s = max(1e-9, source.first.duration_s - options.start)
         with (

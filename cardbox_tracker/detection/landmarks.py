@@ -1,6 +1,11 @@
-"""Names of the 33 points of MediaPipe's pose network, in its order."""
+"""Names of the 33 points of MediaPipe's pose network, and their conversion for the tracker."""
 
 from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detection.pose_network import Detection
 
 LANDMARKS = (
     "nose",
@@ -38,3 +43,10 @@ LANDMARKS = (
     "right_foot",
 )
 """``left`` is the person's left; fingers are their knuckles at the base."""
+
+_USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
+
+
+def image_points(found: Detection) -> ImagePoints:
+    """Return the points of a detection that the tracker uses."""
+    return ImagePoints(found.points_px[_USED], found.scores[_USED])

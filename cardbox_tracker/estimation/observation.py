@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.cost.terms import DepthImage, Image, Silhouette
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """The data of one camera at one time; 2D keypoints of a detector belong here, too.
+    """The data of one camera at one time.
 
     An observation without a silhouette stands for a camera without data at this time.
 
@@ -20,12 +21,14 @@ class Observation:
         depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths are 0
             or not finite. Only the depth image of the first camera is used.
         stamp_ns: time of the data, ns; None if it is unknown.
+        points: the person's joints in the image, from a detector; None without one.
     """
 
     silhouette: Silhouette | None = None
     image: Image | None = None
     depth_m: DepthImage | None = None
     stamp_ns: int | None = None
+    points: ImagePoints | None = None
 
 
 Observations = Sequence[Observation | None]

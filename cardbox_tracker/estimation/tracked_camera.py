@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
@@ -92,16 +94,19 @@ class TrackedCamera:
         if observation is None or observation.silhouette is None:
             nothing = np.zeros((self._camera.height, self._camera.width), np.uint8)
             return Frame(nothing, self._rows, 0, None, posture, depth_m, interval_s, stamp_ns)
+        points = observation.points
         self._check(observation)
         silhouette, image = observation.silhouette, observation.image
         if self.view is not None:
             silhouette, image = _upright(self.view, silhouette, image)
+            if points is not None:
+                points = replace(points, px=self.view.upright_px(points.px))
         if self._region is not None:
             silhouette = self._region.select(silhouette, posture, is_sure, image)
         upper = np.ascontiguousarray(silhouette[: self._rows])
         foreground_px = cv2.countNonZero(upper)
         seen = silhouette, self._rows, foreground_px, image
-        return Frame(*seen, posture, depth_m, interval_s, stamp_ns)
+        return Frame(*seen, posture, depth_m, interval_s, stamp_ns, points)
 
     def _check(self, observation: Observation) -> None:
         for name, pixels, most in (

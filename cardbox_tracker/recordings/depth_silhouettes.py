@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
+from cardbox_tracker.recordings.detector import Detector
+from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
 from cardbox_tracker.vision.empty_scene import brightness_of
@@ -29,18 +31,25 @@ class Within(NamedTuple):
 class DepthSilhouetteSource(SilhouetteSource):
     """One camera of a recording whose silhouettes are cut out by depth images."""
 
-    def __init__(self, bag: BagReader, within: Within, camera: str | None = None) -> None:
+    def __init__(
+        self,
+        bag: BagReader,
+        within: Within,
+        camera: str | None = None,
+        points: Detector | PointTable | None = None,
+    ) -> None:
         """Prepare to read.
 
         Args:
             bag: an open recording.
             within: depth topic and limit.
             camera: namespace of the camera; without it, the recording has only one.
+            points: source of the person's points in the images.
 
         Raises:
             BagError: the recording has no images.
             CameraError: the recording's camera is not calibrated.
-            CardboxError: the limit is out of range.
+            CardboxError: the limit is out of range, or ``points`` cannot be read.
         """
         least_m, most_m = WITHIN_LIMITS_M
         if not least_m <= within.metres <= most_m:
@@ -49,6 +58,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"{most_m:g} m, between the person and the wall"
             )
         self._open(bag, WORKING_SIZE, camera)
+        self._find_points(points, camera)
         self._within, self.depth_topic = within, within.topic
         self._without = 0
 
@@ -57,6 +67,8 @@ class DepthSilhouetteSource(SilhouetteSource):
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self._images(), depths]
         self._without = 0
+        if self._detector is not None:
+            self._detector.restart()
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
@@ -69,9 +81,9 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
-            yield RecordedFrame(
-                stamp_ns, time_s, brightness_of(image), silhouette, image, measured[1]
-            )
+            found = self._points(stamp_ns, image)
+            pictures = brightness_of(image), silhouette, image
+            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found)
 
     @property
     def remarks(self) -> list[str]:

@@ -17,7 +17,9 @@ from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
-from cardbox_tracker.recordings.detector_silhouettes import Detector, DetectorSilhouetteSource
+from cardbox_tracker.recordings.detector import Detector
+from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import DepthImage
@@ -59,7 +61,9 @@ class FrameSet(NamedTuple):
         seen = [
             Observation()
             if frame is None
-            else Observation(frame.silhouette, frame.image, stamp_ns=frame.stamp_ns)
+            else Observation(
+                frame.silhouette, frame.image, stamp_ns=frame.stamp_ns, points=frame.points
+            )
             for frame in self.frames
         ]
         seen[0] = replace(seen[0], depth_m=self.depth_m, stamp_ns=self.stamp_ns)
@@ -154,6 +158,7 @@ def open_recording(
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
     depth: str | None = None,
+    points: Detector | PointTable | None = None,
 ) -> Iterator[Recording]:
     """Open a recording, find the extrinsics of its cameras and learn their backgrounds.
 
@@ -164,11 +169,13 @@ def open_recording(
         cameras: namespaces, the first camera's first; empty if the recording has one camera.
         extrinsics: file of the poses, see :func:`load_extrinsics`.
         depth: see :class:`Recording`.
+        points: source of the person's points in the images; None for no points.
 
     Raises:
         BagError: the recording cannot be read, or lacks a camera.
         CameraError: extrinsics are missing or disagree, or a camera is not calibrated.
-        CardboxError: there are too many cameras, or a camera is given twice.
+        CardboxError: there are too many cameras, a camera is given twice, or ``points`` cannot be
+            read.
     """
     names = camera_names(cameras)
     if depth is not None and not cameras:
@@ -183,19 +190,23 @@ def open_recording(
         bags = [stack.enter_context(BagReader(path)) for _ in names or ("",)]
         found = extrinsics_of(bags[0], names, extrinsics)
         sources = [
-            _source(bag, background, name) for bag, name in zip(bags, names or (None,), strict=True)
+            _source(bag, background, name, points)
+            for bag, name in zip(bags, names or (None,), strict=True)
         ]
         yield Recording(names or ("",), sources, found, depth)
 
 
 def _source(
-    bag: BagReader, background: TimeSpan | Within | Detector, camera: str | None
+    bag: BagReader,
+    background: TimeSpan | Within | Detector,
+    camera: str | None,
+    points: Detector | PointTable | None,
 ) -> SilhouetteSource:
     if isinstance(background, Within):
-        return DepthSilhouetteSource(bag, background, camera)
+        return DepthSilhouetteSource(bag, background, camera, points)
     if isinstance(background, Detector):
-        return DetectorSilhouetteSource(bag, background, camera)
-    return SilhouetteSource(bag, background, camera=camera)
+        return DetectorSilhouetteSource(bag, background, camera, points)
+    return SilhouetteSource(bag, background, camera=camera, points=points)
 
 
 def stereo_of(left: Camera, others: Sequence[OtherCamera]) -> StereoDepth:

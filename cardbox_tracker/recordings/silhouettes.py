@@ -10,8 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.recordings.detector import Detector, FindPoints
+from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.empty_scene import brightness_of
@@ -68,6 +71,7 @@ class RecordedFrame(NamedTuple):
         image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it
             was not requested.
         depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
+        points: joints of the person in the image, from a detector; None without one.
     """
 
     stamp_ns: int
@@ -76,6 +80,7 @@ class RecordedFrame(NamedTuple):
     silhouette: NDArray[np.uint8]
     image: NDArray[np.uint8] | None = None
     depth_m: DepthImage | None = None
+    points: ImagePoints | None = None
 
     @property
     def picture(self) -> NDArray[np.uint8]:
@@ -102,6 +107,7 @@ class SilhouetteSource:
         config: BackgroundConfig | None = None,
         size: tuple[int, int] = WORKING_SIZE,
         camera: str | None = None,
+        points: Detector | PointTable | None = None,
     ) -> None:
         """Learn the empty scene from the first images of the span ``background``.
 
@@ -113,12 +119,15 @@ class SilhouetteSource:
             config: settings of the background model.
             size: working resolution (width, height), px.
             camera: namespace of the camera; without it, the recording has only one.
+            points: source of the person's points in the images.
 
         Raises:
             BagError: the span has too few images.
             CameraError: the recording's camera is not calibrated.
+            CardboxError: ``points`` cannot be read.
         """
         self._open(bag, size, camera, config)
+        self._find_points(points, camera)
         for _, time_s, image in self._images():
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
@@ -149,6 +158,16 @@ class SilhouetteSource:
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
 
+    def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
+        """Use a source of points."""
+        self._detector = points.start() if isinstance(points, Detector) else None
+        self._points: FindPoints = lambda stamp_ns, image: None
+        if self._detector is not None:
+            self._points = self._detector.points
+        elif isinstance(points, PointTable):
+            size = self.camera.width, self.camera.height
+            self._points = points.read(camera, self._pipeline.calibration, size)
+
     @property
     def path(self) -> Path:
         """The recording."""
@@ -168,12 +187,16 @@ class SilhouetteSource:
         """Yield every image from ``start_s`` to ``end_s`` in order."""
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
+        if self._detector is not None:
+            self._detector.restart()
         for stamp_ns, time_s, image in self._images():
             if time_s > end_s:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
-                yield RecordedFrame(stamp_ns, time_s, brightness_of(image), silhouette, image)
+                found = self._points(stamp_ns, image)
+                seen = brightness_of(image), silhouette, image
+                yield RecordedFrame(stamp_ns, time_s, *seen, points=found)
 
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
@@ -217,6 +240,8 @@ class SilhouetteSource:
                 f"{len(self._broken)} images cannot be decoded and are skipped; the first one is "
                 f"number {number}: {reason}"
             )
+        if self._detector is not None and self._detector.missed:
+            remarks.append(f"the detector finds nobody in {self._detector.missed} images")
         return remarks
 
     def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:

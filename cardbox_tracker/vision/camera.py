@@ -162,6 +162,23 @@ class Calibration:
             maps = cv2.initUndistortRectifyMap(k, self.distortion, np.eye(3), k, size, cv2.CV_16SC2)
         return Rectifier(*maps)
 
+    def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:
+        """Return where pixels (N, 2) of the calibrated image lie in the working image, px.
+
+        Raises:
+            CameraError: the camera is uncalibrated or its distortion model is unknown.
+        """
+        camera, rays = self.camera(width, height), np.empty((len(px), 2))
+        if not self.is_distorted:
+            rays[:] = (px - self.k[:2, 2]) / self.k.diagonal()[:2]
+        elif self.distortion_model == "equidistant":
+            lens = self.distortion[:4].reshape(4, 1)
+            rays[:] = cv2.fisheye.undistortPoints(px[:, None], self.k, lens).reshape(-1, 2)
+        else:
+            rays[:] = cv2.undistortPoints(px[:, None], self.k, self.distortion).reshape(-1, 2)
+        placed: FloatArray = rays * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+        return placed
+
     def _check(self) -> None:
         size = (self.width, self.height)
         if not all(0 < side <= _MOST_SIDE_PX for side in size):

@@ -12,7 +12,7 @@ import yaml
 from cardbox_tracker.detection.model_files import ModelFiles
 from cardbox_tracker.detection.pose_network import Detection
 from cardbox_tracker.errors import BagError, CameraError, CardboxError
-from cardbox_tracker.recordings import detector_silhouettes
+from cardbox_tracker.recordings import detector as detector_module
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.depth_silhouettes import Within
@@ -206,8 +206,8 @@ def test_the_masks_of_a_detector_are_the_silhouettes(
             mask[: len(mask) // 2] = 128
             return Detection(np.zeros((33, 2)), np.ones(33), mask)
 
-    monkeypatch.setattr(detector_silhouettes, "PoseNetwork", Network)
-    detector = detector_silhouettes.Detector(ModelFiles(tmp_path / "a", tmp_path / "b"))
+    monkeypatch.setattr(detector_module, "PoseNetwork", Network)
+    detector = detector_module.Detector(ModelFiles(tmp_path / "a", tmp_path / "b"))
     with open_recording(two, detector, ["one"]) as source:
         frames = list(source.first.frames())
         # Of ten images the first six show the empty scene.

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
@@ -65,6 +66,7 @@ class Frame:
             without a depth image.
         interval_s: time since the previous frame, s.
         stamp_ns: time of the frame, ns; None if it is unknown.
+        points: the person's joints in the image, from a detector; None without one.
     """
 
     silhouette: Silhouette
@@ -75,6 +77,7 @@ class Frame:
     depth_m: DepthImage | None = None
     interval_s: float = USUAL_INTERVAL_S
     stamp_ns: int | None = None
+    points: ImagePoints | None = None
 
 
 class TermObservation(Protocol):

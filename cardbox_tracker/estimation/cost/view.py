@@ -57,6 +57,7 @@ class View:
         offset_m: translation from the first level frame into its own, after the rotation, (3,).
         turn: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None
             if the camera stands upright.
+        raw_px: map from pixels of the upright image to those of the camera's image, (2, 3).
         turned: (14, 14).
         moved: (14,).
     """
@@ -66,6 +67,7 @@ class View:
     yaw_rad: float
     offset_m: FloatArray
     turn: NDArray[np.int16] | None
+    raw_px: FloatArray
     turned: FloatArray
     moved: FloatArray
 
@@ -90,7 +92,7 @@ class View:
         upright = other.camera.with_pitch(pitch_rad)
         turned = axes @ (upright.reference_to_optical_rotation() @ level).T
         roll_rad = atan2(float(turned[1, 0]), float(turned[0, 0]))
-        upright, turn = _upright(upright, roll_rad)
+        upright, turn, raw_px = _upright(upright, roll_rad)
         offset_m = level @ (axes.T @ other.extrinsics.translation_m)
         place = body.placement
         hips = np.array([-place.distance_m, place.lateral_m, place.hip_height_m])
@@ -114,7 +116,7 @@ class View:
         moved[TORSO_Y] = offset_m[1] + s * place.distance_m
         moved[TORSO_Z] = offset_m[2] + place.hip_height_m - there.placement.hip_height_m
         moved[YAW] = -yaw_rad
-        return cls(there, upright, yaw_rad, offset_m, turn, turned, moved)
+        return cls(there, upright, yaw_rad, offset_m, turn, raw_px, turned, moved)
 
     def states(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) or (14,) of the first camera in the frame of this camera."""
@@ -156,6 +158,12 @@ class View:
         whole[top : top + height, left : left + width] = turned
         return whole
 
+    def upright_px(self, px: FloatArray) -> FloatArray:
+        """Return where pixels (N, 2) of the camera's image lie in the upright image."""
+        linear, shift = self.raw_px[:, :2], self.raw_px[:, 2]
+        turned: FloatArray = (px - shift) @ np.linalg.inv(linear).T.astype(np.float64)
+        return turned
+
     def level_axes(self) -> FloatArray:
         """Return the rotation (3, 3) from the first level frame into the upright optical frame."""
         axes: FloatArray = self.camera.reference_to_optical_rotation() @ _about_vertical(
@@ -181,10 +189,12 @@ def _about_vertical(yaw_rad: float) -> FloatArray:
     return np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
 
 
-def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, NDArray[np.int16] | None]:
+def _upright(
+    camera: Camera, roll_rad: float
+) -> tuple[Camera, NDArray[np.int16] | None, FloatArray]:
     """Return the camera without its roll ``roll_rad``, and the source of each upright pixel."""
     if abs(roll_rad) < _UPRIGHT_RAD:
-        return camera, None
+        return camera, None, np.eye(2, 3)
     c, s = cos(roll_rad), sin(roll_rad)
     # The orientation (landscape or portrait) that needs less rotation keeps most of the image.
     if abs(s) > abs(c):
@@ -203,4 +213,4 @@ def _upright(camera: Camera, roll_rad: float) -> tuple[Camera, NDArray[np.int16]
     shift = middle - linear @ middle_upright
     grid = np.stack(np.meshgrid(np.arange(upright.width), np.arange(upright.height)), -1)
     turn = np.rint(grid @ linear.T + shift).astype(np.int16)
-    return replace(upright, cx=cx, cy=cy), turn
+    return replace(upright, cx=cx, cy=cy), turn, np.column_stack([linear, shift])
