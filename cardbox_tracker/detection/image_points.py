@@ -42,6 +42,8 @@ class ImagePoints:
         px: column and row of each of ``POINT_NAMES``, (17, 2); (0, 0) is the centre of the first
             pixel. A point that is not known is nan.
         scores: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known.
+        stamp_ns: stamp of the image, ns; points may be older than the image they are used with.
+            None if they are of the same image.
 
     Raises:
         ValueError: the arrays have another shape.
@@ -49,6 +51,7 @@ class ImagePoints:
 
     px: FloatArray
     scores: FloatArray
+    stamp_ns: int | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes; points that are not finite get the score 0, and others 0 to 1."""
@@ -65,14 +68,16 @@ class ImagePoints:
         object.__setattr__(self, "scores", np.where(known, np.clip(scores, 0.0, 1.0), 0.0))
 
     @classmethod
-    def of(cls, found: Mapping[str, tuple[float, float, float]]) -> ImagePoints:
+    def of(
+        cls, found: Mapping[str, tuple[float, float, float]], stamp_ns: int | None = None
+    ) -> ImagePoints:
         """Return the points with column, row and score by name; other names are not used."""
         px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
         for name, (column, row, score) in found.items():
             if name in POINT_INDEX:
                 index = POINT_INDEX[name]
                 px[index], scores[index] = (column, row), score
-        return cls(px, scores)
+        return cls(px, scores, stamp_ns)
 
     @property
     def is_empty(self) -> bool:
