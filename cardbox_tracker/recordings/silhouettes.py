@@ -158,8 +158,14 @@ class SilhouetteSource:
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
 
+    @property
+    def has_points(self) -> bool:
+        """Whether the frames can have points of the person."""
+        return self._has_points
+
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
+        self._has_points = points is not None
         self._detector = points.start() if isinstance(points, Detector) else None
         self._points: FindPoints = lambda stamp_ns, image: None
         if self._detector is not None:

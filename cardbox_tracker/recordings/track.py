@@ -13,6 +13,7 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
@@ -34,6 +35,9 @@ CSV_HEADER = (
     *(metric.name for metric in METRICS),
     *JOINT_STATE_NAMES[PLACE],
 )
+
+NECK_COLUMNS = NECK_NAMES
+"""Columns that follow ``CSV_HEADER`` if the recording has points of the person."""
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
@@ -109,12 +113,12 @@ def track_recording(
     ious: list[float] = []
     frames = frames_uncertain = 0
     with ExitStack() as stack:
-        rows = None
+        rows, has_points = None, recording.first.has_points
         if files.csv is not None:
             path = stack.enter_context(atomic_path(files.csv))
             table = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
             rows = csv.writer(table, lineterminator="\n")
-            rows.writerow(CSV_HEADER)
+            rows.writerow((*CSV_HEADER, *NECK_COLUMNS) if has_points else CSV_HEADER)
         draw = None
         if files.video is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
@@ -124,7 +128,8 @@ def track_recording(
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
             if rows is not None:
-                rows.writerow(csv_row(frame.stamp_ns, estimate))
+                neck = _neck_fields(estimate) if has_points else []
+                rows.writerow([*csv_row(frame.stamp_ns, estimate), *neck])
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
@@ -148,6 +153,12 @@ def track_recording(
         tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(recording.names[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
+
+
+def _neck_fields(estimate: Estimate) -> list[str]:
+    if estimate.neck is None:
+        return [""] * len(NECK_COLUMNS)
+    return [f"{value:.6f}" for value in estimate.neck]
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
