@@ -185,7 +185,7 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m
+    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m, estimate.neck
     return Markers(marker_shapes(*seen))
 
 

@@ -43,6 +43,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
         self._open(bag, WORKING_SIZE, camera)
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
+        self._has_points = points is not None
         self._detector = self._person = detector.start()
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
