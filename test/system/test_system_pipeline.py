@@ -306,7 +306,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     assert keypoints[-1].header.frame_id == "test_optical"
     points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
     body, camera = session.scene.body, session.scene.camera
-    posture, place = np.split(np.array(state.position), [len(JOINT_NAMES)])
+    posture, place, _ = np.split(np.array(state.position), [len(JOINT_NAMES), N_STATE])
     placed = Estimate("tracking", posture, offset_m=place).placed(body)
     expected = camera.reference_to_optical(keypoints_m(placed, posture))
     assert points.shape == (6, 3)
