@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import atan, degrees, radians, tan
 from pathlib import Path
 
 from cardbox_tracker.errors import CameraError
@@ -10,6 +11,8 @@ from cardbox_tracker.vision.camera import Calibration, load_calibration
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02
+# No usual phone held upright has so large a field of view across its image, degrees.
+_UPRIGHT_DEG = 55.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,17 @@ class GivenCamera:
                 "upright), or --calibration FILE of camera_calibration"
             )
         return self.rolled(replace(found, frame_id=frame_id or found.frame_id))
+
+    def remarks(self, width: int, height: int) -> list[str]:
+        """Return a remark if the field of view seems to be that of the longer side."""
+        if self.fov_deg is None or height <= width or self.fov_deg < _UPRIGHT_DEG:
+            return []
+        tall_deg = 2 * degrees(atan(tan(radians(self.fov_deg) / 2) * height / width))
+        return [
+            f"--fov {self.fov_deg:g} is across the width of these upright images, which makes "
+            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 70 there, for which "
+            "--fov is 36 to 43"
+        ]
 
     def rolled(self, calibration: Calibration) -> Calibration:
         """Return the calibration with the given roll."""

@@ -47,7 +47,6 @@ class ImageFolder:
     """
 
     start_ns = 0
-    remarks = ()
 
     def __init__(self, path: Path, camera: GivenCamera) -> None:
         """Store the path and the camera; the folder is read on entry."""
@@ -96,6 +95,11 @@ class ImageFolder:
         """
         self.image_topic(camera)
         return self._given.calibrated(self.path, *self._size)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about the field of view."""
+        return self._given.remarks(*self._size)
 
 
 def _image(file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:

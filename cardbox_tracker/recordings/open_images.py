@@ -34,6 +34,8 @@ def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None)
     """
     path, camera = Path(path), camera or GivenCamera()
     if is_bag(path):
+        if camera.fps is not None:
+            raise BagError(f"--fps has no effect on {path}: the images of a bag have stamps")
         return BagReader(path, camera)
     if path.is_dir():
         if image_files(path):

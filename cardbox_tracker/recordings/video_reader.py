@@ -111,13 +111,14 @@ class VideoReader:
 
     @property
     def remarks(self) -> list[str]:
-        """A remark if the video ended early."""
+        """Warnings about the field of view, and about a video that ends early."""
+        found = self._given.remarks(*self._size)
         if 0 < self._last < self._count - _LACKING:
-            return [
+            found.append(
                 f"{self.path} ends after {self._last} of {self._count} images; it is damaged or "
                 "was cut off"
-            ]
-        return []
+            )
+        return found
 
 
 @contextmanager
