@@ -48,6 +48,8 @@ _SURE = np.radians(7.0)
 # A line that is further from upright is that of a person who leans, rad. A roll below the second
 # limit, or below so many standard deviations, can be the person's own.
 _LEANS, _LEAST_ROLL, _SURE_ROLL = np.radians(10.0), np.radians(2.0), 2.0
+# Three standard deviations: a fit with more explains a person who sits or bows, rad.
+_MOST_PITCH = 3 * _PITCH_PRIOR
 # Root mean square of the residuals, in standard deviations, of a person who stands upright.
 _MOST_RESIDUAL = 2.5
 _LEAST_LEVELS, _LEAST_SCORE = 3, 0.5
@@ -127,7 +129,8 @@ def standing_camera(points: Mapping[str, FloatArray], camera: Camera) -> Standin
             break
     wrong = float(np.sqrt(np.mean(_residuals(fit, levels, rays) ** 2)))
     # Values that are not finite are refused, too.
-    if not (wrong < _MOST_RESIDUAL and abs(fit[_ROLL]) < _LEANS):
+    is_plausible = abs(fit[_ROLL]) < _LEANS and abs(fit[_PITCH]) < _MOST_PITCH
+    if not (wrong < _MOST_RESIDUAL and is_plausible):
         return None
     stddevs = np.sqrt(np.linalg.inv(jacobian.T @ jacobian).diagonal())
     is_found = bool(stddevs[_PITCH] < _SURE)

@@ -9,7 +9,7 @@ from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource
-from cardbox_tracker.vision.learning import PersonInViewLearning
+from cardbox_tracker.vision.learning import Learning, PersonInViewLearning
 
 # A standing person sways too slowly to be seen in images at a higher rate than the live nodes'.
 _LEARNING_HZ = 15.0
@@ -52,12 +52,20 @@ class PersonInViewSource(SilhouetteSource):
             if learning.has_enough():
                 break
         if not learning.has_enough():
-            hidden = learning.values()["hidden by the person (% of the image)"]
-            raise CardboxError(
-                f"{hidden} % of the images of {bag.path} is hidden by the person all the time, so "
-                "the scene behind is unknown. The person must step aside by twice their width for "
-                f"{2 * learning.images / _LEARNING_HZ:.0f} s, or leave the image; for this "
-                "recording give --detector mediapipe, which needs no scene, or --background T0:T1 "
-                "if nobody is in view for a while"
-            )
+            raise CardboxError(self._missing(learning))
         self._pipeline.finish_learning()
+
+    def _missing(self, learning: Learning) -> str:
+        """Return which part of the scene was not seen, and the remedy."""
+        needed_s = learning.images / _LEARNING_HZ
+        if learning.count < learning.images:
+            what = f"{self.path} has less than {needed_s:.0f} s"
+        else:
+            hidden = learning.values()["hidden by the person (% of the image)"]
+            what = f"the person hides {hidden} % of {self.path} all the time"
+        return (
+            f"{what}, so the scene behind them is unknown. Film someone who steps aside by twice "
+            f"their width for {2 * needed_s:.0f} s, or leaves the image; for this recording give "
+            "--detector mediapipe, which needs no scene, or --background T0:T1 if nobody is in "
+            "view for a while"
+        )

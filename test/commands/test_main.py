@@ -71,7 +71,7 @@ def test_version(cardbox: Callable) -> None:
     [
         ((), "required: COMMAND"),
         (("dance",), "invalid choice: 'dance'"),
-        (("track",), "required: BAG, --model, --start, --csv"),
+        (("track",), "required: RECORDING"),
         (("synthesize",), "required: --output"),
         (("urdf",), "required: MODEL.yaml"),
     ],
