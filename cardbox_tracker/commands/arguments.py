@@ -38,20 +38,24 @@ def add_retired(parser: argparse.ArgumentParser, flag: str, instead: str) -> Non
 
 
 def add_recording(
-    parser: argparse.ArgumentParser, required: bool = True, needs_background: bool = True
+    parser: argparse.ArgumentParser, required: bool = True, only_bags: bool = True
 ) -> None:
-    """Add the recording to read and the span in which its background is learned."""
+    """Add the recording to read and the span in which its background is learned.
+
+    The span may be missing unless there are ``only_bags``.
+    """
+    bag = "rosbag2 folder or file"
     parser.add_argument(
         "recording",
         type=Path,
         nargs=None if required else "?",
-        metavar="RECORDING",
-        help="rosbag2 folder or file, video, or folder of JPEG or PNG images",
+        metavar="BAG" if only_bags else "RECORDING",
+        help=bag if only_bags else f"{bag}, video, or folder of JPEG or PNG images",
     )
     parser.add_argument(
         "--background",
         type=span,
-        required=needs_background,
+        required=only_bags,
         default=None,
         metavar="T0:T1",
         help="seconds during which nobody is in view",
@@ -234,14 +238,15 @@ def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
     )
 
 
-def add_camera_pitch(parser: argparse.ArgumentParser, default: str = "0") -> None:
-    """Add ``--camera-pitch-deg``; ``default`` says what holds without it."""
+def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
+    """Add ``--camera-pitch-deg``, None by default if ``found`` says how it is found, else 0."""
+    text = "positive when the camera looks down"
     parser.add_argument(
         "--camera-pitch-deg",
         type=float,
-        default=None,
+        default=None if found else 0.0,
         metavar="P",
-        help=f"positive when the camera looks down (default: {default})",
+        help=f"{text} (default: {found})" if found else text,
     )
 
 

@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
         options.distance,
         options.shoulder_breadth,
         options.hip_height,
-        math.radians(options.camera_pitch_deg or 0.0),
+        math.radians(options.camera_pitch_deg),
     )
     save_body_model(body, options.output)
     print(body)

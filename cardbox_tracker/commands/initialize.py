@@ -31,7 +31,7 @@ _GUESSED_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser, needs_background=False)
+    add_recording(parser, only_bags=False)
     add_cameras(parser)
     add_depth(parser)
     add_detector(parser)

@@ -74,7 +74,7 @@ def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
     Without ``required``, the recording may be missing, or be a bag of results without further
     arguments.
     """
-    add_recording(parser, required, needs_background=False)
+    add_recording(parser, required, only_bags=False)
     add_cameras(parser)
     add_depth(parser)
     add_detector(parser)

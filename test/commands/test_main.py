@@ -20,6 +20,7 @@ NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
 SHARED = {
     *("output_paths", "__init__", "arguments", "checkout", "command", "main"),
+    *("camera_arguments", "person_arguments"),
     "settings_arguments",
 }
 
