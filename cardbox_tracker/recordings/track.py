@@ -17,7 +17,7 @@ from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
@@ -43,6 +43,8 @@ Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
 
 _VIDEO_SCALE = 2
+# Rate of a video of a single image.
+_USUAL_HZ = 15.0
 
 
 class TrackFiles(NamedTuple):
@@ -51,12 +53,12 @@ class TrackFiles(NamedTuple):
     Attributes:
         csv: table with one row for each image.
         video: overlay video.
-        fps: frames per second of the video.
+        fps: frames per second of the video; None for the rate of the recording.
     """
 
     csv: Path | None = None
     video: Path | None = None
-    fps: float = 15.0
+    fps: float | None = None
 
 
 _NO_FILES = TrackFiles()
@@ -73,6 +75,7 @@ class TrackSummary:
         mean_iou: mean overlap (IoU) over the tracked images; nan without any.
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics that seem to be wrong.
+        body: the body at the end, whose unknown values were fitted.
     """
 
     frames: int
@@ -81,6 +84,7 @@ class TrackSummary:
     mean_iou: float
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
+    body: BodyModel | None = None
 
 
 def track_recording(
@@ -99,8 +103,8 @@ def track_recording(
         body: the measured person.
         config: settings of the tracker.
         seed: random seed; the same recording and seed give the same bytes.
-        start_s: seconds from the bag's start at which the person stands in the front reference
-            posture.
+        start_s: seconds from the recording's start at which the person stands in the front
+            reference posture.
         files: files to write; the table is written atomically.
         observers: called after each image, such as a progress bar or a bag writer.
 
@@ -122,7 +126,7 @@ def track_recording(
         draw = None
         if files.video is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
-            draw = stack.enter_context(video_file(files.video, size, files.fps))
+            draw = stack.enter_context(video_file(files.video, size, files.fps or _rate(recording)))
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
@@ -145,14 +149,22 @@ def track_recording(
                 tracker.agreement.check()
         if frames == 0:
             raise CardboxError(
-                f"no image lies after --start {start_s:g} s; give seconds from the bag's start"
+                f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks: list[str] = []
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(recording.names[1:])
-    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
+    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
+
+
+def _rate(recording: Recording) -> float:
+    """Return the images a second, Hz, as exactly as a video can have them."""
+    try:
+        return round(1e9 / max(1, recording.first.period_ns()), 2)
+    except BagError:
+        return _USUAL_HZ
 
 
 def _neck_fields(estimate: Estimate) -> list[str]:
