@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -69,9 +68,6 @@ class LiveParameters(Generic[T]):
 
     def _declare(self, name: str) -> Any:
         spec, type_ = self._specs[name], self._types[name]
-        default: Any = _LIST_TYPES.get(type_)
-        if default is None:
-            default = getattr(self._kind, name)
         given = self._given(name)
         if spec.was:
             given = self._given_before(name, spec.was, given)
@@ -82,18 +78,29 @@ class LiveParameters(Generic[T]):
             )
         if given is not None:
             self._check_limits(name, given)
+        elif type_ in _LIST_TYPES:
+            self._declare_empty_list(name)
+            return []
+        default = getattr(self._kind, name) if given is None else given
         try:
             self._node.declare_parameter(
-                name,
-                default if given is None else given,
-                descriptor(spec, type_),
-                ignore_override=True,
+                name, default, descriptor(spec, type_), ignore_override=True
             )
             return _plain(self._node.get_parameter(name).value)
-        except ParameterUninitializedException:
-            return []
         except Exception as error:
             raise self._refusal(f"{error}. {name} is {spec.description}") from None
+
+    def _declare_empty_list(self, name: str) -> None:
+        """Declare a list with the value []; rclpy alone would take it for a list of bytes.
+
+        An unset list would be simpler, but then a request for all parameters gets no values.
+        """
+        type_ = self._types[name]
+        list_type, described = _LIST_TYPES[type_], descriptor(self._specs[name], type_)
+        described.type = list_type.value
+        self._node.declare_parameter(name, list_type, ignore_override=True)
+        self._node.set_parameters([Parameter(name, list_type, [])])
+        self._node.set_descriptor(name, described)
 
     def _check_limits(self, name: str, given: Any) -> None:
         """Refuse a value out of range with a clearer text than rclpy's."""
