@@ -6,7 +6,6 @@ validated instance. A wrong value is refused with the reason, and the old value 
 
 from __future__ import annotations
 
-import difflib
 from array import array
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
-from cardbox_tracker.settings import check
+from cardbox_tracker.settings import check, suggestion
 
 T = TypeVar("T", bound=NodeParameters)
 
@@ -150,12 +149,10 @@ class LiveParameters(Generic[T]):
                 raise self._refusal(f"'{name}' was removed: {self._kind.retired[name]}")
             if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
-            near = difflib.get_close_matches(name, self._specs, 1)
             self._node.get_logger().warning(
                 f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
-                "effect; "
-                + (f"did you mean '{near[0]}'? " if near else "")
-                + "see 'ros2 param list' or docs/parameters.md for all names"
+                f"effect; {suggestion(name, self._specs)}see 'ros2 param list' or "
+                "docs/parameters.md for all names"
             )
 
     def _refusal(self, problem: str) -> CardboxError:
