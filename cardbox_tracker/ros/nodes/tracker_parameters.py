@@ -183,7 +183,11 @@ class TrackerParameters(NodeParameters):
         try:
             return base.changed(nested(self._given()))
         except NoEffectError as error:
-            raise ValueError(error.renamed(_PARAMETERS)) from None
+            name = _PARAMETERS[error.name]
+            raise ValueError(
+                f"{error.renamed(_PARAMETERS)}; to change the preset, first set {name} back to its "
+                f"default, {getattr(type(self), name)}"
+            ) from None
 
     def _given(self) -> dict[str, Any]:
         """Return the values that differ from the defaults, by the names of the core's settings."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -437,6 +438,16 @@ def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
 def test_a_parameter_without_effect_is_refused_at_the_start(make_node: Callable) -> None:
     with pytest.raises(CardboxError, match=r"particles has no effect.*use effort"):
         LiveParameters(make_node("-p", "particles:=300"), TrackerParameters)
+
+
+def test_a_preset_is_refused_with_the_parameter_to_reset_first(make_node: Callable) -> None:
+    """'ros2 param set' sets one parameter after another, so the order matters."""
+    node = make_node("-p", "preset:=paper", "-p", "particles:=100")
+    live = LiveParameters(node, TrackerParameters)
+    accepted, reason = set_values(node, preset="default")
+    assert not accepted and re.search(r"set particles back to its default, 0", reason)
+    assert set_values(node, particles=0) == set_values(node, preset="default") == (True, "")
+    assert live.value == TrackerParameters()
 
 
 def test_a_parameter_without_effect_is_refused_live(make_node: Callable) -> None:
