@@ -23,6 +23,7 @@ import pytest
         ),
         (("--particles", "1"), "--particles: expected a whole number of 2 or more, got '1'"),
         (("--particles", "100"), "--particles has no effect with the filter whole_body"),
+        (("--particles", "200"), "--particles has no effect with the filter whole_body"),
         (("--particles", "100"), "use --effort"),
         (("--strategy", "srs"), "use --effort"),
         (("--effort", "5"), "--effort is 5; expected 0.25 to 4"),
@@ -76,6 +77,7 @@ def test_mistakes_of_track(
     [
         (("--particles=9999999999",), "--particles is 1e+10; expected 2 to 1e+06"),
         (("--effort=0.5",), "--effort has no effect with the filter hierarchical (preset paper)"),
+        (("--effort=1",), "--effort has no effect with the filter hierarchical (preset paper)"),
         (("--effort=0.5",), "use --particles"),
         (("--corrector=none",), "--corrector has no effect"),
     ],
