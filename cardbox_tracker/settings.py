@@ -7,7 +7,7 @@ nodes and their documentation are generated from these fields.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -115,6 +115,25 @@ def settings_of(kind: Any) -> dict[str, Setting]:
         for entry in fields(kind)
         if "setting" in entry.metadata
     }
+
+
+def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, Setting]]:
+    """Yield dotted name, value and properties of every setting, also of nested ones.
+
+    Args:
+        instance: the settings.
+        before: prefix of the names, such as ``whole_body.``.
+    """
+    known = settings_of(instance)
+    for entry in fields(instance):
+        name, value = f"{before}{entry.name}", getattr(instance, entry.name)
+        if isinstance(value, tuple):
+            for one in value:
+                yield from settings_below(one, f"{name}.{type(one).__name__}.")
+        elif is_dataclass(value):
+            yield from settings_below(value, f"{name}.")
+        else:
+            yield name, value, known[entry.name]
 
 
 def check(instance: Any) -> None:
