@@ -30,7 +30,7 @@ import pytest
         (("--output-smoothing-s", "-1"), "--output-smoothing-s is -1; expected 0 to 10"),
         (("--corrector", "best"), "corrector is 'best'; expected learned, none, FILE.npz or"),
         (("--corrector", "FOLDER/missing.npz"), "missing.npz: No such file"),
-        (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file"),
+        (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give a"),
         (("--settings", "FOLDER/list.yaml"), "list.yaml: expected names and values"),
         (("--settings", "FOLDER/person.yaml"), "person.yaml: 'format' is no setting; "),
         (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),
