@@ -1,10 +1,12 @@
 """Settings of the tracker in a YAML file, by the names that they have in ``TrackerConfig``.
 
-lost_frames: 10
-whole_body:
-effort: 0.5
-cost:
-yaw_deg: 20.0
+    lost_frames: 10
+    whole_body:
+      effort: 0.5
+      cost:
+        yaw_deg: 20.0
+
+docs/parameters.md has all names.
 """
 
 from __future__ import annotations
