@@ -85,7 +85,8 @@ def run(options: argparse.Namespace) -> None:
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    inputs = options.recording, options.extrinsics
+    points = None if options.detector is None else Path(options.detector)
+    inputs = options.recording, options.extrinsics, points
     check_outputs((options.output,), options.force, inputs=inputs)
     if None not in (options.depth, options.distance) and options.within is None:
         raise CardboxError(

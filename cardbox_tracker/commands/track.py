@@ -105,7 +105,10 @@ def run(options: argparse.Namespace) -> None:
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
     """Return the files that the arguments of :func:`add_inputs` name."""
-    return options.recording, options.model, options.extrinsics, options.settings
+    # These two may also be words, which name no file.
+    words = options.detector, options.corrector
+    files = options.recording, options.model, options.extrinsics, options.settings
+    return *files, *(Path(word) for word in words if word)
 
 
 def track_inputs(

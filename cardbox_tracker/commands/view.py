@@ -51,7 +51,8 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
-    check_outputs((options.save,), options.force, inputs=inputs_of(options))
+    inputs = *inputs_of(options), options.truth
+    check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
     is_result = not options.live and _holds_results(options)
     truth = None if options.live else _truth_of(options)

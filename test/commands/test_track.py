@@ -111,6 +111,16 @@ def test_a_background_or_depth_tells_the_person_from_the_scene(
     assert not (files / "out.csv").exists()
 
 
+@pytest.mark.parametrize("option", ["--detector", "--corrector", "--settings"])
+def test_a_file_that_is_read_is_not_replaced(files: Path, option: str, cardbox: Callable) -> None:
+    table = files / "text.txt"
+    before = table.read_bytes()
+    given = ("--background=0:3.9", f"--model={files / 'person.yaml'}", "--start=15.6", "--force")
+    done = cardbox("track", files / "session", *given, f"{option}={table}", f"--csv={table}")
+    done.assert_refused("track", "text.txt: it is read, as")
+    assert table.read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
