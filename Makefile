@@ -60,7 +60,7 @@ $(VENV)/package: $(VENV)/dependencies $(NAMES) $(SOURCES) setup.py setup.cfg pyp
 	@touch $@
 
 $(VENV)/compiled: $(VENV)/package
-	@echo "compiling the tracker's inner loop, once, for about a minute"
+	@echo "compiling the tracker's inner loop, once, for one to two minutes"
 	cd $(VENV) && $(BIN)/python -m cardbox_tracker.estimation.precompile
 	@touch $@
 

@@ -128,7 +128,7 @@ def _cache_of(function: Callable[..., Any]) -> _Cache | None:
         finally:
             config.CACHE_DIR = before
     _say(
-        "compiled code cannot be kept, so that each start compiles for a minute; set "
+        "compiled code cannot be kept, so that each start compiles for one to two minutes; set "
         "NUMBA_CACHE_DIR to a folder that only you can write to"
     )
     return None

@@ -7,7 +7,7 @@ nodes and their documentation are generated from these fields.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -117,6 +117,25 @@ def settings_of(kind: Any) -> dict[str, Setting]:
     }
 
 
+def settings_below(instance: Any, before: str = "") -> Iterator[tuple[str, Any, Setting]]:
+    """Yield dotted name, value and properties of every setting, also of nested ones.
+
+    Args:
+        instance: the settings.
+        before: prefix of the names, such as ``whole_body.``.
+    """
+    known = settings_of(instance)
+    for entry in fields(instance):
+        name, value = f"{before}{entry.name}", getattr(instance, entry.name)
+        if isinstance(value, tuple):
+            for one in value:
+                yield from settings_below(one, f"{name}.{type(one).__name__}.")
+        elif is_dataclass(value):
+            yield from settings_below(value, f"{name}.")
+        else:
+            yield name, value, known[entry.name]
+
+
 def check(instance: Any) -> None:
     """Check every setting of a dataclass instance.
 
@@ -194,11 +213,16 @@ def _changed_parts(before: tuple[Any, ...], given: Any, where: str) -> tuple[Any
 def _check_name(name: Any, known: Mapping[str, Any], where: str) -> None:
     if name in known:
         return
-    near = difflib.get_close_matches(str(name), known, 1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
     raise ValueError(
-        f"'{where}{name}' is no setting; {hint}expected one of {', '.join(known) or 'none'}"
+        f"'{where}{name}' is no setting; {suggestion(name, known)}expected one of "
+        f"{', '.join(known) or 'none'}"
     )
+
+
+def suggestion(name: object, known: Iterable[str]) -> str:
+    """Return "did you mean ...? " with the known name nearest to ``name``; empty without one."""
+    near = difflib.get_close_matches(str(name), list(known), 1)
+    return f"did you mean '{near[0]}'? " if near else ""
 
 
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from cardbox_tracker.ros.nodes.rula_node import RulaParameters
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, ParameterSpec
-from cardbox_tracker.settings import settings_of
+from cardbox_tracker.settings import settings_below
 
 _GENERATED = (
     "made by 'python -m tools.parameter_docs'; edit the settings and ros/nodes/*_parameters.py"
@@ -148,21 +147,13 @@ def _settings_section() -> list[str]:
     return lines + list(_settings_rows(TrackerConfig(terms=(InnerCue(), Depth()))))
 
 
-def _settings_rows(settings: Any, before: str = "") -> Iterator[str]:
-    known = settings_of(settings)
-    for entry in fields(settings):
-        name, value = f"{before}{entry.name}", getattr(settings, entry.name)
-        if isinstance(value, tuple):
-            for one in value:
-                yield from _settings_rows(one, f"{name}.{type(one).__name__}.")
-        elif is_dataclass(value):
-            yield from _settings_rows(value, f"{name}.")
-        else:
-            spec, allowed = known[entry.name], known[entry.name].range_text.replace("|", "\\|")
-            yield (
-                f"| `{name}` | {type(value).__name__} | `{yaml_value(value)}` | {spec.unit} "
-                f"| {allowed} | {spec.description} |"
-            )
+def _settings_rows(settings: Any) -> Iterator[str]:
+    for name, value, spec in settings_below(settings):
+        allowed = spec.range_text.replace("|", "\\|")
+        yield (
+            f"| `{name}` | {type(value).__name__} | `{yaml_value(value)}` | {spec.unit} "
+            f"| {allowed} | {spec.description} |"
+        )
 
 
 def files() -> dict[str, str]:

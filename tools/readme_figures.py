@@ -68,7 +68,7 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
     """Return the table of accuracy.
 
     Args:
-        results: ``sessions.json``, the rendered recordings; its means are the first row.
+        results: ``sessions.json``, the rendered recordings; its means are the last row.
         others: rows of ``accuracy.json``, errors in cm; a pair is a range, null is not measured.
     """
     sessions = results["sessions"]
@@ -81,10 +81,10 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
         mean_of(session["runs"], "aligned") < peer
         for session, peer in zip(sessions, peers, strict=True)
     )
-    first = {
-        "people": f"rendered like those that the correction learned from ({len(sessions)} "
-        "recordings)",
+    rendered = {
+        "people": f"rendered ({len(sessions)} recordings)",
         "cameras": "one",
+        "left_out": "recording; used in development",
         "aligned": means["aligned"],
         "mediapipe": float(np.mean(peers)),
         "absolute": means["absolute"],
@@ -95,17 +95,18 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
             f"Mean 3D error of shoulders, elbows and hands, preset `default`, "
             f"{len(results['seeds'])} seeds. *Aligned* is the error after both skeletons are "
             "shifted to the middle of their shoulders, because MediaPipe Pose (one camera) has no "
-            "metric place:"
+            "metric place. *Left out* says what of a row was not among the data that priors and "
+            "correction learned from:"
         ),
         "",
-        "| people | cameras | aligned | MediaPipe | absolute | measured on |",
-        "|---|---|---|---|---|---|",
-        *(_accuracy_row(row) for row in (first, *others)),
+        "| people | cameras | left out | aligned | MediaPipe | absolute | measured on |",
+        "|---|---|---|---|---|---|---|",
+        *(_accuracy_row(row) for row in (*others, rendered)),
         "",
         *_wrapped(
             f"The aligned error is below MediaPipe's on {better} of the {len(sessions)} rendered "
-            f"recordings. An image takes {means['ms']:.1f} ms from silhouette and image to "
-            "posture, on one core."
+            f"recordings of the last row. An image takes {means['ms']:.1f} ms from silhouette "
+            "and image to posture, on one core."
         ),
     ]
     return "\n".join(lines)
@@ -168,8 +169,8 @@ def _accuracy_row(row: Mapping[str, Any]) -> str:
         without = row["without_correction"]
         aligned += f" ({without[0]:.1f} without the correction)"
         absolute += f" ({without[1]:.1f})"
-    figures = (aligned, _range(row["mediapipe"]), absolute)
-    return f"| {row['people']} | {row['cameras']} | {' | '.join(figures)} | {row['source']} |"
+    cells = (row["people"], row["cameras"], row["left_out"], aligned, _range(row["mediapipe"]))
+    return f"| {' | '.join(cells)} | {absolute} | {row['source']} |"
 
 
 def _range(value_cm: float | Sequence[float] | None) -> str:

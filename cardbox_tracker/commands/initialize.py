@@ -81,7 +81,8 @@ def run(options: argparse.Namespace) -> None:
         )
     distance_m = _GUESSED_M if options.distance is None else options.distance
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
-    inputs = options.recording, options.extrinsics, options.calibration
+    points = None if options.detector is None else Path(options.detector)
+    inputs = options.recording, options.extrinsics, options.calibration, points
     check_outputs((options.output,), options.force, inputs=inputs)
     if None not in (options.depth, options.distance) and options.within is None:
         raise CardboxError(

@@ -124,8 +124,10 @@ def _name(recording: Path) -> str:
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
     """Return the files that the arguments of :func:`add_inputs` name."""
-    inputs = options.recording, options.model, options.extrinsics, options.settings
-    return *inputs, options.calibration
+    # These two may also be words, which name no file.
+    words = options.detector, options.corrector
+    files = options.recording, options.model, options.extrinsics, options.settings
+    return *files, options.calibration, *(Path(word) for word in words if word)
 
 
 def track_inputs(

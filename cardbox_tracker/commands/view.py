@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,8 @@ from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.evaluation.truth import TrueFrame
+    from cardbox_tracker.viewing.feed import Feed
     from cardbox_tracker.viewing.scene import Scene
 
 NAME = "view"
@@ -48,7 +51,12 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
-    check_outputs((options.save,), options.force, inputs=inputs_of(options))
+    inputs = *inputs_of(options), options.truth
+    check_outputs((options.save,), options.force, inputs=inputs)
+    # A wrong input is reported before a missing library or display.
+    is_result = not options.live and _holds_results(options)
+    truth = None if options.live else _truth_of(options)
+    from cardbox_tracker.viewing.feed import Feed
     from cardbox_tracker.viewing.layout import layout
     from cardbox_tracker.viewing.library import recording
     from cardbox_tracker.viewing.scene import Scene
@@ -59,7 +67,8 @@ def run(options: argparse.Namespace) -> None:
         if options.live:
             _show_nodes(Scene(stream))
         else:
-            count = _show_recording(options, Scene(stream))
+            feed = Feed(Scene(stream), truth)
+            count = _show_results(options.recording, feed) if is_result else _track(options, feed)
             print(f"shown: {count} images with a posture", flush=True)
         if options.web and not options.live:
             stream.flush()
@@ -78,29 +87,50 @@ def _show_nodes(scene: Scene) -> None:
     show_nodes(scene)
 
 
-def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
-    from cardbox_tracker.evaluation.truth import load_ground_truth
-    from cardbox_tracker.progress import progress_bar
+def _holds_results(options: argparse.Namespace) -> bool:
+    """Return whether the recording has results, or False if the options suffice to track it.
+
+    Raises:
+        CardboxError: the recording cannot be read, or options are missing.
+    """
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.result_reader import has_results
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.result_bag import show_results
-    from cardbox_tracker.viewing.tracking import ShownTracking
 
-    truth = options.truth or _truth_beside(options.recording)
-    feed = Feed(scene, None if truth is None else load_ground_truth(truth).frames)
     if is_bag(options.recording) or not options.recording.exists():
         with BagReader(options.recording) as bag:
             if has_results(bag):
-                with progress_bar("view") as show:
-                    return show_results(bag, feed, show)
+                return True
     missing = [] if options.stature is not None else _missing(options)
     if missing:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
             f"--{', --'.join(missing)} as for 'cardbox track', to track it now"
         )
+    return False
+
+
+def _truth_of(options: argparse.Namespace) -> Mapping[int, TrueFrame] | None:
+    from cardbox_tracker.evaluation.truth import load_ground_truth
+
+    path = options.truth or _truth_beside(options.recording)
+    return None if path is None else load_ground_truth(path).frames
+
+
+def _show_results(path: Path, feed: Feed) -> int:
+    """Show the results in the bag ``path``; return the number of images with a posture."""
+    from cardbox_tracker.progress import progress_bar
+    from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.viewing.result_bag import show_results
+
+    with BagReader(path) as bag, progress_bar("view") as show:
+        return show_results(bag, feed, show)
+
+
+def _track(options: argparse.Namespace, feed: Feed) -> int:
+    """Track the recording and show it; return the number of images with a posture."""
+    from cardbox_tracker.viewing.tracking import ShownTracking
+
     shown = ShownTracking(feed)
     track_inputs(options, observers=(shown,))
     return shown.count
@@ -110,7 +140,8 @@ def _missing(options: argparse.Namespace) -> list[str]:
     """Return the names of the options that tracking needs."""
     from cardbox_tracker.recordings.open_images import is_bag
 
-    is_empty_needed = is_bag(options.recording) and None is options.within is options.silhouettes
+    sources = options.within, options.silhouettes, options.detector
+    is_empty_needed = is_bag(options.recording) and sources == (None, None, None)
     needed = ("model", "start", *(["background"] if is_empty_needed else []))
     return [name for name in needed if getattr(options, name) is None]
 

@@ -28,6 +28,8 @@ from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.processes import Nodes
 
+# Without a cache, each node compiles at its start.
+_START_S = 600.0
 _UNRELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 # The bag of 'cardbox track --bag' has the same topics; /tf is derived from two of them.
 _OF_PERSON = {
@@ -165,6 +167,7 @@ class Client:
                 and self._node.count_publishers("joint_states") == 1
             ),
             "the nodes to find each other",
+            _START_S,
         )
 
     def wait_for_pause(self, time_s: float) -> None:

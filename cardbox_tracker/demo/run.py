@@ -15,7 +15,12 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.result_bag import result_writer
-from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
+from cardbox_tracker.ros.runtime.processes import (
+    Nodes,
+    compile_kernels,
+    isolate,
+    running_nodes,
+)
 from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 
 _RATE = 2.0
@@ -38,6 +43,8 @@ def run_demo(output: Path, preset: str, seed: int, cameras: int = 1) -> None:
     with progress_bar("synthesize") as show:
         form = SessionFormat(cameras=cameras)
         synthesize_session(session, "all", seed, form, overwrite=True, progress=show)
+    print("compile (one to two minutes, the first time only)", flush=True)
+    compile_kernels()
     result = track_through_nodes(session, output, preset, seed)
     write_report(result, session, output, preset, seed)
 

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
-from cardbox_tracker.settings import NoEffectError, Settings, changed, restarting, setting
+from cardbox_tracker.settings import (
+    NoEffectError,
+    Settings,
+    changed,
+    restarting,
+    setting,
+    suggestion,
+)
 
 FILTERS = ("hierarchical", "whole_body")
 """Allowed values of ``filter``."""
@@ -213,4 +221,14 @@ def default_preset() -> TrackerConfig:
     )
 
 
-PRESETS = MappingProxyType({"paper": paper_preset, "default": default_preset})
+class _Presets(dict[str, Callable[[], TrackerConfig]]):
+    """Functions that return settings, by the name of the preset."""
+
+    def __missing__(self, name: str) -> Callable[[], TrackerConfig]:
+        """Raise CardboxError with the names of the presets."""
+        hint = suggestion(name, self)
+        raise CardboxError(f"there is no preset '{name}'; {hint}expected one of {', '.join(self)}")
+
+
+PRESETS = MappingProxyType(_Presets(paper=paper_preset, default=default_preset))
+"""Functions that return the settings of the presets; a wrong name raises CardboxError."""

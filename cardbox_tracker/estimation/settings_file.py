@@ -1,10 +1,12 @@
 """Settings of the tracker in a YAML file, by the names that they have in ``TrackerConfig``.
 
-lost_frames: 10
-whole_body:
-effort: 0.5
-cost:
-yaw_deg: 20.0
+    lost_frames: 10
+    whole_body:
+      effort: 0.5
+      cost:
+        yaw_deg: 20.0
+
+docs/parameters.md has all names.
 """
 
 from __future__ import annotations
@@ -28,5 +30,10 @@ def read_settings(path: str | os.PathLike[str], config: TrackerConfig) -> Tracke
         if not isinstance(given, dict):
             raise ValueError("expected names and values, such as 'lost_frames: 10'")
         return config.changed(given)
-    except (SmallYamlError, ValueError) as error:
+    except SmallYamlError as error:
+        raise CardboxError(
+            f"settings of {path}: {error}; give a YAML file with names of docs/parameters.md, such "
+            "as 'lost_frames: 10'"
+        ) from None
+    except ValueError as error:
         raise CardboxError(f"settings of {path}: {error}") from None

@@ -107,7 +107,10 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             data.get("depth_topic"),
         )
     except OSError as error:
-        raise CardboxError(f"cannot read the ground truth {path}: {error.strerror}") from None
+        raise CardboxError(
+            f"cannot read the ground truth {path}: {error.strerror}; expected the "
+            "ground_truth.json of a session, such as 'cardbox synthesize' writes"
+        ) from None
     except (ValueError, KeyError, IndexError, TypeError) as error:
         raise CardboxError(
             f"{path} is not a ground truth: {error!r}; expected the ground_truth.json of a session"

@@ -127,12 +127,16 @@ class SilhouetteSource:
         """
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
+        is_readable = False
         for _, time_s, image in self.images():
+            is_readable = True
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
             if background.contains(time_s):
                 self._pipeline.learn(image)
         count = self._pipeline.learned_images
+        if not is_readable and self._broken:
+            raise BagError(f"{self.path} has no image to learn from: {self._brokenness()}")
         if count < 2:
             raise BagError(
                 f"{count} images lie in the background span {background} s of a recording of "
@@ -230,6 +234,13 @@ class SilhouetteSource:
             raise BagError(f"{self.path} has fewer than two images on {self._topic}")
         return int(np.median(np.diff(stamps_ns)))
 
+    def _brokenness(self) -> str:
+        number, reason = next(iter(self._broken.items()))
+        return (
+            f"{len(self._broken)} images cannot be decoded and are skipped; the first one is "
+            f"number {number}: {reason}"
+        )
+
     @property
     def remarks(self) -> list[str]:
         """Warnings about the images read so far."""
@@ -241,11 +252,7 @@ class SilhouetteSource:
                 "in seconds count from the recording's start nevertheless"
             )
         if self._broken:
-            number, reason = next(iter(self._broken.items()))
-            remarks.append(
-                f"{len(self._broken)} images cannot be decoded and are skipped; the first one is "
-                f"number {number}: {reason}"
-            )
+            remarks.append(self._brokenness())
         if self._detector is not None and self._detector.missed:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
         return remarks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,6 +34,9 @@ class Camera:
         cx: principal point, px; (0, 0) is the centre of the first pixel.
         cy: principal point, px.
         pitch_rad: downward pitch of the camera, rad; the reference frame stays level.
+
+    Raises:
+        CameraError: a value is impossible; the text names it.
     """
 
     width: int
@@ -42,6 +46,26 @@ class Camera:
     cx: float
     cy: float
     pitch_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if not all(0 < side <= _MOST_SIDE_PX for side in (self.width, self.height)):
+            raise CameraError(
+                f"the camera's image has {self.width}x{self.height} px; expected 1 to "
+                f"{_MOST_SIDE_PX} each: give the size of the silhouettes"
+            )
+        if not all(0.0 < length < math.inf for length in (self.fx, self.fy)):
+            raise CameraError(
+                f"the camera's focal lengths are {self.fx:g} and {self.fy:g} px; expected finite "
+                "numbers above 0: calibrate the camera, or take half of the image's width divided "
+                "by the tangent of half the field of view"
+            )
+        if not all(map(math.isfinite, (self.cx, self.cy, self.pitch_rad))):
+            raise CameraError(
+                f"the camera's principal point ({self.cx:g}, {self.cy:g}) px or pitch "
+                f"{self.pitch_rad:g} rad is not finite; expected the middle of the image and the "
+                "angle by which the camera looks down"
+            )
 
     def scaled(self, width: int, height: int) -> Camera:
         """Return the same camera with its image resized to ``width`` x ``height`` px."""

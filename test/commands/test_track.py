@@ -26,13 +26,14 @@ import pytest
         ),
         (("--particles", "1"), "--particles: expected a whole number of 2 or more, got '1'"),
         (("--particles", "100"), "--particles has no effect with the filter whole_body"),
+        (("--particles", "200"), "--particles has no effect with the filter whole_body"),
         (("--particles", "100"), "use --effort"),
         (("--strategy", "srs"), "use --effort"),
         (("--effort", "5"), "--effort is 5; expected 0.25 to 4"),
         (("--output-smoothing-s", "-1"), "--output-smoothing-s is -1; expected 0 to 10"),
         (("--corrector", "best"), "corrector is 'best'; expected learned, none, FILE.npz or"),
         (("--corrector", "FOLDER/missing.npz"), "missing.npz: No such file"),
-        (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file"),
+        (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give a"),
         (("--settings", "FOLDER/list.yaml"), "list.yaml: expected names and values"),
         (("--settings", "FOLDER/person.yaml"), "person.yaml: 'format' is no setting; "),
         (("--seed", "-3"), "--seed: expected a whole number of 0 or more, got '-3'"),
@@ -79,6 +80,7 @@ def test_mistakes_of_track(
     [
         (("--particles=9999999999",), "--particles is 1e+10; expected 2 to 1e+06"),
         (("--effort=0.5",), "--effort has no effect with the filter hierarchical (preset paper)"),
+        (("--effort=1",), "--effort has no effect with the filter hierarchical (preset paper)"),
         (("--effort=0.5",), "use --particles"),
         (("--corrector=none",), "--corrector has no effect"),
     ],
@@ -110,6 +112,16 @@ def test_a_background_or_depth_tells_the_person_from_the_scene(
     given = (f"--model={files / 'person.yaml'}", "--start=15.6", f"--csv={files / 'out.csv'}")
     cardbox("track", files / "session", *given, *words).assert_refused("track", expected)
     assert not (files / "out.csv").exists()
+
+
+@pytest.mark.parametrize("option", ["--detector", "--corrector", "--settings"])
+def test_a_file_that_is_read_is_not_replaced(files: Path, option: str, cardbox: Callable) -> None:
+    table = files / "text.txt"
+    before = table.read_bytes()
+    given = ("--background=0:3.9", f"--model={files / 'person.yaml'}", "--start=15.6", "--force")
+    done = cardbox("track", files / "session", *given, f"{option}={table}", f"--csv={table}")
+    done.assert_refused("track", "text.txt: it is read, as")
+    assert table.read_bytes() == before
 
 
 @pytest.mark.parametrize(

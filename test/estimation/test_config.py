@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation import tracker
 from cardbox_tracker.estimation.config import (
     FILTERS,
@@ -134,3 +135,9 @@ def test_settings_cannot_change_while_a_tracker_uses_them() -> None:
         for field in fields(config):
             with pytest.raises(FrozenInstanceError):
                 setattr(config, field.name, getattr(config, field.name))
+
+
+def test_a_misspelt_preset_is_refused_with_the_names() -> None:
+    with pytest.raises(CardboxError, match=r"'defualt'.*mean 'default'.*paper, default"):
+        PRESETS["defualt"]
+    assert PRESETS.get("defualt") is None and "defualt" not in PRESETS

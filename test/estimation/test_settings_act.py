@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -21,7 +20,7 @@ from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.initialization.part_colors import learn_appearance
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.settings import NoEffectError, Setting, nested, settings_of
+from cardbox_tracker.settings import NoEffectError, Setting, nested, settings_below
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -96,20 +95,6 @@ def result_of(config: TrackerConfig) -> list[Any]:
 @cache
 def usual(preset: str) -> list[Any]:
     return result_of(PRESETS[preset]())
-
-
-def settings_below(config: Any, before: str = "") -> Iterator[tuple[str, Any, Setting]]:
-    """Dotted name, value and description of each setting."""
-    known = settings_of(config)
-    for entry in fields(config):
-        name, value = f"{before}{entry.name}", getattr(config, entry.name)
-        if isinstance(value, tuple):
-            for one in value:
-                yield from settings_below(one, f"{name}.{type(one).__name__}.")
-        elif is_dataclass(value):
-            yield from settings_below(value, f"{name}.")
-        else:
-            yield name, value, known[entry.name]
 
 
 def another(name: str, value: Any, setting: Setting) -> Any:

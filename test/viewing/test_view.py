@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -163,6 +164,26 @@ def test_without_a_display_the_other_ways_are_named(
     monkeypatch.setattr("cardbox_tracker.viewing.library._has_display", lambda: False)
     assert view(results) == 1
     assert "--save FILE.rrd" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nope",), r"there is no recording nope"),
+        (("BAG", "--truth", "nope.json"), r"nope\.json"),
+    ],
+)
+def test_a_missing_file_is_named_before_a_missing_library(
+    results: Path,
+    words: tuple[str, ...],
+    expected: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert view(*(word.replace("BAG", str(results)) for word in words)) == 1
+    said = capsys.readouterr().err
+    assert re.search(expected, said) and "rerun" not in said
 
 
 def test_without_the_library_its_extra_is_named(

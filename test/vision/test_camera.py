@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -30,6 +31,26 @@ def test_projection_by_hand() -> None:
     points = np.array([(0, 0, 2.0), (0.5, -0.25, 2.0), (-1.0, 1.0, 4.0)])
     expected = [(159.5, 119.5), (159.5 + 75, 119.5 - 38.75), (159.5 - 75, 119.5 + 77.5)]
     np.testing.assert_allclose(CAMERA.project(points), expected)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"width": 0}, r"0x240 px; expected 1 to"),
+        ({"height": -240}, r"320x-240 px"),
+        ({"width": 70_000}, r"70000x240 px"),
+        ({"fx": 0.0}, r"focal lengths are 0 and 310 px; expected .* above 0: calibrate"),
+        ({"fy": float("nan")}, r"300 and nan px"),
+        ({"fy": float("inf")}, r"300 and inf px"),
+        ({"cx": float("nan")}, r"principal point \(nan, 119.5\)"),
+        ({"pitch_rad": float("inf")}, r"pitch inf rad is not finite"),
+    ],
+)
+def test_an_impossible_camera_is_refused(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(CameraError, match=words):
+        replace(CAMERA, **changes)  # type: ignore[arg-type]
+    with pytest.raises(CameraError, match="0x0 px"):
+        CAMERA.scaled(0, 0)
 
 
 def test_the_axes_of_the_two_frames() -> None:

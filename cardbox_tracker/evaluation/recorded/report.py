@@ -14,6 +14,15 @@ Results = Mapping[str, Any]
 MOTION_CAPTURE = "cmu"
 """Sessions with this in their name have motions from motion capture."""
 
+DEVELOPMENT = frozenset(
+    {
+        *("person_a", "person_b", "cmu_gestures", "cmu_everyday_30fps", "cmu_conversation"),
+        *("arms_before_torso", "leaves_returns_elsewhere", "steps_and_turns", "changing_light"),
+        *("low_contrast_child", "fast_waving_side_object", "two_webcams", "stereo_bumblebee"),
+    }
+)
+"""Rendered sessions on which settings of the package were chosen."""
+
 
 def sessions_report(results: Results) -> str:
     """Return the report in Markdown."""
@@ -24,9 +33,9 @@ def sessions_report(results: Results) -> str:
         f"Preset `{results['preset']}`, seeds {seeds}; every figure is a mean over the seeds. Each "
         "session is initialized from its own reference postures with the silhouettes that the "
         "background model cuts out, then all images from the first neutral posture on are tracked; "
-        "images with the neck in view after the reference postures are scored. Bodies and rooms "
-        "are rendered, motions are scripted or, in sessions named `cmu`, motion capture.",
+        "images with the neck in view after the reference postures are scored.",
         "",
+        *_used_in_development([session["name"] for session in results["sessions"]]),
         *_versus(results),
         *_signed(results),
         *_steadiness(results),
@@ -37,6 +46,21 @@ def sessions_report(results: Results) -> str:
         f"{results['provenance']['cpu']}.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _used_in_development(names: Sequence[str]) -> list[str]:
+    """Return a paragraph about the sessions that settings were chosen on, if there are any."""
+    used = [name for name in names if name in DEVELOPMENT]
+    if not used:
+        return []
+    which = "all sessions" if len(used) == len(names) else ", ".join(used)
+    return [
+        f"Settings of the package were chosen on {which}, which were thus used in development. "
+        "Their bodies and rooms are rendered, their motions scripted or motion capture (sessions "
+        "named `cmu`, `two_webcams`). The correction learned from other recordings of the same "
+        "renderer, the prior from other clips of motion capture.",
+        "",
+    ]
 
 
 def mean_of(runs: Sequence[Mapping[str, Any]], *path: str) -> float:

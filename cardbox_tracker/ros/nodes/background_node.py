@@ -14,6 +14,7 @@ from cardbox_tracker.errors import BackgroundFileError, CameraError
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
+    depth_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
 )
@@ -63,12 +64,7 @@ class BackgroundParameters(NodeParameters):
         unit="m",
         limits=(0.0, WITHIN_LIMITS_M[1]),
     )
-    depth: str = parameter(
-        "",
-        "topic of these depth images (16UC1, 32FC1 or compressedDepth) from the camera's position, "
-        "with the camera's field of view or a CameraInfo on TOPIC/camera_info; empty: none",
-        effect=AT_START,
-    )
+    depth: str = depth_parameter()
     learning: str = parameter(
         next(iter(WAYS)),
         "still: learn the empty scene when nothing moves; person_in_view: learn the scene around a "

@@ -139,6 +139,7 @@ class CameraInputs:
         self._count = len(self._streams)
         if settings.depth:
             self._streams.append(_Stream("depth", node.resolve(settings.depth)))
+        self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
         self._pairings = [ImagePairing(partial(self._add, number)) for number in range(self._count)]
         for topic, pairing in zip(topics, self._pairings, strict=True):
@@ -245,16 +246,15 @@ class CameraInputs:
         return depth_m
 
     def values(self, ious: Sequence[float | None]) -> dict[str, str]:
-        """Return rate, age and fit of each stream for the diagnostics, if there are several."""
+        """Return rate, age and fit of each stream that has a name, for the diagnostics."""
         values: dict[str, str] = {}
-        if len(self._streams) == 1:
-            return values
-        for number, stream in enumerate(self._streams):
+        for number, stream in enumerate(self._streams if self._is_named else ()):
             values |= stream.values()
             if self._count > 1 and number < min(len(ious), self._count):
                 iou = ious[number]
                 values[f"{stream.name} iou"] = "sees nobody" if iou is None else f"{iou:.3f}"
-            values[f"{stream.name} late"] = str(self._arrivals.late[number])
+            if len(self._streams) > 1:
+                values[f"{stream.name} late"] = str(self._arrivals.late[number])
         return values
 
     def warnings(self) -> dict[str, str]:

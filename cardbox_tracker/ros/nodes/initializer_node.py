@@ -37,9 +37,9 @@ from cardbox_tracker.ros.messages.measurement import (
     refused_message,
 )
 from cardbox_tracker.ros.nodes.camera_poses import silhouettes_of
+from cardbox_tracker.ros.nodes.distance_sources import distance_source, measured
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture
-from cardbox_tracker.ros.nodes.second_camera import distance_source, measured
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node

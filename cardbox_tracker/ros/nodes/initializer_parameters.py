@@ -9,7 +9,11 @@ from cardbox_tracker.estimation.initialization.config import (
     MAX_PITCH_RAD,
     InitializationConfig,
 )
-from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    cameras_parameter,
+    depth_parameter,
+    extrinsics_parameter,
+)
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.vision.pairing import camera_names
 
@@ -85,13 +89,7 @@ class InitializerParameters(NodeParameters):
 
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
-    depth: str = parameter(
-        "",
-        "topic of depth images (16UC1, 32FC1 or compressedDepth) to measure the person's distance, "
-        "from the (first) camera's position, with its field of view or a CameraInfo on "
-        "TOPIC/camera_info; empty: none",
-        effect=AT_START,
-    )
+    depth: str = depth_parameter()
     measure_distance: bool = parameter(
         True,
         "measure the person's distance with depth images, or with the second of several cameras; "

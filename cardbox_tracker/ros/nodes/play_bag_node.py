@@ -78,7 +78,7 @@ class PlayBagParameters(NodeParameters):
     wait_for_topics: list[str] = parameter(
         [],
         "begin when these topics have a publisher; with keypoints, the player waits for the "
-        "tracker, which compiles for half a minute at its very first start",
+        "tracker, which compiles for one to two minutes at its very first start",
         effect=AT_START,
     )
     delay_s: float = parameter(

@@ -29,6 +29,16 @@ def extrinsics_parameter() -> Any:
     )
 
 
+def depth_parameter() -> Any:
+    """Return the field of the depth images' topic."""
+    return parameter(
+        "",
+        "topic of depth images (16UC1, 32FC1 or compressedDepth) from the (first) camera's "
+        "position, with its field of view or a CameraInfo on TOPIC/camera_info; empty: none",
+        effect=AT_START,
+    )
+
+
 def image_transport_parameter() -> Any:
     """Return the field of the image topic's transport."""
     return parameter(

@@ -41,7 +41,7 @@ class TrackerNode(CardboxNode):
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
         # The code is compiled before the first image arrives, unless the cache has it.
-        self.get_logger().info("preparing (the very first start compiles for half a minute)")
+        self.get_logger().info("preparing (the very first start compiles for one to two minutes)")
         compile_all()
         self._body: BodyModel | None = None
         self._camera: Camera | None = None

@@ -12,7 +12,11 @@ from cardbox_tracker.estimation.filtering.corrector_loading import load_correcto
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.settings_file import read_settings
-from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    cameras_parameter,
+    depth_parameter,
+    extrinsics_parameter,
+)
 from cardbox_tracker.ros.runtime.parameter_fields import (
     AT_START,
     RESTARTS,
@@ -161,12 +165,7 @@ class TrackerParameters(NodeParameters):
 
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
-    depth: str = parameter(
-        "",
-        "topic of depth images (16UC1, 32FC1 or compressedDepth) from the first camera's position, "
-        "with its field of view or a CameraInfo on TOPIC/camera_info; empty: none",
-        effect=AT_START,
-    )
+    depth: str = depth_parameter()
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.
@@ -183,7 +182,11 @@ class TrackerParameters(NodeParameters):
         try:
             return base.changed(nested(self._given()))
         except NoEffectError as error:
-            raise ValueError(error.renamed(_PARAMETERS)) from None
+            name = _PARAMETERS[error.name]
+            raise ValueError(
+                f"{error.renamed(_PARAMETERS)}; to change the preset, first set {name} back to its "
+                f"default, {getattr(type(self), name)}"
+            ) from None
 
     def _given(self) -> dict[str, Any]:
         """Return the values that differ from the defaults, by the names of the core's settings."""

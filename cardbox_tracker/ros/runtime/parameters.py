@@ -6,20 +6,18 @@ validated instance. A wrong value is refused with the reason, and the old value 
 
 from __future__ import annotations
 
-import difflib
 from array import array
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Generic, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, descriptor
-from cardbox_tracker.settings import check
+from cardbox_tracker.settings import check, suggestion
 
 T = TypeVar("T", bound=NodeParameters)
 
@@ -69,9 +67,6 @@ class LiveParameters(Generic[T]):
 
     def _declare(self, name: str) -> Any:
         spec, type_ = self._specs[name], self._types[name]
-        default: Any = _LIST_TYPES.get(type_)
-        if default is None:
-            default = getattr(self._kind, name)
         given = self._given(name)
         if spec.was:
             given = self._given_before(name, spec.was, given)
@@ -82,18 +77,29 @@ class LiveParameters(Generic[T]):
             )
         if given is not None:
             self._check_limits(name, given)
+        elif type_ in _LIST_TYPES:
+            self._declare_empty_list(name)
+            return []
+        default = getattr(self._kind, name) if given is None else given
         try:
             self._node.declare_parameter(
-                name,
-                default if given is None else given,
-                descriptor(spec, type_),
-                ignore_override=True,
+                name, default, descriptor(spec, type_), ignore_override=True
             )
             return _plain(self._node.get_parameter(name).value)
-        except ParameterUninitializedException:
-            return []
         except Exception as error:
             raise self._refusal(f"{error}. {name} is {spec.description}") from None
+
+    def _declare_empty_list(self, name: str) -> None:
+        """Declare a list with the value []; rclpy alone would take it for a list of bytes.
+
+        An unset list would be simpler, but then a request for all parameters gets no values.
+        """
+        type_ = self._types[name]
+        list_type, described = _LIST_TYPES[type_], descriptor(self._specs[name], type_)
+        described.type = list_type.value
+        self._node.declare_parameter(name, list_type, ignore_override=True)
+        self._node.set_parameters([Parameter(name, list_type, [])])
+        self._node.set_descriptor(name, described)
 
     def _check_limits(self, name: str, given: Any) -> None:
         """Refuse a value out of range with a clearer text than rclpy's."""
@@ -143,12 +149,10 @@ class LiveParameters(Generic[T]):
                 raise self._refusal(f"'{name}' was removed: {self._kind.retired[name]}")
             if self._node.has_parameter(name) or name.startswith(_OF_QOS):
                 continue
-            near = difflib.get_close_matches(name, self._specs, 1)
             self._node.get_logger().warning(
                 f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
-                "effect; "
-                + (f"did you mean '{near[0]}'? " if near else "")
-                + "see 'ros2 param list' or docs/parameters.md for all names"
+                f"effect; {suggestion(name, self._specs)}see 'ros2 param list' or "
+                "docs/parameters.md for all names"
             )
 
     def _refusal(self, problem: str) -> CardboxError:

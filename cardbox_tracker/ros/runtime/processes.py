@@ -15,6 +15,10 @@ import cardbox_tracker
 from cardbox_tracker.errors import CardboxError
 
 _STOP_S = 10.0
+# Characters of a failed process's output that an error shows.
+_SHOWN = 800
+# With -P the installed package runs, also in a checkout.
+_OF_PACKAGE = (sys.executable, "-P", "-m")
 
 
 def isolate() -> None:
@@ -38,6 +42,26 @@ def share_file(name: str) -> Path | None:
     return next((path for path in candidates if path.exists()), None)
 
 
+def compile_kernels() -> None:
+    """Compile the code that the nodes will run, unless its cache has it; takes minutes at most.
+
+    Raises:
+        CardboxError: the process failed; the text has the end of its output.
+    """
+    done = subprocess.run(
+        [*_OF_PACKAGE, "cardbox_tracker.estimation.precompile"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    if done.returncode:
+        raise CardboxError(
+            f"the compilation of the tracker's inner loop ended with {done.returncode}; install "
+            f"the package anew with 'make setup' or pip:\n{done.stdout[-_SHOWN:]}"
+        )
+
+
 class Nodes:
     """Running nodes, each with its own log file."""
 
@@ -51,11 +75,10 @@ class Nodes:
 
         ``called`` distinguishes several processes of one executable.
         """
-        # With -P the installed package runs, whose kernels are compiled, even in a checkout.
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(
-                [sys.executable, "-P", "-m", "cardbox_tracker.start", name, *arguments],
+                [*_OF_PACKAGE, "cardbox_tracker.start", name, *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
@@ -68,7 +91,7 @@ class Nodes:
         """
         for name, process in self._processes.items():
             if process.poll() not in (None, 0):
-                words = (self._logs / f"{name}.log").read_text(errors="replace")[-800:]
+                words = (self._logs / f"{name}.log").read_text(errors="replace")[-_SHOWN:]
                 raise CardboxError(f"the node {name} ended with {process.returncode}:\n{words}")
 
     def pid(self, name: str) -> int:

@@ -1,29 +1,58 @@
-"""Detection of several publishers of one camera's images or calibration."""
+"""Detection of no or several publishers of one camera's images or calibration."""
 
 from __future__ import annotations
 
 from rclpy.node import Node
 
+PATIENCE = 5
+"""Number of checks, one a second, after which a topic without a publisher is reported."""
+
+_MOST_NAMED = 5
+
 
 class SinglePublisher:
-    """Watches topics that only one node should publish."""
+    """Watches topics that exactly one node should publish."""
 
     def __init__(self, node: Node, topics: tuple[str, ...]) -> None:
-        """Watch the resolved names ``topics`` as ``node`` sees them."""
+        """Watch the resolved names ``topics``, to which ``node`` subscribes."""
         self._node = node
+        # Numbers of checks without a publisher, of topics that never had one.
+        self._absent = dict.fromkeys(topics, 0)
         self._topics = topics
 
     def remarks(self) -> dict[str, str]:
-        """Return a warning for each topic that has several publishers, by its kind."""
+        """Return a warning for each topic with no or several publishers, by its kind."""
         found = {}
         for topic in self._topics:
-            ends = self._node.get_publishers_info_by_topic(topic)
-            if len(ends) < 2:
-                continue
-            names = sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in ends)
-            found[f"publishers of {topic}"] = (
-                f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one camera. "
-                "Stop all but one, or give each camera its own namespace (docs/cameras.md); "
-                "a killed publisher stays listed for some seconds"
-            )
+            names = self._publishers(topic)
+            if names:
+                self._absent.pop(topic, None)
+            if len(names) > 1:
+                found[f"publishers of {topic}"] = (
+                    f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one "
+                    "camera. Stop all but one, or give each camera its own namespace "
+                    "(docs/cameras.md); a killed publisher stays listed for some seconds"
+                )
+            if topic in self._absent:
+                self._absent[topic] += 1
+                if self._absent[topic] > PATIENCE:
+                    found[f"no publisher of {topic}"] = self._missing(topic)
         return found
+
+    def _missing(self, topic: str) -> str:
+        types = dict(self._node.get_topic_names_and_types())
+        own = f"{self._node.get_namespace().rstrip('/')}/{self._node.get_name()}"
+        others = [
+            name
+            for name, kinds in types.items()
+            if set(kinds) & set(types.get(topic, ())) and {*self._publishers(name)} - {own}
+        ]
+        there = ", ".join(others[:_MOST_NAMED]) or "none at all"
+        return (
+            f"nobody publishes {topic}; topics of the same type are: {there}. Start the camera's "
+            "driver with the same ROS_DOMAIN_ID, or remap the topic to one of these"
+        )
+
+    def _publishers(self, topic: str) -> list[str]:
+        ends = self._node.get_publishers_info_by_topic(topic)
+        return sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in ends)

@@ -226,6 +226,16 @@ def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:
     assert of_left(inside) > learned(inside) + 0.5
 
 
+def test_both_arms_have_the_same_prior() -> None:
+    """The same angles mirror one arm to the other, and so does the learned prior."""
+    of = cost()
+    for angles in np.random.default_rng(0).uniform(-1.5, 1.5, (50, 4)):
+        one = state()
+        one[4:8] = one[8:12] = angles
+        _, left, right = priors(one, of.body, of._prior)
+        assert right == pytest.approx(left)
+
+
 def test_how_deep_a_point_is_inside_by_hand() -> None:
     """On the axis of the torso's middle a hand costs 1, half way to its side a half."""
     parts = cost().parts

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -17,23 +19,6 @@ from cardbox_tracker.vision.camera import Camera
 # At 2 m a pixel is 1 cm.
 CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)
 DISTANCE_M = 2.0
-
-
-def block(top: int, bottom: int, left: int, right: int) -> np.ndarray:
-    silhouette = np.zeros((240, 320), np.uint8)
-    silhouette[top:bottom, left:right] = 255
-    return silhouette
-
-
-def outstretched(drop: float = 0.0, left_px: int = 80, right_px: int = 80) -> np.ndarray:
-    """Trunk 40 px wide, head 16 px, arms 8 px thick at row 100 that fall by ``drop`` a pixel."""
-    image: np.ndarray = block(95, 220, 140, 180) | block(60, 95, 152, 168)
-    for side, reach in ((1, right_px), (-1, left_px)):
-        for i in range(reach):
-            column = 160 + i if side > 0 else 159 - i
-            row = round(100 + drop * i)
-            image[row - 4 : row + 4, column] = 255
-    return image
 
 
 @pytest.mark.parametrize(
@@ -56,7 +41,9 @@ def test_points_of_the_plane_by_hand(
     np.testing.assert_allclose(points, [expected_m], atol=1e-12)
 
 
-def test_small_holes_are_filled_and_the_gap_at_an_arm_is_not() -> None:
+def test_small_holes_are_filled_and_the_gap_at_an_arm_is_not(
+    block: Callable[..., np.ndarray],
+) -> None:
     image = block(20, 220, 100, 220)
     image[40:50, 110:120] = 0
     image[100:200, 180:190] = 0
@@ -65,7 +52,7 @@ def test_small_holes_are_filled_and_the_gap_at_an_arm_is_not() -> None:
     assert np.all(whole[102:198, 182:188] == 0)
 
 
-def test_a_hand_torn_off_is_kept_and_a_thing_aside_is_not() -> None:
+def test_a_hand_torn_off_is_kept_and_a_thing_aside_is_not(block: Callable[..., np.ndarray]) -> None:
     image = block(40, 200, 140, 180) | block(100, 108, 180, 240) | block(20, 40, 10, 30)
     image[:, 220:226] = 0
     whole = filled(image)
@@ -80,7 +67,7 @@ def test_nobody_stays_nobody() -> None:
 
 
 @pytest.mark.parametrize("drop", [0.0, 0.1, 0.2])
-def test_a_level_arm_by_hand(drop: float) -> None:
+def test_a_level_arm_by_hand(drop: float, outstretched: Callable[..., np.ndarray]) -> None:
     image = outstretched(drop)
     left, right = (level_arm(image, CAMERA, DISTANCE_M, side) for side in (1, -1))
     assert left is not None
@@ -97,7 +84,9 @@ def test_a_level_arm_by_hand(drop: float) -> None:
     assert left.reach_m == pytest.approx(0.595, abs=0.006)
 
 
-def test_what_hangs_below_an_arm_is_not_the_arm() -> None:
+def test_what_hangs_below_an_arm_is_not_the_arm(
+    block: Callable[..., np.ndarray], outstretched: Callable[..., np.ndarray]
+) -> None:
     skirt = block(160, 220, 90, 230)
     left = level_arm(outstretched() | skirt, CAMERA, DISTANCE_M, 1)
     assert left is not None
@@ -105,7 +94,7 @@ def test_what_hangs_below_an_arm_is_not_the_arm() -> None:
     assert left.slope == pytest.approx(0.0, abs=1e-9)
 
 
-def test_no_arm_in_almost_nothing() -> None:
+def test_no_arm_in_almost_nothing(block: Callable[..., np.ndarray]) -> None:
     assert level_arm(block(10, 20, 10, 25), CAMERA, DISTANCE_M, 1) is None
 
 
@@ -119,7 +108,9 @@ def test_no_arm_in_almost_nothing() -> None:
         (56, 80, 1.60),
     ],
 )
-def test_the_span_by_hand(left_px: int, right_px: int, expected_m: float) -> None:
+def test_the_span_by_hand(
+    left_px: int, right_px: int, expected_m: float, outstretched: Callable[..., np.ndarray]
+) -> None:
     image = outstretched(left_px=left_px, right_px=right_px)
     left, right = (level_arm(image, CAMERA, DISTANCE_M, side) for side in (1, -1))
     assert left is not None
@@ -128,6 +119,6 @@ def test_the_span_by_hand(left_px: int, right_px: int, expected_m: float) -> Non
     assert found == pytest.approx(expected_m, abs=0.02)
 
 
-def test_a_width_by_hand() -> None:
+def test_a_width_by_hand(block: Callable[..., np.ndarray]) -> None:
     assert width_m(block(50, 150, 100, 140), CAMERA, DISTANCE_M, 0.0) == pytest.approx(0.40)
     assert np.isnan(width_m(block(50, 60, 100, 140), CAMERA, DISTANCE_M, -0.5))

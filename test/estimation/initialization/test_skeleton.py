@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
@@ -25,23 +27,6 @@ from cardbox_tracker.vision.rasterisation import render
 # At 2 m a pixel is 1 cm.
 CAMERA = Camera(320, 240, 200.0, 200.0, 159.5, 119.5)
 DISTANCE_M = 2.0
-
-
-def block(top: int, bottom: int, left: int, right: int) -> np.ndarray:
-    silhouette = np.zeros((240, 320), np.uint8)
-    silhouette[top:bottom, left:right] = 255
-    return silhouette
-
-
-def outstretched(drop: float = 0.0, left_px: int = 80, right_px: int = 80) -> np.ndarray:
-    """Trunk 40 px wide, head 16 px, arms 8 px thick at row 100 that fall by ``drop`` a pixel."""
-    image: np.ndarray = block(95, 220, 140, 180) | block(60, 95, 152, 168)
-    for side, reach in ((1, right_px), (-1, left_px)):
-        for i in range(reach):
-            column = 160 + i if side > 0 else 159 - i
-            row = round(100 + drop * i)
-            image[row - 4 : row + 4, column] = 255
-    return image
 
 
 def seen(body: BodyModel, name: str) -> np.ndarray:
@@ -74,7 +59,9 @@ def test_the_effect_of_the_hips_by_hand() -> None:
     assert effect_of_hips(float("nan")) == 1.0
 
 
-def test_a_stick_figure_by_hand() -> None:
+def test_a_stick_figure_by_hand(
+    block: Callable[..., np.ndarray], outstretched: Callable[..., np.ndarray]
+) -> None:
     """Arms at row 100, hanging arms whose axes meet the joints' height 16 px from the middle."""
     arms = outstretched()
     front = block(95, 220, 146, 174) | block(60, 95, 152, 168)
@@ -97,7 +84,7 @@ def test_a_stick_figure_by_hand() -> None:
     assert UPPER_ARM_SHARE * np.exp(-0.03) - 1e-9 <= share <= UPPER_ARM_SHARE * np.exp(0.03) + 1e-9
 
 
-def test_no_arms_no_skeleton() -> None:
+def test_no_arms_no_skeleton(block: Callable[..., np.ndarray]) -> None:
     narrow = block(60, 220, 155, 165)
     assert measure_skeleton({"front": narrow, "arms": narrow}, CAMERA, DISTANCE_M) is None
 

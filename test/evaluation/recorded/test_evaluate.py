@@ -22,6 +22,9 @@ from cardbox_tracker.simulation.session import synthesize_session
 LARGEST_ERROR_CM = 25.0
 
 
+ROOT = Path(__file__).parents[3]
+
+
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A synthetic session, laid out as the recorded ones are, with figures of MediaPipe beside."""
@@ -60,6 +63,16 @@ def test_the_command_writes_report_and_numbers(
     assert report == sessions_report(results)
     assert "| waves |" in report
     assert "9.9" in report
+
+
+def test_sessions_of_development_are_named_as_such() -> None:
+    results = json.loads((ROOT / "docs/evaluation/sessions.json").read_text())
+    assert "chosen on all sessions, which were thus used in development" in sessions_report(results)
+    for session in results["sessions"][1:]:
+        session["name"] = f"my_{session['name']}"
+    assert "chosen on person_a, which were thus used in development" in sessions_report(results)
+    results["sessions"][0]["name"] = "mine"
+    assert "used in development" not in sessions_report(results)
 
 
 def test_a_session_with_depth_images_is_tracked_with_them_too(

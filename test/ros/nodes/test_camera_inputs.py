@@ -295,3 +295,14 @@ def test_one_camera_is_a_list_of_one() -> None:
     assert (alone.source.values([0.9]), alone.source.warnings()) == ({}, {})
     with pytest.raises(CameraError, match="32x24"):
         alone.show("", 4 * S, (24, 32))
+
+
+def test_one_camera_with_a_name_has_values_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = camera_inputs.time.monotonic()
+    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    alone = Watching(depth="", cameras=("left",))
+    for step in range(10):
+        alone.show("left", S + step * S // 5)
+    now_s += 2.0
+    assert alone.source.values([0.9]) == {"left rate (Hz)": "5.0", "left age (s)": "2.0"}
+    assert alone.source.warnings() == {}

@@ -20,7 +20,7 @@ from cardbox_tracker.body.model_file import load_body_model  # noqa: E402
 from cardbox_tracker.body.posture import REFERENCE_NAMES  # noqa: E402
 from cardbox_tracker.errors import CardboxError  # noqa: E402
 from cardbox_tracker.estimation.initialization.config import InitializationResult  # noqa: E402
-from cardbox_tracker.ros.nodes import initializer_node, second_camera  # noqa: E402
+from cardbox_tracker.ros.nodes import distance_sources, initializer_node  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
@@ -61,7 +61,7 @@ def test_a_folder_that_is_gone_costs_no_second_posing(
     folder.mkdir()
     path = folder / "model.yaml"
     result = InitializationResult(BODY, dict.fromkeys(REFERENCE_NAMES, 0.9), {}, {})
-    monkeypatch.setattr(second_camera, "initialize_body", lambda *_: result)
+    monkeypatch.setattr(distance_sources, "initialize_body", lambda *_: result)
     node = initializer_node.InitializerNode(
         context=context,
         parameter_overrides=[Parameter("model_file", value=str(path))],

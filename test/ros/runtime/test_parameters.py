@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Any, get_type_hints
 
 import pytest
 from rcl_interfaces.msg import ParameterType
-from rclpy.parameter import Parameter
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
@@ -268,6 +271,53 @@ def test_every_node_can_declare_its_parameters(make_node: Callable, node_name: s
     LiveParameters(make_node(*arguments, name=node_name), NODES[node_name])
 
 
+@pytest.mark.parametrize("node_name", NODES)
+def test_every_node_answers_with_the_values_of_all_its_parameters(
+    make_node: Callable, node_name: str
+) -> None:
+    """One request for all names is how rqt and 'ros2 param dump' read a node."""
+    arguments = ("-p", "bag:=some") if node_name == "play_bag" else ()
+    node = make_node(*arguments, name=node_name)
+    expected = LiveParameters(node, NODES[node_name]).value
+    names = node.list_parameters([], 0).names
+    client = AsyncParameterClient(node, node_name)
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    assert client.wait_for_services(10.0)
+    answer = client.get_parameters(names)
+    executor.spin_until_future_complete(answer, 10.0)
+    values = [parameter_value_to_python(value) for value in answer.result().values]
+    assert len(values) == len(names) > 0
+    answered = dict(zip(names, values, strict=True))
+    for entry in fields(expected):
+        value = answered[entry.name]
+        assert value == getattr(expected, entry.name), entry.name
+
+
+@pytest.mark.parametrize("given", [None, "names:=[]"])
+def test_an_empty_list_keeps_its_type_and_properties(
+    make_node: Callable, given: str | None
+) -> None:
+    @dataclass(frozen=True)
+    class Listed(NodeParameters):
+        """Parameters of a test."""
+
+        names: list[str] = parameter([], "some names", effect=AT_START)
+        times: list[float] = parameter([], "some times")
+
+    node = make_node(*(() if given is None else ("-p", given)))
+    live = LiveParameters(node, Listed)
+    assert node.get_parameter("names").value == []
+    described = node.describe_parameter("names")
+    assert described.type == ParameterType.PARAMETER_STRING_ARRAY
+    assert (described.description, described.read_only) == ("some names", True)
+    assert not set_values(node, names=["a"])[0]
+    assert set_values(node, times=[1.0, 2.0])[0]
+    empty = Parameter("times", Parameter.Type.DOUBLE_ARRAY, [])
+    assert node.set_parameters_atomically([empty]).successful
+    assert live.value == Listed()
+
+
 @pytest.mark.parametrize("name", parameter_docs.files())
 def test_committed_files_are_the_generated_ones(name: str) -> None:
     path = ROOT / name
@@ -388,6 +438,16 @@ def test_a_parameter_of_the_tracker_acts_or_is_refused_with_the_one_that_does(
 def test_a_parameter_without_effect_is_refused_at_the_start(make_node: Callable) -> None:
     with pytest.raises(CardboxError, match=r"particles has no effect.*use effort"):
         LiveParameters(make_node("-p", "particles:=300"), TrackerParameters)
+
+
+def test_a_preset_is_refused_with_the_parameter_to_reset_first(make_node: Callable) -> None:
+    """'ros2 param set' sets one parameter after another, so the order matters."""
+    node = make_node("-p", "preset:=paper", "-p", "particles:=100")
+    live = LiveParameters(node, TrackerParameters)
+    accepted, reason = set_values(node, preset="default")
+    assert not accepted and re.search(r"set particles back to its default, 0", reason)
+    assert set_values(node, particles=0) == set_values(node, preset="default") == (True, "")
+    assert live.value == TrackerParameters()
 
 
 def test_a_parameter_without_effect_is_refused_live(make_node: Callable) -> None:

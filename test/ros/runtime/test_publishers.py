@@ -1,4 +1,4 @@
-"""Two publishers of a topic that one camera should publish are named."""
+"""No publisher, or two, of a topic that one camera should publish are reported with names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from std_msgs.msg import String  # noqa: E402
 
-from cardbox_tracker.ros.runtime.publishers import SinglePublisher  # noqa: E402
+from cardbox_tracker.ros.runtime.publishers import PATIENCE, SinglePublisher  # noqa: E402
 
 WAIT_S = 30.0
 
@@ -36,3 +36,26 @@ def test_two_publishers_are_named_until_one_has_gone(make_node: Callable[..., An
     assert "/image_raw: /left, /right; expected one" in text
     second.destroy_publisher(other)
     wait_for(lambda: not watch.remarks())
+
+
+def test_a_wrong_name_is_reported_with_the_topics_of_the_type(
+    make_node: Callable[..., Any],
+) -> None:
+    node, camera = make_node(), make_node(name="camera")
+    node.create_subscription(String, "/kamera/image_raw", print, 1)
+    node.create_publisher(String, "/own", 1)
+    camera.create_publisher(String, "/camera/image_raw", 1)
+    wait_for(lambda: node.count_publishers("/camera/image_raw") == 1)
+    watch = SinglePublisher(node, ("/kamera/image_raw",))
+    # Other nodes may start a little later.
+    assert [watch.remarks() for _ in range(PATIENCE)] == [{}] * PATIENCE
+    ((kind, text),) = watch.remarks().items()
+    assert kind == "no publisher of /kamera/image_raw"
+    assert "nobody publishes /kamera/image_raw" in text
+    assert "/camera/image_raw" in text and "/own" not in text and "remap" in text
+    late = camera.create_publisher(String, "/kamera/image_raw", 1)
+    wait_for(lambda: watch.remarks() == {})
+    # A publisher that ends is reported as silence of the images.
+    camera.destroy_publisher(late)
+    wait_for(lambda: node.count_publishers("/kamera/image_raw") == 0)
+    assert all(watch.remarks() == {} for _ in range(PATIENCE + 2))

@@ -25,7 +25,7 @@ from cardbox_tracker.estimation.initialization.config import (  # noqa: E402
 )
 from cardbox_tracker.estimation.initialization.scale import scaled  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import image_message  # noqa: E402
-from cardbox_tracker.ros.nodes.depth_distance import DepthDistance  # noqa: E402
+from cardbox_tracker.ros.nodes.distance_sources import DepthDistance  # noqa: E402
 from cardbox_tracker.ros.nodes.reference_capture import ReferenceCapture  # noqa: E402
 from cardbox_tracker.vision.camera import Camera  # noqa: E402
 
