@@ -12,7 +12,11 @@ from cardbox_tracker.estimation.filtering.corrector_loading import load_correcto
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.settings_file import read_settings
-from cardbox_tracker.ros.nodes.shared_parameters import cameras_parameter, extrinsics_parameter
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    cameras_parameter,
+    extrinsics_parameter,
+    keypoints_parameter,
+)
 from cardbox_tracker.ros.runtime.parameter_fields import (
     AT_START,
     RESTARTS,
@@ -167,6 +171,7 @@ class TrackerParameters(NodeParameters):
         "with its field of view or a CameraInfo on TOPIC/camera_info; empty: none",
         effect=AT_START,
     )
+    keypoints: str = keypoints_parameter()
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.

@@ -15,6 +15,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
@@ -93,10 +94,15 @@ class CardboxNode(Node):
             return publisher
         return self._intra_process.advertise(publisher)
 
-    def subscribe(self, kind: Any, topic: str, callback: Callback, profile: QoSProfile) -> None:
+    def subscribe(
+        self, kind: Any, topic: str, callback: Callback, profile: QoSProfile
+    ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
         An exception in ``callback`` is reported, and the node continues.
+
+        Returns:
+            The subscription; None without DDS.
         """
 
         def guarded(message: Any, info: dict[str, Any]) -> None:
@@ -112,8 +118,8 @@ class CardboxNode(Node):
         if self._intra_process is not None and self._intra_process.subscribe(
             self.resolve(topic), guarded
         ):
-            return
-        self.create_subscription(
+            return None
+        return self.create_subscription(
             kind,
             topic,
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument
