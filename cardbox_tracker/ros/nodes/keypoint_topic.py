@@ -153,7 +153,9 @@ class KeypointTopic:
             self._node.destroy_subscription(self._subscription)
         self._type, self._convert = type_, CONVERSIONS[type_]
         self._kept.clear()
-        self._subscription = self._node.subscribe(kind, self._topic, self._add, qos.SENSOR_DATA)
+        self._subscription = self._node.subscribe(
+            kind, self._topic, self._add, qos.SENSOR_DATA, has_one_type=False
+        )
 
     def _add(self, message: Any, _: int) -> None:
         at_ns = stamp_ns(message.header.stamp)

@@ -95,11 +95,24 @@ class CardboxNode(Node):
         return self._intra_process.advertise(publisher)
 
     def subscribe(
-        self, kind: Any, topic: str, callback: Callback, profile: QoSProfile
+        self,
+        kind: Any,
+        topic: str,
+        callback: Callback,
+        profile: QoSProfile,
+        *,
+        has_one_type: bool = True,
     ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
         An exception in ``callback`` is reported, and the node continues.
+
+        Args:
+            kind: class of the messages.
+            topic: name of the topic.
+            callback: receives each message.
+            profile: quality of service, which can be overridden.
+            has_one_type: False if the caller adapts to publishers of another type.
 
         Returns:
             The subscription; None without DDS.
@@ -114,7 +127,8 @@ class CardboxNode(Node):
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
-        self._types.add(self.resolve(topic), kind)
+        if has_one_type:
+            self._types.add(self.resolve(topic), kind)
         if self._intra_process is not None and self._intra_process.subscribe(
             self.resolve(topic), guarded
         ):
