@@ -61,7 +61,7 @@ class KeypointTopic:
         self._node, self._topic = node, topic
         self._kept: deque[Taken] = deque()
         self._asked_ns = self._apart_ns = 0
-        self._unused = self._in_doubt = 0
+        self._used = self._unused = self._in_doubt = 0
         self._wrong_type = ""
         self._type = ""
         self._subscription: Subscription | None = None
@@ -92,7 +92,8 @@ class KeypointTopic:
                 f"{quoted(frame_id)}: give each camera's detector the images of that camera"
             )
             return None
-        self._in_doubt, self._apart_ns = 0, at_ns - newest.stamp_ns
+        self._used, self._in_doubt = self._used + 1, 0
+        self._apart_ns = at_ns - newest.stamp_ns
         return newest
 
     def values(self) -> dict[str, str]:
@@ -101,6 +102,7 @@ class KeypointTopic:
         behind = f"{max(self._apart_ns, 0) / 1e6:.0f}"
         return self.stream.values() | {
             f"{name} behind the image (ms)": behind,
+            f"{name} used": str(self._used),
             f"{name} not used": str(self._unused),
         }
 
