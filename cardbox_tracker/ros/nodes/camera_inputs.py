@@ -116,7 +116,7 @@ class CameraInputs:
             node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
-        self._keypoints = KeypointInputs(node, settings.keypoints, cameras)
+        self._keypoints = KeypointInputs(node, settings)
 
     @property
     def source(self) -> str:

@@ -29,6 +29,7 @@ from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 from cardbox_tracker.vision.stamps import WINDOW, StampOrder
@@ -101,7 +102,9 @@ class DetectorNode(CardboxNode):
             # While the network works, only the newest image is kept.
             qos.NEWEST,
         )
-        self.diagnostics.advice = self._images.remarks
+        own = (self.resolve("silhouette"),) if settings.publish_silhouette else ()
+        self._single = SinglePublisher(self, own)
+        self.diagnostics.advice = lambda: self._images.remarks() | self._single.remarks()
 
     def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
@@ -114,7 +117,7 @@ class DetectorNode(CardboxNode):
         if self._images.order is StampOrder.RESTART:
             self._person.restart()
             self._looked_ns = 0
-        elif not self._is_due(stamp_ns(header.stamp)):
+        if not self._is_due(stamp_ns(header.stamp)):
             return
         began_s = time.perf_counter()
         image = pipeline.prepare(full)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo
@@ -15,13 +14,11 @@ from cardbox_tracker.files import user_path
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
 from cardbox_tracker.ros.nodes.keypoint_topic import KeypointTopic, Taken
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.calibration_watch import CalibrationWatch
 from cardbox_tracker.vision.camera import Calibration, Camera
-
-TABLE_SUFFIX = ".csv"
-"""Ending of a source that is a table; no topic's name has a dot."""
 
 _PATIENCE_S = 3.0
 # With this calibration a table's points stay where they are.
@@ -34,18 +31,14 @@ _ANY = Calibration(
 class KeypointInputs:
     """The points of all cameras; the tracker never waits for them."""
 
-    def __init__(self, node: CardboxNode, source: str, cameras: Sequence[str]) -> None:
-        """Subscribe with ``node``.
-
-        Args:
-            node: the tracker.
-            source: topic, below each of several cameras, or file of a table; empty for no points.
-            cameras: namespaces of the cameras; "" stands for the node's own.
+    def __init__(self, node: CardboxNode, settings: TrackerParameters) -> None:
+        """Subscribe with ``node``, the tracker, if its parameter ``keypoints`` is given.
 
         Raises:
             CardboxError: the table cannot be read, or the topic's name is not allowed.
         """
-        self._cameras = [_CameraKeypoints(node, source, name) for name in cameras] if source else []
+        cameras = (settings.cameras or [""]) if settings.keypoints else []
+        self._cameras = [_CameraKeypoints(node, settings, name) for name in cameras]
         self._topics = [one.topic for one in self._cameras if one.topic is not None]
 
     def points(
@@ -85,15 +78,16 @@ class KeypointInputs:
 class _CameraKeypoints:
     """The points of one camera, and the calibration that leads from its image to silhouettes."""
 
-    def __init__(self, node: CardboxNode, source: str, camera: str) -> None:
-        below = f"{camera.rstrip('/')}/" if camera else ""
+    def __init__(self, node: CardboxNode, settings: TrackerParameters, camera: str) -> None:
+        source, below = settings.keypoints, f"{camera.rstrip('/')}/" if camera else ""
         self.topic: KeypointTopic | None = None
-        if source.endswith(TABLE_SUFFIX):
+        if settings.has_point_table:
             table = PointTable(user_path(source))
             self._find = table.read(camera.strip("/") or None, _ANY, _ANY_SIZE)
         else:
             name = f"{camera.strip('/')} keypoints".lstrip()
-            self.topic = KeypointTopic(node, name, f"{below}{source}")
+            topic = source if source.startswith("/") else f"{below}{source}"
+            self.topic = KeypointTopic(node, name, topic)
         self._info_topic = node.resolve(f"{below}camera_info")
         self._watch = CalibrationWatch(self._info_topic, node.resolve(f"{below}image_raw"))
         self._began_s = time.monotonic()

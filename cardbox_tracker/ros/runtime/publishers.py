@@ -1,4 +1,4 @@
-"""Detection of several publishers of one camera's images or calibration."""
+"""Detection of several publishers of one camera's images, calibration or silhouettes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class SinglePublisher:
                 continue
             names = sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in ends)
             found[f"publishers of {topic}"] = (
-                f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one camera. "
-                "Stop all but one, or give each camera its own namespace (docs/cameras.md); "
-                "a killed publisher stays listed for some seconds"
+                f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one "
+                "for each camera. Stop all but one, or give each camera its own namespace "
+                "(docs/cameras.md); a killed publisher stays listed for some seconds"
             )
         return found

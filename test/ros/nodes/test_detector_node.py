@@ -139,6 +139,20 @@ def test_an_image_that_cannot_be_read_is_reported(bus: Any) -> None:
     assert len(bus.sent["/detector/keypoints"]) == 1
 
 
+def test_a_second_source_of_silhouettes_is_reported(
+    bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = Driver(bus, publish_silhouette=True)
+    driver.show(100.0)
+    assert bus.tick().message == "working"
+    ends = [SimpleNamespace(node_namespace="/", node_name=n) for n in ("background", "detector")]
+    found = {"/silhouette": ends}
+    monkeypatch.setattr(
+        driver.node, "get_publishers_info_by_topic", lambda topic: found.get(topic, [])
+    )
+    assert "/background, /detector" in bus.tick().message
+
+
 def test_with_hri_msgs_there_is_a_skeleton(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class Skeleton2D:
         def __init__(self, header: Any) -> None:

@@ -53,7 +53,9 @@ class Tracker:
     def __init__(self, bus: Any, source: str = "points", cameras: tuple[str, ...] = ("",)) -> None:
         self.bus = bus
         self.node = bus.start(lambda **options: CardboxNode("tracker", **options))
-        self.inputs = KeypointInputs(self.node, source, cameras)
+        names = [name for name in cameras if name]
+        settings = TrackerParameters(keypoints=source, cameras=names)
+        self.inputs = KeypointInputs(self.node, settings)
         self.node.diagnostics.advice = self.inputs.warnings
         self.cameras = cameras
 
@@ -248,6 +250,15 @@ def test_a_table_that_cannot_be_read_ends_the_start(bus: Any, tmp_path: Path) ->
         Tracker(bus, str(table(tmp_path, f"{T},nose,x,100,0.5")))
 
 
+def test_an_absolute_topic_is_of_one_camera(bus: Any) -> None:
+    tracker = Tracker(bus, "/yolo/points", ("cam0",)).calibrate()
+    tracker.bus.send("/yolo/points", keypoints(T))
+    assert tracker.ask(T) is not None
+    TrackerParameters(keypoints="/points.csv", cameras=["cam0", "cam1"]).check()
+    with pytest.raises(ValueError, match="one topic for 2 cameras"):
+        TrackerParameters(keypoints="/yolo/points", cameras=["cam0", "cam1"]).check()
+
+
 def test_an_impossible_topic_ends_the_start(bus: Any) -> None:
     with pytest.raises(CardboxError, match="topic"):
         Tracker(bus, "not a topic")
@@ -312,7 +323,7 @@ def test_the_type_of_the_publisher_is_used_when_it_comes(
     persons = [ImagePoints.of({"nose": (100.0, 100.0, 0.5)})]
     types = keypoint_topic.CONVERSIONS | {"geometry_msgs/msg/PoseArray": lambda _, __: persons}
     monkeypatch.setattr(keypoint_topic, "CONVERSIONS", types)
-    inputs = KeypointInputs(tracker_node, "points", [""])
+    inputs = KeypointInputs(tracker_node, TrackerParameters(keypoints="points"))
     topic = inputs._topics[0]
     topic.size = (640, 480)
 
