@@ -16,6 +16,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.detection.landmarks import LANDMARKS
 from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.ros.messages.types import optional_class
 
 COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right_ankle")
 """The 17 points of COCO in its order."""
@@ -60,6 +61,14 @@ def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> Pol
         for i in map(LANDMARKS.index, MESSAGE_NAMES)
     ]
     return PolygonStamped(header=header, polygon=Polygon(points=points))
+
+
+def skeleton_class() -> Any:
+    """Return hri_msgs/Skeleton2D; None if it is not installed, or has other points."""
+    kind = optional_class("hri_msgs", "Skeleton2D")
+    if kind is None or len(getattr(kind(), "skeleton", ())) != len(SKELETON_NAMES):
+        return None
+    return kind
 
 
 def skeleton_message(

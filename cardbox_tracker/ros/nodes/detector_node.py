@@ -16,8 +16,11 @@ from cardbox_tracker.detection.landmarks import LANDMARKS
 from cardbox_tracker.detection.pose_network import Detection
 from cardbox_tracker.recordings.detector import Detector, PersonDetector
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
-from cardbox_tracker.ros.messages.keypoints import keypoints_message, skeleton_message
-from cardbox_tracker.ros.messages.types import optional_class
+from cardbox_tracker.ros.messages.keypoints import (
+    keypoints_message,
+    skeleton_class,
+    skeleton_message,
+)
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.shared_parameters import (
     image_transport_parameter,
@@ -85,7 +88,7 @@ class DetectorNode(CardboxNode):
         self._looked_ns = 0
         self._took_ms: deque[float] = deque(maxlen=WINDOW)
         self._keypoints = self.advertise(PolygonStamped, "~/keypoints", qos.RESULT)
-        self._skeleton_kind = optional_class("hri_msgs", "Skeleton2D")
+        self._skeleton_kind = skeleton_class()
         self._skeletons = (
             None
             if self._skeleton_kind is None

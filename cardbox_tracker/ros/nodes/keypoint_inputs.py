@@ -102,11 +102,7 @@ class _CameraKeypoints:
         taken = self._taken(at_ns, header.frame_id)
         if taken is None or calibration is None:
             return None
-        size = camera.width, camera.height
-        placed = [
-            ImagePoints(calibration.rectified(person.px, *size), person.scores)
-            for person in taken.persons
-        ]
+        placed = [_placed(person, calibration, camera) for person in taken.persons]
         person = person_in(silhouette, placed)
         if person is None:
             return None
@@ -126,6 +122,15 @@ class _CameraKeypoints:
                 "the silhouette; remap camera_info of the tracker to that of the camera"
             )
         return texts
+
+
+def _placed(person: ImagePoints, calibration: Calibration, camera: Camera) -> ImagePoints:
+    """Return the points in the working image."""
+    size = np.array([camera.width, camera.height])
+    px = calibration.rectified(person.px, camera.width, camera.height)
+    # Beyond its image, a lens with distortion is not calibrated.
+    is_near = ((px > -size) & (px < 2 * size)).all(axis=1)
+    return ImagePoints(px, np.where(is_near, person.scores, 0.0))
 
 
 _NOTHING = np.zeros((1, 1), np.uint8)

@@ -11,7 +11,7 @@ from rclpy.clock_type import ClockType
 from rclpy.subscription import Subscription
 
 from cardbox_tracker.detection.image_points import ImagePoints
-from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.messages.conversions import stamp_ns
 from cardbox_tracker.ros.messages.keypoints import CONVERSIONS, POLYGON_STAMPED, Size
 from cardbox_tracker.ros.messages.types import optional_class
@@ -173,6 +173,10 @@ class KeypointTopic:
             persons = self._convert(message, self.size)
         except CardboxError as error:
             self._report(str(error))
+            return
+        except (AttributeError, TypeError) as error:
+            # Another release of a foreign package may have other fields.
+            self._report(f"the fields of {self._type} are not the expected ones: {cut(str(error))}")
             return
         self.stream.problem = ""
         self._kept.append(Taken(at_ns, str(message.header.frame_id), persons))

@@ -153,11 +153,14 @@ def test_a_second_source_of_silhouettes_is_reported(
     assert "/background, /detector" in bus.tick().message
 
 
-def test_with_hri_msgs_there_is_a_skeleton(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("points", [18, 0])
+def test_with_hri_msgs_there_is_a_skeleton_if_it_has_the_points_of_rep155(
+    bus: Any, monkeypatch: pytest.MonkeyPatch, points: int
+) -> None:
     class Skeleton2D:
-        def __init__(self, header: Any) -> None:
+        def __init__(self, header: Any = None) -> None:
             self.header = header
-            self.skeleton = [SimpleNamespace(x=0.0, y=0.0, c=0.0) for _ in range(18)]
+            self.skeleton = [SimpleNamespace(x=0.0, y=0.0, c=0.0) for _ in range(points)]
 
     Skeleton2D.__module__ = "hri_msgs.msg"
     module = ModuleType("hri_msgs.msg")
@@ -166,6 +169,10 @@ def test_with_hri_msgs_there_is_a_skeleton(bus: Any, monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "hri_msgs.msg", module)
     driver = Driver(bus)
     driver.show(100.0)
+    assert len(bus.sent["/detector/keypoints"]) == 1
+    if not points:
+        assert "/detector/skeleton2d" not in bus.sent
+        return
     (message,) = bus.sent["/detector/skeleton2d"]
     assert message.skeleton[0].x == pytest.approx(100.5 / WIDTH, abs=2 / WIDTH)
     assert message.header.frame_id == "eye"

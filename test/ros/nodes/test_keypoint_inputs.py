@@ -104,6 +104,19 @@ def test_points_join_in_time_with_their_stamp(
         assert points.stamp_ns == T + (late_ms - (expected_ms or 0)) * MS
 
 
+def test_a_lens_throws_no_point_far_away(bus: Any) -> None:
+    tracker = Tracker(bus)
+    info = camera_info_message(header(T), FULL)
+    info.d = [-0.9, 0.9, 0.0, 0.0, 0.0]
+    bus.send("/camera_info", info)
+    for number, column in enumerate((300.0, 1200.0, -600.0)):
+        bus.send("/points", keypoints(T + number * 33 * MS, column))
+        points = tracker.ask(T + number * 33 * MS)
+        if points is not None:
+            assert np.all(np.abs(points.px[points.scores > 0.0]) < 2 * CAMERA.width)
+        assert column != 300.0 or points is not None
+
+
 def test_points_are_used_once_and_the_newest_ones(tracker: Tracker) -> None:
     for number in range(3):
         tracker.bus.send("/points", keypoints(T + number * 33 * MS, 100.0 + 10 * number))
@@ -156,6 +169,12 @@ def test_bad_messages_are_reported_and_not_used(
     tracker.bus.send("/points", keypoints(T + 33 * MS))
     assert tracker.ask(T + 33 * MS) is not None
     assert tracker.warning() == ""
+
+
+def test_another_release_of_a_foreign_message_is_reported(tracker: Tracker) -> None:
+    tracker.bus.send("/points", SimpleNamespace(header=header(T), people=[]))
+    assert tracker.ask(T) is None
+    assert "fields of geometry_msgs/msg/PolygonStamped" in tracker.warning()
 
 
 def test_points_of_another_camera_are_not_used(tracker: Tracker) -> None:
