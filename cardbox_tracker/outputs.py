@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
@@ -95,8 +96,8 @@ class Metric:
         return "" if value is None else format(value, self.format)
 
 
-JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES)
-"""Joints of ``joint_states``: those of the posture, then the person's place."""
+JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+"""Joints of ``joint_states``: those of the posture, the person's place, then the neck."""
 
 
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
@@ -104,13 +105,22 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
 
     Without ``torso_place``, these are the 12 joints of the posture.
     """
-    return _joints(estimate.posture, place_of(estimate) if torso_place else None)
+    if estimate.posture is None or not torso_place:
+        return _joints(JOINT_NAMES, estimate.posture)
+    return _joints(JOINT_STATE_NAMES, estimate.posture, place_of(estimate), neck_of(estimate))
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
-    """Return the standard deviation of each joint; None if unknown."""
-    place = _or_zeros(estimate.offset_stddev_m)
-    return _joints(estimate.posture_stddev, place if torso_place else None)
+    """Return the standard deviation of each joint; None if unknown.
+
+    The joints of the neck are among them only if the face was seen.
+    """
+    if estimate.posture_stddev is None or not torso_place:
+        return _joints(JOINT_NAMES, estimate.posture_stddev)
+    known = estimate.posture_stddev, _or_zeros(estimate.offset_stddev_m)
+    if estimate.neck_stddev is None:
+        return _joints((*JOINT_NAMES, *PLACE_NAMES), *known)
+    return _joints(JOINT_STATE_NAMES, *known, estimate.neck_stddev)
 
 
 def place_of(estimate: Estimate) -> FloatArray:
@@ -118,16 +128,19 @@ def place_of(estimate: Estimate) -> FloatArray:
     return _or_zeros(estimate.offset_m)
 
 
-def _or_zeros(place_m: FloatArray | None) -> FloatArray:
-    return np.zeros(len(PLACE_NAMES)) if place_m is None else place_m
+def neck_of(estimate: Estimate) -> FloatArray:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad; 0 if the face was not seen."""
+    return _or_zeros(estimate.neck)
 
 
-def _joints(posture: FloatArray | None, place_m: FloatArray | None) -> JointValues | None:
-    if posture is None:
-        return None
-    if place_m is None:
-        return JointValues(JOINT_NAMES, posture)
-    return JointValues(JOINT_STATE_NAMES, np.concatenate([posture, place_m]))
+def _or_zeros(pair: FloatArray | None) -> FloatArray:
+    return np.zeros(2) if pair is None else pair
+
+
+def _joints(
+    names: tuple[str, ...], posture: FloatArray | None, *others: FloatArray
+) -> JointValues | None:
+    return None if posture is None else JointValues(names, np.concatenate([posture, *others]))
 
 
 def posture_from(joints: JointValues) -> FloatArray:
@@ -151,6 +164,14 @@ def place_from(joints: JointValues) -> FloatArray | None:
     return np.array([by_name[name] for name in PLACE_NAMES])
 
 
+def neck_from(joints: JointValues) -> FloatArray | None:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,) from named joints; None if one is missing."""
+    by_name = positions_of(joints)
+    if not by_name.keys() >= set(NECK_NAMES):
+        return None
+    return np.array([by_name[name] for name in NECK_NAMES])
+
+
 def positions_of(joints: JointValues) -> dict[str, float]:
     """Return the joint values by name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
@@ -164,14 +185,14 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m
+    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m, estimate.neck
     return Markers(marker_shapes(*seen))
 
 
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:
     """Return the topics of the tracker in the order of publication.
 
-    With ``torso_place``, the joints include ``torso_x`` and ``torso_z``.
+    With ``torso_place``, the joints include ``torso_x``, ``torso_z`` and those of the neck.
     """
     return (
         # The state comes first, so that subscribers have it when the posture arrives.

@@ -242,6 +242,7 @@ def test_each_common_complaint_has_an_entry_with_cause_and_remedy(complaint: str
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
+    from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES
     from cardbox_tracker.body.posture import (
         JOINT_NAMES,
         PLACE_LIMITS,
@@ -255,6 +256,7 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     limits = dict(zip(JOINT_NAMES, np.degrees(TURNING_LIMITS), strict=True))
     limits["torso_y"] = TURNING_LIMITS[0]
     limits |= dict(zip(PLACE_NAMES, PLACE_LIMITS, strict=True))
-    assert len(rows) == 10
+    limits |= dict(zip(NECK_NAMES, np.degrees(NECK_LIMITS), strict=True))
+    assert len(rows) == 12
     for name, lowest, highest in rows:
         assert (float(lowest), float(highest)) == pytest.approx(tuple(limits[name])), name

@@ -25,6 +25,7 @@ from cardbox_tracker.outputs import (
     Text,
     joint_deviations,
     joint_values,
+    neck_from,
     outputs,
     place_from,
     posture_from,
@@ -42,7 +43,9 @@ PLACED = replace(
     offset_m=np.array([0.25, -0.05]),
     offset_stddev_m=np.array([0.03, 0.01]),
 )
-ALL_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
+SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.1, 0.2]))
+BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
+ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch")
 TOPICS = ["tracking_state", "joint_states", "joint_states_stddev", "keypoints", "markers"]
 
 
@@ -58,8 +61,8 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     }
     state, joints, deviations, points, markers = cast(Any, list(found.values()))
     assert state == Text(TRACKING)
-    assert joints.names == deviations.names == ALL_NAMES
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.0, 0.0])
+    assert (joints.names, deviations.names) == (ALL_NAMES, BODY_NAMES)
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0, 0.0])
     assert points.points_m.shape == (6, 3)
     patches, skeleton = markers.shapes
@@ -78,14 +81,25 @@ def test_joints_have_the_place_after_the_posture() -> None:
     joints, deviations = joint_values(PLACED), joint_deviations(PLACED)
     assert joints is not None
     assert deviations is not None
-    assert joints.names == deviations.names == ALL_NAMES
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05])
+    assert (joints.names, deviations.names) == (ALL_NAMES, BODY_NAMES)
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.0, 0.0])
     np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.03, 0.01])
+
+
+def test_the_neck_is_last_and_has_deviations_if_it_was_seen() -> None:
+    joints, deviations = joint_values(SEEN), joint_deviations(SEEN)
+    assert joints is not None
+    assert deviations is not None
+    assert joints.names == deviations.names == ALL_NAMES
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.4, -0.1])
+    np.testing.assert_array_equal(deviations.values[-2:], (0.1, 0.2))
+    np.testing.assert_array_equal(cast(Any, neck_from(joints)), (0.4, -0.1))
+    assert neck_from(JointValues(BODY_NAMES, np.zeros(14))) is None
 
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
     stream = OutputStream(outputs(torso_place=False))
-    found = {output.topic: cast(Any, value) for output, value in stream.values(PLACED, TRACKER)}
+    found = {output.topic: cast(Any, value) for output, value in stream.values(SEEN, TRACKER)}
     assert list(found) == TOPICS
     for topic, expected in (("joint_states", POSTURE), ("joint_states_stddev", 0.1)):
         assert found[topic].names == JOINT_NAMES

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.silhouettes import WORKING_SIZE
+from cardbox_tracker.recordings.image_recording import WORKING_SIZE
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
 

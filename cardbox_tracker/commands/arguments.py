@@ -6,16 +6,17 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
-    from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.recordings.detector import Detector
     from cardbox_tracker.recordings.point_table import PointTable
-    from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+    from cardbox_tracker.recordings.recording import Segmentation
+    from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 
 REFERENCES = {
@@ -37,20 +38,24 @@ def add_retired(parser: argparse.ArgumentParser, flag: str, instead: str) -> Non
 
 
 def add_recording(
-    parser: argparse.ArgumentParser, required: bool = True, needs_background: bool = True
+    parser: argparse.ArgumentParser, required: bool = True, only_bags: bool = True
 ) -> None:
-    """Add the recording to read and the span in which its background is learned."""
+    """Add the recording to read and the span in which its background is learned.
+
+    The span may be missing unless there are ``only_bags``.
+    """
+    bag = "rosbag2 folder or file"
     parser.add_argument(
         "recording",
         type=Path,
         nargs=None if required else "?",
-        metavar="BAG",
-        help="rosbag2 folder or file",
+        metavar="BAG" if only_bags else "RECORDING",
+        help=bag if only_bags else f"{bag}, video, or folder of JPEG or PNG images",
     )
     parser.add_argument(
         "--background",
         type=span,
-        required=needs_background,
+        required=only_bags,
         default=None,
         metavar="T0:T1",
         help="seconds during which nobody is in view",
@@ -81,11 +86,13 @@ def add_detector(parser: argparse.ArgumentParser) -> None:
     """Add ``--silhouettes`` and ``--detector``."""
     parser.add_argument(
         "--silhouettes",
-        choices=("background", "detector"),
+        choices=("background", "detector", "person_in_view"),
         default=None,
-        help="source of the silhouettes: the difference from the empty scene, or the mask of a "
-        "person detector, which needs no empty scene ('cardbox detector --install'); with "
-        "--detector mediapipe and neither --background nor --within, the mask is the default",
+        help="source of the silhouettes: the difference from the scene of --background; the mask "
+        "of a person detector ('cardbox detector --install'); or the difference from a scene that "
+        "is learned around the person, who must step aside at some time. With neither --background "
+        "nor --within, the mask is the default with --detector mediapipe, and person_in_view for "
+        "videos and images",
     )
     parser.add_argument(
         "--detector",
@@ -96,31 +103,35 @@ def add_detector(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def silhouettes_of(options: argparse.Namespace) -> TimeSpan | Within | Detector:
-    """Return the source of the silhouettes: an empty scene, a depth limit, or the detector.
+def silhouettes_of(options: argparse.Namespace) -> Segmentation:
+    """Return the source of the silhouettes.
 
     Raises:
         CardboxError: none or several are given, or the detector is not installed.
     """
     from cardbox_tracker.recordings.depth_silhouettes import Within
     from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
+    from cardbox_tracker.recordings.open_images import is_bag
+    from cardbox_tracker.recordings.person_in_view import PersonInView
     from cardbox_tracker.recordings.recording import STEREO
 
     given = (options.background is not None) + (options.within is not None)
     chosen = options.silhouettes
     if chosen is None and not given and options.detector == MEDIAPIPE:
         chosen = "detector"
-    if chosen == "detector":
+    elif chosen is None and not given and not is_bag(options.recording):
+        chosen = "person_in_view"
+    if chosen in ("detector", "person_in_view"):
         if given:
             raise CardboxError(
-                "--silhouettes detector takes the place of --background and --within: leave them "
+                f"--silhouettes {chosen} takes the place of --background and --within: leave them "
                 "out"
             )
-        return Detector.installed()
+        return Detector.installed() if chosen == "detector" else PersonInView()
     if given != 1:
         raise CardboxError(
             "expected either --background T0:T1, seconds during which nobody is in view, --within "
-            "M with depth images, or --silhouettes detector, which needs neither"
+            "M with depth images, or --silhouettes detector or person_in_view, which need neither"
         )
     if options.within is None:
         span: TimeSpan = options.background
@@ -172,9 +183,9 @@ def add_references(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def print_remarks(source: SilhouetteSource, more: Iterable[str] = ()) -> None:
-    """Print the remarks on a recording, and ``more``, on the standard error."""
-    for remark in (*source.remarks, *more):
+def print_remarks(*remarks: Iterable[str]) -> None:
+    """Print remarks on a recording on the standard error."""
+    for remark in chain(*remarks):
         print(f"cardbox: {remark}", file=sys.stderr)
 
 
@@ -227,14 +238,15 @@ def add_camera_count(parser: argparse.ArgumentParser, several: str) -> None:
     )
 
 
-def add_camera_pitch(parser: argparse.ArgumentParser) -> None:
-    """Add ``--camera-pitch-deg``."""
+def add_camera_pitch(parser: argparse.ArgumentParser, found: str = "") -> None:
+    """Add ``--camera-pitch-deg``, None by default if ``found`` says how it is found, else 0."""
+    text = "positive when the camera looks down"
     parser.add_argument(
         "--camera-pitch-deg",
         type=float,
-        default=0.0,
+        default=None if found else 0.0,
         metavar="P",
-        help="positive when the camera looks down",
+        help=f"{text} (default: {found})" if found else text,
     )
 
 

@@ -18,6 +18,7 @@ from cardbox_tracker.commands.arguments import (
     print_remarks,
     silhouettes_of,
 )
+from cardbox_tracker.commands.camera_arguments import add_camera, detector_among, pitch_of
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.errors import CardboxError
 
@@ -30,7 +31,7 @@ _GUESSED_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox initialize``."""
-    add_recording(parser, needs_background=False)
+    add_recording(parser, only_bags=False)
     add_cameras(parser)
     add_depth(parser)
     add_detector(parser)
@@ -43,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="from the camera to the person, metres along the floor; all sizes are proportional "
         "to it; not needed with --depth, or with two or more --cameras, which measure it",
     )
-    add_camera_pitch(parser)
+    add_camera(parser)
+    add_camera_pitch(parser, "0; found in the --front images where a detector finds silhouettes")
     add_seed(parser, "the hypotheses")
     parser.add_argument(
         "--output", type=Path, required=True, metavar="MODEL.yaml", help="body model to write"
@@ -70,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
     )
     from cardbox_tracker.recordings.recording import open_recording
 
-    pitch_rad = math.radians(options.camera_pitch_deg)
+    pitch_rad = math.radians(options.camera_pitch_deg or 0.0)
     # The body model refuses an impossible distance or pitch by name, before they are used.
     if options.distance is None and options.depth is None and len(options.cameras) < 2:
         raise CardboxError(
@@ -79,13 +81,7 @@ def run(options: argparse.Namespace) -> None:
         )
     distance_m = _GUESSED_M if options.distance is None else options.distance
     BodyModel.of(distance_m=distance_m, camera_pitch_rad=pitch_rad)
-    config = InitializationConfig(
-        distance_m=distance_m,
-        camera_pitch_rad=pitch_rad,
-        side_turn=options.side_turn,
-        seed=options.seed,
-    )
-    inputs = options.recording, options.extrinsics
+    inputs = options.recording, options.extrinsics, options.calibration
     check_outputs((options.output,), options.force, inputs=inputs)
     if None not in (options.depth, options.distance) and options.within is None:
         raise CardboxError(
@@ -93,13 +89,22 @@ def run(options: argparse.Namespace) -> None:
             "or give --within M in place of --background"
         )
     spans = {name: getattr(options, name) for name in REFERENCES}
+    silhouettes = silhouettes_of(options)
+    pitch_rad, camera = pitch_of(options, detector_among(silhouettes), spans["front"])
+    config = InitializationConfig(
+        distance_m=distance_m,
+        camera_pitch_rad=pitch_rad,
+        side_turn=options.side_turn,
+        seed=options.seed,
+    )
     with (
         open_recording(
             options.recording,
-            silhouettes_of(options),
+            silhouettes,
             options.cameras,
             options.extrinsics,
             options.depth if options.distance is None else None,
+            camera=camera,
         ) as source,
         progress_bar("initialize") as show,
     ):
@@ -109,7 +114,8 @@ def run(options: argparse.Namespace) -> None:
             result = initialize_with_depth(source, spans, config, show)
         else:
             result = initialize_from_cameras(source, spans, config, show)
-    print_remarks(source.first)
+        remarks = source.first.remarks
+    print_remarks(remarks)
     save_body_model(result.body, options.output)
     print(describe(result))
     print(f"wrote {options.output}")

@@ -51,7 +51,7 @@ RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
 _DESCRIPTION = """\
 The 3D posture of one person's upper body, from the silhouettes that one
-fixed camera sees. These commands work on recordings (rosbag2, sqlite3 or mcap);
+fixed camera sees. These commands work on recordings (rosbag2, videos, images);
 live, use the nodes background, initializer, tracker, camera and play_bag."""
 _EPILOG = """\
 in this order, on a recording of your own or on a synthetic one:
@@ -60,6 +60,8 @@ in this order, on a recording of your own or on a synthetic one:
       --arms 12.8:14.2 --distance 2.0 --output person.yaml
   cardbox track session --model person.yaml --background 0:3.9 --start 15.6 \\
       --csv person.csv --video person.mp4
+or on a film of your own, which writes film.csv and the body that was used:
+  cardbox track film.mp4 --fov 60 --stature 1.75 --detector mediapipe
 Times are seconds from the start of the recording.
 'cardbox COMMAND --help' explains a command."""
 

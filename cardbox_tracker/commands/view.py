@@ -82,6 +82,7 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
     from cardbox_tracker.evaluation.truth import load_ground_truth
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
+    from cardbox_tracker.recordings.open_images import is_bag
     from cardbox_tracker.recordings.result_reader import has_results
     from cardbox_tracker.viewing.feed import Feed
     from cardbox_tracker.viewing.result_bag import show_results
@@ -89,12 +90,12 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
 
     truth = options.truth or _truth_beside(options.recording)
     feed = Feed(scene, None if truth is None else load_ground_truth(truth).frames)
-    with BagReader(options.recording) as bag:
-        if has_results(bag):
-            with progress_bar("view") as show:
-                return show_results(bag, feed, show)
-    needed = ("model", "start", *(["background"] if options.within is None else []))
-    missing = [name for name in needed if getattr(options, name) is None]
+    if is_bag(options.recording) or not options.recording.exists():
+        with BagReader(options.recording) as bag:
+            if has_results(bag):
+                with progress_bar("view") as show:
+                    return show_results(bag, feed, show)
+    missing = [] if options.stature is not None else _missing(options)
     if missing:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
@@ -103,6 +104,15 @@ def _show_recording(options: argparse.Namespace, scene: Scene) -> int:
     shown = ShownTracking(feed)
     track_inputs(options, observers=(shown,))
     return shown.count
+
+
+def _missing(options: argparse.Namespace) -> list[str]:
+    """Return the names of the options that tracking needs."""
+    from cardbox_tracker.recordings.open_images import is_bag
+
+    is_empty_needed = is_bag(options.recording) and None is options.within is options.silhouettes
+    needed = ("model", "start", *(["background"] if is_empty_needed else []))
+    return [name for name in needed if getattr(options, name) is None]
 
 
 def _truth_beside(bag: Path) -> Path | None:

@@ -14,7 +14,11 @@ therefore remembers the last angles and takes the nearer pair; an undefined angl
 
 The joint ``waist`` is our ``torso_pitch``. The reference model has no other joint of the spine;
 ``body``, ``y_waist`` and ``r_waist`` are added for the position, the turn and the sideways bend, so
-that ``body`` is the middle of the hips, in the sensor's frame. The head does not move on the torso.
+that ``body`` is the middle of the hips, in the sensor's frame.
+
+The joint ``y_head`` is our ``neck_yaw``. ``p_head`` is our ``neck_pitch`` with the other sign: it
+is positive if the face looks up. The reference model's third joint of the head, ``r_head``, is
+missing.
 
 Two further joints of ours, ``x_body`` and ``z_body``, lead to ``body``: they are ``torso_x`` and
 ``torso_z``. Without them the frame ``body_<id>``, which others take for the person's place, would
@@ -39,6 +43,8 @@ REP155_JOINTS: tuple[str, ...] = (
 """Joint names without the suffix ``_<id>``; the first four are d1..d4, in their order."""
 REP155_PLACE: tuple[str, ...] = ("x_body", "z_body")
 """Joint names of ``torso_x`` and ``torso_z``, which follow the others."""
+REP155_HEAD: tuple[str, ...] = ("y_head", "p_head")
+"""Joint names of the head, which follow those of the place."""
 
 LOWEST_RAISE_RAD = -np.pi / 3
 """Lowest p: an arm that swings further through rest gets its other pair of angles, rad."""
@@ -50,9 +56,15 @@ _MEANINGLESS_RAD = 1e-3
 
 
 def joint_names(body_id: str, torso_place: bool = True) -> list[str]:
-    """Return the names of the joints of the body ``body_id``: 12, or 14 with the place."""
-    names = (*REP155_JOINTS, *REP155_PLACE) if torso_place else REP155_JOINTS
+    """Return the names of the joints of ``body_id``: 12, or 16 with place and head."""
+    names = (*REP155_JOINTS, *REP155_PLACE, *REP155_HEAD) if torso_place else REP155_JOINTS
     return [f"{name}_{body_id}" for name in names]
+
+
+def head_joints(neck: FloatArray) -> FloatArray:
+    """Return the values of ``REP155_HEAD``, (2,), of ``neck_yaw`` and ``neck_pitch``, rad."""
+    yaw, pitch = neck
+    return np.array([yaw, -pitch])
 
 
 class Rep155Joints:

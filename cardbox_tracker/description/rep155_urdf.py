@@ -2,7 +2,7 @@
 
     sensor frame -x_body-> -z_body-> -body-> body_ID
     body_ID -y_waist-> -waist-> -r_waist-> -(fixed)-> torso_ID
-    torso_ID -(fixed)-> head_ID
+    torso_ID -y_head-> -p_head-> -(fixed)-> head_ID
     torso_ID -y_shoulder-> -p_shoulder-> -r_shoulder-> l_shoulder_ID -elbow-> l_elbow_ID
     l_elbow_ID -(fixed)-> l_wrist_ID, and the same with r_
 
@@ -19,6 +19,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import NECK_LIMITS, head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import PLACE_LIMITS, TURNING_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
@@ -44,7 +45,7 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
         body: the measured person.
         body_id: ending of all link and joint names; letters, digits and underscores.
         optical_frame: frame of the camera, the root of the tree.
-        torso_place: add the joints of the person's place, which the joint states then must contain.
+        torso_place: add the joints of place and head, which the joint states then must contain.
     """
     robot = add_robot(f"human_{body_id}")
     end = f"_{body_id}"
@@ -71,13 +72,32 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
     torso = add_link(robot, "torso" + end)
     add_joint(robot, "torso" + end, parent, "torso" + end, Origin(_up(shoulders_m)))
     add_patches(torso, "torso", parts.torso, _up(parts.torso.middle_m - shoulders_m))
-    head = add_link(robot, "head" + end)
-    head_m = (parts.head.forward_m, 0.0, parts.head.middle_m - shoulders_m)
-    add_joint(robot, "head" + end, "torso" + end, "head" + end, Origin(head_m))
-    add_patches(head, "torso", parts.head, _up(0.0))
+    _head(robot, parts, torso_place, end)
     _arm(robot, parts, "l", "left", 1.0, end)
     _arm(robot, parts, "r", "right", -1.0, end)
     return xml_text(robot)
+
+
+def _head(robot: Xml.Element, parts: BodyParts[float], has_neck: bool, end: str) -> None:
+    """Add the head, which is fixed to the torso without ``has_neck``."""
+    parent = "torso" + end
+    centre_m = (parts.head.forward_m, 0.0, parts.head.middle_m - parts.shoulder_height_m)
+    if has_neck:
+        x, y, z = neck_pivot_m(parts)
+        origin = Origin((x, y, z - parts.shoulder_height_m))
+        yaw, pitch = NECK_LIMITS.tolist()
+        for name, axis, limits in (
+            ("y_head", (0, 0, 1), yaw),
+            ("p_head", (0, -1, 0), [-pitch[1], -pitch[0]]),
+        ):
+            add_link(robot, name + end)
+            movement = Movement("revolute", axis, limits)
+            add_joint(robot, name + end, parent, name + end, origin, movement)
+            parent, origin = name + end, AT_PARENT
+        centre_m = head_from_pivot_m(parts)
+    head = add_link(robot, "head" + end)
+    add_joint(robot, "head" + end, parent, "head" + end, Origin(centre_m))
+    add_patches(head, "torso", parts.head, _up(0.0))
 
 
 def _arm(

@@ -1,10 +1,12 @@
 """Robot description (URDF) of a measured person.
 
-Its movable joints are those of the joint states, by the same names and signs: the posture's 12, and
-``torso_x`` and ``torso_z``. So robot_state_publisher and RViz show the person from them alone:
+Its movable joints are those of the joint states, by the same names and signs: the posture's 12,
+``torso_x``, ``torso_z``, ``neck_yaw`` and ``neck_pitch``. So robot_state_publisher and RViz show
+the person from them alone:
 
     camera_level -(fixed)-> hips -torso_x-> -torso_z-> -torso_y-> -torso_yaw-> -torso_pitch->
     -torso_roll-> torso
+    torso -neck_yaw-> -neck_pitch-> -(fixed)-> head
     torso -abduction (X)-> -flexion (Y)-> upper arm -abduction-> -flexion-> forearm -(fixed)-> hand
 
 The root ``camera_level`` follows REP-103: origin at the camera's centre, X forward (away from the
@@ -19,9 +21,16 @@ import math
 from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import (
+    NECK_LIMITS,
+    NECK_NAMES,
+    head_from_pivot_m,
+    neck_pivot_m,
+)
 from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
 from cardbox_tracker.description.urdf_elements import (
+    AT_PARENT,
     PATCH_THICKNESS_M,
     Movement,
     Origin,
@@ -37,8 +46,8 @@ ROOT_LINK = "camera_level"
 
 _LIMITS = dict(
     zip(
-        (*JOINT_NAMES, *PLACE_NAMES),
-        [*TURNING_LIMITS.tolist(), *PLACE_LIMITS.tolist()],
+        (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES),
+        [*TURNING_LIMITS.tolist(), *PLACE_LIMITS.tolist(), *NECK_LIMITS.tolist()],
         strict=True,
     )
 )
@@ -55,8 +64,8 @@ def urdf_from_body(
         body: the measured person.
         optical_frame: name of the camera's optical frame; if given, it is added with the camera's
             pitch, so that markers and keypoints are in the same tree.
-        torso_place: add the joints ``torso_x`` and ``torso_z``; the joint states then must contain
-            them, or the transforms beyond the hips are missing.
+        torso_place: add the joints ``torso_x``, ``torso_z``, ``neck_yaw`` and ``neck_pitch``; the
+            joint states then must contain them, or the transforms beyond are missing.
     """
     robot = add_robot("cardbox_person")
     add_link(robot, ROOT_LINK)
@@ -70,6 +79,7 @@ def urdf_from_body(
     add_joint(robot, "camera_to_hips", ROOT_LINK, "hips", Origin(place_m, (0.0, 0.0, math.pi)))
     parts = body_parts(body.sizes)
     _trunk(robot, parts, _place(robot) if torso_place else "hips")
+    _head(robot, parts, has_neck=torso_place)
     _arm(robot, parts, "left", 1.0)
     _arm(robot, parts, "right", -1.0)
     return xml_text(robot)
@@ -104,9 +114,21 @@ def _trunk(robot: Xml.Element, parts: BodyParts[float], parent: str) -> None:
     lid = (torso.depth_m, torso.top_width_m, PATCH_THICKNESS_M)
     add_box(link, "torso", lid, (0.0, 0.0, torso.top_m))
     add_patches(link, "torso", waist, (0.0, 0.0, waist.middle_m))
+
+
+def _head(robot: Xml.Element, parts: BodyParts[float], has_neck: bool) -> None:
+    parent, centre_m = "torso", (parts.head.forward_m, 0.0, parts.head.middle_m)
+    if has_neck:
+        origin = Origin(neck_pivot_m(parts))
+        for joint, axis in zip(NECK_NAMES, ((0, 0, 1), (0, 1, 0)), strict=True):
+            child = f"{joint}_link"
+            add_link(robot, child)
+            movement = Movement("revolute", axis, _LIMITS[joint])
+            add_joint(robot, joint, parent, child, origin, movement)
+            parent, origin = child, AT_PARENT
+        centre_m = head_from_pivot_m(parts)
     head = add_link(robot, "head")
-    origin = Origin((parts.head.forward_m, 0.0, parts.head.middle_m))
-    add_joint(robot, "neck", "torso", "head", origin)
+    add_joint(robot, "neck", parent, "head", Origin(centre_m))
     add_patches(head, "torso", parts.head, (0.0, 0.0, 0.0))
 
 

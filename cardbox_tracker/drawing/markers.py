@@ -8,6 +8,8 @@ import numpy as np
 
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import gaze_m
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
 from cardbox_tracker.vision.camera import Camera
@@ -46,11 +48,16 @@ class MarkerShape(NamedTuple):
 
 
 def marker_shapes(
-    body: BodyModel, camera: Camera, posture: FloatArray, keypoints_m: FloatArray | None = None
+    body: BodyModel,
+    camera: Camera,
+    posture: FloatArray,
+    keypoints_m: FloatArray | None = None,
+    neck: FloatArray | None = None,
 ) -> tuple[MarkerShape, MarkerShape]:
     """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``.
 
-    If ``keypoints_m`` (6, 3), metres in the optical frame, are given, they place the shoulders.
+    If ``keypoints_m`` (6, 3), metres in the optical frame, are given, they place the shoulders. If
+    ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
     """
     frames = model_frames(body, camera, posture, keypoints_m)
     corners = camera.reference_to_optical(patches_at(body, frames))
@@ -62,6 +69,9 @@ def marker_shapes(
     bones = [(frames.hip, frames.neck), (frames.neck, frames.head)]
     for arm in (frames.left, frames.right):
         bones += [(frames.neck, arm.shoulder), (arm.shoulder, arm.elbow), (arm.elbow, arm.hand)]
+    if neck is not None:
+        start, end = gaze_m(body_parts(body.sizes), frames, neck)
+        bones.append((start, end))
     return (
         MarkerShape(
             *("patches", TRIANGLE_LIST, 1.0),

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
-from cardbox_tracker.body.kinematics import BodyFrames
+from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import gaze_m
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
@@ -24,6 +26,7 @@ ImageArray = NDArray[np.uint8]
 
 OUTLINE_BGR = (60, 220, 60)
 SKELETON_BGR = (0, 140, 255)
+GAZE_BGR = (255, 230, 60)
 JOINT_BGR = (255, 255, 255)
 TEXT_BGR = (255, 255, 255)
 # Colours of the markers and of the URDF: torso, left, right.
@@ -64,6 +67,9 @@ def draw_overlay(
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
         there = estimate.placed(body)
         draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoints_m)
+        if estimate.neck is not None:
+            frames = forward_kinematics(there, estimate.posture)
+            _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), frames, estimate.neck))
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
@@ -164,6 +170,18 @@ def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thick
         radius = (thickness + 1 + rim) << _SHIFT
         for joint in joints:
             cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:
+    """Draw a line (2, 3), metres in the reference frame, with a dot at its end."""
+    points = camera.reference_to_optical(line_m)
+    if not in_front(points).all():
+        return
+    pixels = _subpixels(camera.project(points))
+    thickness = max(1, round(camera.width / 400))
+    cv2.polylines(canvas, [pixels], False, GAZE_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)
+    radius = (thickness + 1) << _SHIFT
+    cv2.circle(canvas, pixels[1].tolist(), radius, GAZE_BGR, -1, cv2.LINE_AA, _SHIFT)
 
 
 def draw_text(canvas: ImageArray, text: str, colour: tuple[int, int, int] = TEXT_BGR) -> None:

@@ -20,7 +20,7 @@ class RulaConfig(Settings):
     neck: int = setting(
         1,
         "score of the neck: 1 for 0 to 10 degrees of flexion, 2 to 20, 3 beyond, 4 in extension; 1 "
-        f"more each if twisted, bent aside; {_DECLARED}",
+        "more each if twisted, bent aside; declared for images without points of a face",
         limits=(1, 6),
     )
     wrist: int = setting(
@@ -73,6 +73,19 @@ class RulaConfig(Settings):
         "a trunk this far to a side counts as bent; the paper names no angle",
         unit="deg",
         limits=(1.0, 45.0),
+    )
+    neck_extended_deg: float = setting(
+        10.0,
+        "a neck bent backwards by more than this is in extension, score 4; the paper has 0, which "
+        "is within the error of the measurement",
+        unit="deg",
+        limits=(0.0, 45.0),
+    )
+    neck_twisted_deg: float = setting(
+        20.0,
+        "a head turned this far against the trunk twists the neck; the paper names no angle",
+        unit="deg",
+        limits=(5.0, 80.0),
     )
     upright_deg: float = setting(
         10.0,

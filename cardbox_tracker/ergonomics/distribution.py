@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import NECK_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.rula import rula_scores
@@ -51,11 +52,23 @@ def expected(chances: FloatArray) -> float:
     return float(chances @ _SCORES)
 
 
+def neck_samples(
+    neck: FloatArray, stddev: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return normal samples (count, 2) of ``neck_yaw`` and ``neck_pitch``, rad, in their limits."""
+    drawn = neck + stddev * rng.standard_normal((count, len(neck)))
+    samples: FloatArray = np.clip(drawn, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1])
+    return samples
+
+
 def score_distribution(
-    body: BodyModel, postures: FloatArray, config: RulaConfig
+    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
 ) -> ScoreDistribution:
-    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``."""
-    scores = rula_scores(body, postures, config)
+    """Return the distribution of the scores, given equally likely postures (n, 12) of ``body``.
+
+    ``necks`` (n, 2) are the angles of the neck in each of them, rad; None if they are unknown.
+    """
+    scores = rula_scores(body, postures, config, necks)
     return ScoreDistribution(*map(_chances, (scores.grand, scores.left.grand, scores.right.grand)))
 
 

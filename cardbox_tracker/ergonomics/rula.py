@@ -6,9 +6,12 @@ The parts are scored as in the figures of the paper (:mod:`.tables` names it):
 degrees, 2 to 45 and for more than 20 backwards, 3 to 90, 4 beyond; abducted adds 1;
 - lower arm: 1 for 60 to 100 degrees between it and the line of the upper arm, else 2; a hand beyond
   the middle of the body, or a forearm that points outside, adds 1;
+- neck: 1 to 10 degrees of flexion against the trunk, 2 to 20, 3 beyond, 4 in extension; twisted
+  adds 1;
 - trunk: 1 upright, 2 to 20 degrees, 3 to 60, 4 beyond, forwards or backwards; bent aside adds 1.
 
-Neck, wrists, legs, twist of the trunk, load and muscle use come from the settings.
+Wrists, legs, twist of the trunk, load and muscle use come from the settings, and the neck where its
+angles are not known. A neck that bends aside is not measured.
 """
 
 from __future__ import annotations
@@ -38,31 +41,56 @@ class ArmScores(NamedTuple):
 
 
 class RulaScores(NamedTuple):
-    """Scores (...) of both arms and the trunk; ``grand`` is that of the worse arm, 1 to 7."""
+    """Scores (...) of both arms and the trunk; ``grand`` is that of the worse arm, 1 to 7.
+
+    ``neck`` is that of the settings if the angles of the neck are not known.
+    """
 
     left: ArmScores
     right: ArmScores
     trunk: ScoreArray
     grand: ScoreArray
+    neck: ScoreArray
 
 
-def rula_scores(body: BodyModel, postures: FloatArray, config: RulaConfig) -> RulaScores:
-    """Return the scores of postures (..., 12), rad and metres, of ``body``."""
+def rula_scores(
+    body: BodyModel, postures: FloatArray, config: RulaConfig, necks: FloatArray | None = None
+) -> RulaScores:
+    """Return the scores of postures of ``body``.
+
+    Args:
+        body: the person.
+        postures: shape (..., 12), rad and metres.
+        config: settings.
+        necks: ``neck_yaw`` and ``neck_pitch`` of each posture, (..., 2), rad; None if unknown.
+    """
     d = np.asarray(postures, dtype=np.float64)
     trunk = trunk_score(d[..., PITCH], d[..., ROLL], config)
-    rest = TABLE_B[config.neck - 1, trunk - 1, config.legs - 1]
+    neck = np.full(trunk.shape, config.neck)
+    if necks is not None:
+        neck = neck_score(necks[..., 0], necks[..., 1], config)
+    rest = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
     rest = rest + config.body_muscle_use + config.body_load
     left, right = (
         _arm(body, d[..., joints], side, rest, config)
         for joints, side in ((LEFT_ARM, 1.0), (RIGHT_ARM, -1.0))
     )
-    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand))
+    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck)
 
 
 def grand_score(arm: ScoreArray, rest: ScoreArray) -> ScoreArray:
     """Look up table C with the scores of arm and wrist, and of neck, trunk and legs."""
     found: ScoreArray = TABLE_C[np.minimum(arm, 8) - 1, np.minimum(rest, 7) - 1]
     return found
+
+
+def neck_score(yaw_rad: FloatArray, pitch_rad: FloatArray, config: RulaConfig) -> ScoreArray:
+    """Return the score of necks turned by ``yaw_rad`` and bent forwards by ``pitch_rad``."""
+    pitch_deg = np.degrees(pitch_rad)
+    score = 1 + (pitch_deg > 10.0).astype(np.int64) + (pitch_deg > 20.0)
+    score = np.where(pitch_deg < -config.neck_extended_deg, 4, score)
+    twisted: ScoreArray = score + (np.abs(np.degrees(yaw_rad)) > config.neck_twisted_deg)
+    return twisted
 
 
 def trunk_score(flexion_rad: FloatArray, bend_rad: FloatArray, config: RulaConfig) -> ScoreArray:

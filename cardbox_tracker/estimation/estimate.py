@@ -32,6 +32,9 @@ class Estimate:
         offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
             model's placement, towards the camera and up; None if the filter keeps it constant.
         offset_stddev_m: standard deviations of ``offset_m``, (2,), metres.
+        neck: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso (``body/neck.py``);
+            None without points of the face.
+        neck_stddev: standard deviations of ``neck``, (2,), rad, those of the torso included.
     """
 
     state: str
@@ -42,6 +45,8 @@ class Estimate:
     iou: float | None = None
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
+    neck: FloatArray | None = None
+    neck_stddev: FloatArray | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

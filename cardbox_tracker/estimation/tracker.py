@@ -29,6 +29,7 @@ from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
+from cardbox_tracker.estimation.head import HeadTracker
 from cardbox_tracker.estimation.observation import Observation, Observations, stamp_of
 from cardbox_tracker.estimation.sampling import likely_postures
 from cardbox_tracker.estimation.tracked_camera import TrackedCamera
@@ -104,6 +105,7 @@ class Tracker:
             camera.reset(self.config)
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
+        self._head = HeadTracker(self.body, self.camera)
         self._poor_frames = 0
         self._last_ns: int | None = None
         self._particles: Particles | None = None
@@ -179,7 +181,9 @@ class Tracker:
                 f"there are {len(observations)} observations; expected one for each of "
                 f"{len(self._cameras)} cameras"
             )
-        return self._track(self._frames_of(observations))
+        frames = self._frames_of(observations)
+        estimate = self._track(frames)
+        return self._head.see(frames[0], estimate)
 
     def _frames_of(self, observations: Observations) -> list[Frame]:
         """Return the frames of all cameras; the frame of a camera without data is empty."""

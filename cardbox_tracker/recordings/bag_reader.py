@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,8 +14,10 @@ from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.typesys import Stores, get_typestore
 
-from cardbox_tracker.errors import BagError, cut
+from cardbox_tracker.errors import BagError, EncodingError, cut
 from cardbox_tracker.recordings.bag_limits import check_recording, limit_decompression
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import WORKING_SIZE, RecordedImage
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.encodings import (
@@ -28,7 +29,8 @@ from cardbox_tracker.vision.encodings import (
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 _REPAIR = "'ros2 bag reindex' remakes lost metadata, 'mcap recover' a file that was cut off"
-_FILE_ENDINGS = (".mcap", ".db3", ".bag")
+FILE_ENDINGS = (".mcap", ".db3", ".bag")
+"""Endings of a recording's files."""
 
 
 class BagMessage(NamedTuple):
@@ -40,40 +42,21 @@ class BagMessage(NamedTuple):
     raw: bytes
 
 
-@dataclass(frozen=True)
-class BagImage:
-    """One image of a recording, decoded by its properties.
-
-    Attributes:
-        stamp_ns: stamp of the header.
-        frame_id: frame of the header.
-        time_ns: recording time.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    time_ns: int
-    _decode: Callable[[], NDArray[np.uint8]]
-
-    @property
-    def as_sent(self) -> NDArray[np.uint8]:
-        """BGR colours (H, W, 3) of a colour camera, else brightness (H, W), uint8."""
-        return self._decode()
-
-
 class BagReader:
     """Context of an open recording.
 
     All methods raise BagError if the recording cannot be read or lacks the requested topic.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], camera: GivenCamera | None = None) -> None:
         """Store the path; the recording is opened on entry.
 
         Args:
             path: folder of a rosbag2 recording, or its .mcap or .db3 file.
+            camera: properties of the only camera that replace those of the recording.
         """
-        self.path = Path(path)
+        self.path, self.working_size = Path(path), WORKING_SIZE
+        self._given = camera or GivenCamera()
         self._reader: AnyReader | None = None
 
     def __enter__(self) -> BagReader:
@@ -84,7 +67,7 @@ class BagReader:
         if not path.is_dir() and not path.is_file():
             raise BagError(f"{path} is a pipe or a device; give a rosbag2 folder or file")
         if path.is_dir() and not (path / "metadata.yaml").exists():
-            files = [f for f in sorted(path.iterdir()) if f.suffix in _FILE_ENDINGS]
+            files = [f for f in sorted(path.iterdir()) if f.suffix in FILE_ENDINGS]
             if (path / "bag" / "metadata.yaml").exists():
                 path = path / "bag"
             elif len(files) == 1:
@@ -217,13 +200,13 @@ class BagReader:
     def _list(self) -> str:
         return ", ".join(f"{n} ({t})" for n, t in sorted(self.topics.items())) or "no topics"
 
-    def images(self, topic: str | None = None) -> Iterator[BagImage]:
+    def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images of ``topic``, or of the only image topic, in order."""
         for message in self.messages([topic or self.image_topic()]):
             image = self.deserialize(message)
             try:
                 frame_id, decode = str(image.header.frame_id), _decoder(image)
-                found = BagImage(stamp_ns_of(image), frame_id, message.time_ns, decode)
+                found = RecordedImage(stamp_ns_of(image), frame_id, message.time_ns, decode)
             except (AttributeError, TypeError, ValueError) as error:
                 # The message type is defined by the recording and may lack fields.
                 raise self._damaged(error) from None
@@ -241,18 +224,40 @@ class BagReader:
         raise BagError(f"{self.path} has no message on {topic}; record it with the images")
 
     def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the calibration in the message of :meth:`camera_info`.
+        """Return the given calibration, or that in the message of :meth:`camera_info`.
 
         Raises:
             BagError: the recording has no CameraInfo.
             CameraError: the camera is not calibrated; the text names both topics.
         """
+        if self._given.is_calibrated:
+            return self._given_calibration(camera)
+        if CAMERA_INFO_TYPE not in self.topics.values():
+            raise BagError(
+                f"{self.path} has 0 CameraInfo topics; expected one for {self.image_topic(camera)}."
+                " Record it with the images, or give --fov DEG or --calibration FILE"
+            )
         topics = self.image_topic(camera), self.camera_info_topic(camera)
         info = self.camera_info(camera)
         try:
-            return calibration_from_info(info, *topics)
+            return self._given.rolled(calibration_from_info(info, *topics))
         except (AttributeError, ArithmeticError, TypeError, ValueError) as error:
             raise self._damaged(error) from None
+
+    def _given_calibration(self, camera: str | None) -> Calibration:
+        topic = self.image_topic(camera)
+        for image in self.images(topic):
+            with suppress(EncodingError):
+                height, width = image.as_sent.shape[:2]
+                return self._given.calibrated(self.path, width, height, image.frame_id)
+        raise BagError(f"{self.path} has no image on {topic} that can be decoded; record it again")
+
+    @property
+    def remarks(self) -> list[str]:
+        """A remark if a given calibration replaces a CameraInfo."""
+        if self._given.is_calibrated and CAMERA_INFO_TYPE in self.topics.values():
+            return ["the given calibration or field of view replaces the recording's CameraInfo"]
+        return []
 
 
 def _image_names(folder: str) -> tuple[str, ...]:

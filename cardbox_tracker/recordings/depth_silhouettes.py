@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.detector import Detector
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.point_table import PointTable
-from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M, silhouette_within
 from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, side_by_side
@@ -33,7 +33,7 @@ class DepthSilhouetteSource(SilhouetteSource):
 
     def __init__(
         self,
-        bag: BagReader,
+        bag: ImageRecording,
         within: Within,
         camera: str | None = None,
         points: Detector | PointTable | None = None,
@@ -57,7 +57,7 @@ class DepthSilhouetteSource(SilhouetteSource):
                 f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "
                 f"{most_m:g} m, between the person and the wall"
             )
-        self._open(bag, WORKING_SIZE, camera)
+        self._open(bag, bag.working_size, camera)
         self._find_points(points, camera)
         self._within, self.depth_topic = within, within.topic
         self._without = 0
@@ -65,7 +65,7 @@ class DepthSilhouetteSource(SilhouetteSource):
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
-        streams: list[Iterator[Any]] = [self._images(), depths]
+        streams: list[Iterator[Any]] = [self.images(), depths]
         self._without = 0
         if self._detector is not None:
             self._detector.restart()

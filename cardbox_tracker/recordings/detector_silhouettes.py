@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.detection.landmarks import image_points
-from cardbox_tracker.recordings.bag_reader import BagReader
+from cardbox_tracker.detection.pose_network import Detection
 from cardbox_tracker.recordings.detector import Detector
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.point_table import PointTable
-from cardbox_tracker.recordings.silhouettes import WORKING_SIZE, RecordedFrame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.empty_scene import brightness_of
 
 # Least value of the mask inside the person: a chance of one half.
@@ -22,7 +24,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
     def __init__(
         self,
-        bag: BagReader,
+        bag: ImageRecording,
         detector: Detector,
         camera: str | None = None,
         points: Detector | PointTable | None = None,
@@ -40,9 +42,10 @@ class DetectorSilhouetteSource(SilhouetteSource):
             CameraError: the recording's camera is not calibrated.
             CardboxError: the networks or ``points`` cannot be loaded.
         """
-        self._open(bag, WORKING_SIZE, camera)
+        self._open(bag, bag.working_size, camera)
         self._find_points(None if isinstance(points, Detector) else points, camera)
         self._has_own_points = isinstance(points, Detector)
+        self._has_points = points is not None
         self._detector = self._person = detector.start()
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
@@ -50,13 +53,7 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        self._person.restart()
-        for stamp_ns, time_s, image in self._images():
-            if time_s > end_s:
-                break
-            if time_s < start_s:
-                continue
-            person = self._person(image)
+        for stamp_ns, time_s, image, person in self.detections(start_s, end_s):
             silhouette, points = np.zeros(image.shape[:2], np.uint8), None
             if person is not None:
                 silhouette[person.mask >= _PERSON] = 255
@@ -64,3 +61,14 @@ class DetectorSilhouetteSource(SilhouetteSource):
             points = points or self._points(stamp_ns, image)
             seen = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *seen, points=points)
+
+    def detections(
+        self, start_s: float = 0.0, end_s: float = float("inf")
+    ) -> Iterator[tuple[int, float, NDArray[np.uint8], Detection | None]]:
+        """Yield stamp, ns, seconds from the start, image and person of the images of a span."""
+        self._person.restart()
+        for stamp_ns, time_s, image in self.images():
+            if time_s > end_s:
+                break
+            if time_s >= start_s:
+                yield stamp_ns, time_s, image, self._person(image)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.errors import CameraError, CardboxError
+from cardbox_tracker.errors import BagError, CameraError, CardboxError
 from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.recordings.bag_reader import BagReader
@@ -19,6 +19,10 @@ from cardbox_tracker.recordings.depth_images import depth_images
 from cardbox_tracker.recordings.depth_silhouettes import DepthSilhouetteSource, Within
 from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.recordings.detector_silhouettes import DetectorSilhouetteSource
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.open_images import is_bag, open_images
+from cardbox_tracker.recordings.person_in_view import PersonInView, PersonInViewSource
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
@@ -35,6 +39,9 @@ from cardbox_tracker.vision.stereo import StereoDepth, stereo_of_pair
 
 STEREO = "stereo"
 """Given in place of a depth topic: stereo depth of the first two cameras, a rectified pair."""
+Segmentation = TimeSpan | Within | Detector | PersonInView
+"""Source of the silhouettes: a span without a person in any image, a depth limit, a detector whose
+masks they are, or the scene learned around the person."""
 _STATIC_TOPIC = "/tf_static"
 
 
@@ -154,22 +161,23 @@ class Recording:
 @contextmanager
 def open_recording(
     path: str | os.PathLike[str],
-    background: TimeSpan | Within | Detector,
+    background: Segmentation,
     cameras: Sequence[str] = (),
     extrinsics: Path | None = None,
     depth: str | None = None,
     points: Detector | PointTable | None = None,
+    camera: GivenCamera | None = None,
 ) -> Iterator[Recording]:
     """Open a recording, find the extrinsics of its cameras and learn their backgrounds.
 
     Args:
-        path: a recording as :class:`BagReader` takes it.
-        background: span without a person in any image, or the detector whose masks are the
-            silhouettes; with one camera alternatively the depth limit that cuts out the person.
+        path: a recording as :func:`open_images` takes it.
+        background: see ``Segmentation``; a depth limit is for one camera.
         cameras: namespaces, the first camera's first; empty if the recording has one camera.
         extrinsics: file of the poses, see :func:`load_extrinsics`.
         depth: see :class:`Recording`.
         points: source of the person's points in the images; None for no points.
+        camera: properties of the only camera that the recording does not have.
 
     Raises:
         BagError: the recording cannot be read, or lacks a camera.
@@ -185,10 +193,17 @@ def open_recording(
             "depth images can cut out the person for one camera only; several cameras need "
             "--background"
         )
+    if len(names) > 1 and camera is not None and camera != GivenCamera():
+        raise CardboxError(
+            "--fov, --calibration and --camera-roll-deg describe one camera; the recording of "
+            "several cameras needs a CameraInfo of each"
+        )
+    if (depth is not None or isinstance(background, Within)) and not is_bag(Path(path)):
+        raise CardboxError(f"depth images are read from a rosbag2, which {os.fspath(path)} is not")
     with ExitStack() as stack:
         # A reader has one position, and the cameras are read in parallel.
-        bags = [stack.enter_context(BagReader(path)) for _ in names or ("",)]
-        found = extrinsics_of(bags[0], names, extrinsics)
+        bags = [stack.enter_context(open_images(path, camera)) for _ in names or ("",)]
+        found = [] if len(names) < 2 else _extrinsics_in(bags[0], names, extrinsics)
         sources = [
             _source(bag, background, name, points)
             for bag, name in zip(bags, names or (None,), strict=True)
@@ -196,9 +211,17 @@ def open_recording(
         yield Recording(names or ("",), sources, found, depth)
 
 
+def _extrinsics_in(
+    bag: ImageRecording, names: Sequence[str], file: Path | None
+) -> list[Extrinsics]:
+    if not isinstance(bag, BagReader):
+        raise BagError(f"{bag.path} is of one camera; omit --cameras, or give a rosbag2 of several")
+    return extrinsics_of(bag, names, file)
+
+
 def _source(
-    bag: BagReader,
-    background: TimeSpan | Within | Detector,
+    bag: ImageRecording,
+    background: Segmentation,
     camera: str | None,
     points: Detector | PointTable | None,
 ) -> SilhouetteSource:
@@ -206,6 +229,8 @@ def _source(
         return DepthSilhouetteSource(bag, background, camera, points)
     if isinstance(background, Detector):
         return DetectorSilhouetteSource(bag, background, camera, points)
+    if isinstance(background, PersonInView):
+        return PersonInViewSource(bag, camera, points)
     return SilhouetteSource(bag, background, camera=camera, points=points)
 
 

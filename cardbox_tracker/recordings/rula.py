@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.ergonomics.config import RulaConfig
-from cardbox_tracker.ergonomics.distribution import SAMPLES, score_distribution
+from cardbox_tracker.ergonomics.distribution import SAMPLES, neck_samples, score_distribution
 from cardbox_tracker.ergonomics.recording import RulaRow
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
@@ -33,5 +33,8 @@ class RulaObserver:
         scores = None
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
-            scores = score_distribution(tracker.body, postures, self._config)
+            necks = None
+            if estimate.neck is not None and estimate.neck_stddev is not None:
+                necks = neck_samples(estimate.neck, estimate.neck_stddev, SAMPLES, self._rng)
+            scores = score_distribution(tracker.body, postures, self._config, necks)
         self.rows.append(RulaRow(frame.stamp_ns, estimate.state, scores))

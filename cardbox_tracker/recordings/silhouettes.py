@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.errors import BagError, CardboxError, EncodingError
-from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.detector import Detector, FindPoints
+from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.empty_scene import brightness_of
+from cardbox_tracker.vision.learning import Learning
 from cardbox_tracker.vision.silhouettes import SilhouettePipeline
-
-WORKING_SIZE = (320, 240)
 
 _PERIOD_IMAGES = 60
 # A stamp that differs from the recording time by more comes from another clock.
@@ -28,7 +27,7 @@ _OTHER_CLOCK_NS = 10_000_000_000
 
 
 class TimeSpan(NamedTuple):
-    """Seconds from the bag's start, both ends included."""
+    """Seconds from the recording's start, both ends included."""
 
     start_s: float
     end_s: float
@@ -65,7 +64,7 @@ class RecordedFrame(NamedTuple):
 
     Attributes:
         stamp_ns: stamp of the image.
-        time_s: seconds from the bag's start.
+        time_s: seconds from the recording's start.
         brightness: (H, W) uint8, undistorted, at the working resolution.
         silhouette: (H, W) uint8, 0 or 255.
         image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution; None if it
@@ -102,10 +101,10 @@ class SilhouetteSource:
 
     def __init__(
         self,
-        bag: BagReader,
+        bag: ImageRecording,
         background: TimeSpan,
         config: BackgroundConfig | None = None,
-        size: tuple[int, int] = WORKING_SIZE,
+        size: tuple[int, int] | None = None,
         camera: str | None = None,
         points: Detector | PointTable | None = None,
     ) -> None:
@@ -117,7 +116,7 @@ class SilhouetteSource:
             bag: an open recording.
             background: span without a person in the image.
             config: settings of the background model.
-            size: working resolution (width, height), px.
+            size: working resolution (width, height), px; None for that of the recording.
             camera: namespace of the camera; without it, the recording has only one.
             points: source of the person's points in the images.
 
@@ -126,9 +125,9 @@ class SilhouetteSource:
             CameraError: the recording's camera is not calibrated.
             CardboxError: ``points`` cannot be read.
         """
-        self._open(bag, size, camera, config)
+        self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
-        for _, time_s, image in self._images():
+        for _, time_s, image in self.images():
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
             if background.contains(time_s):
@@ -136,7 +135,7 @@ class SilhouetteSource:
         count = self._pipeline.learned_images
         if count < 2:
             raise BagError(
-                f"{count} images lie in the background span {background} s of a bag of "
+                f"{count} images lie in the background span {background} s of a recording of "
                 f"{bag.duration_s:.1f} s; give a span in which the empty scene was recorded"
                 + "".join(f" ({remark})" for remark in self.remarks)
             )
@@ -144,22 +143,29 @@ class SilhouetteSource:
 
     def _open(
         self,
-        bag: BagReader,
+        bag: ImageRecording,
         size: tuple[int, int],
         camera: str | None,
         config: BackgroundConfig | None = None,
+        learning: type[Learning] = Learning,
     ) -> None:
         self._bag = bag
         self._broken: dict[int, str] = {}
         self._clock_ns = 0
         self._topic = bag.image_topic(camera)
         calibration = bag.calibration(camera)
-        self._pipeline = SilhouettePipeline(calibration, size, config)
+        self._pipeline = SilhouettePipeline(calibration, size, config, learning)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
 
+    @property
+    def has_points(self) -> bool:
+        """Whether the frames can have points of the person."""
+        return self._has_points
+
     def _find_points(self, points: Detector | PointTable | None, camera: str | None) -> None:
         """Use a source of points."""
+        self._has_points = points is not None
         self._detector = points.start() if isinstance(points, Detector) else None
         self._points: FindPoints = lambda stamp_ns, image: None
         if self._detector is not None:
@@ -189,7 +195,7 @@ class SilhouetteSource:
         self._pipeline.restart()
         if self._detector is not None:
             self._detector.restart()
-        for stamp_ns, time_s, image in self._images():
+        for stamp_ns, time_s, image in self.images():
             if time_s > end_s:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
@@ -207,8 +213,8 @@ class SilhouetteSource:
         found = list(self.frames(*span))
         if not found:
             raise CardboxError(
-                f"no image lies in the {what} span {span} s of a bag of "
-                f"{self._bag.duration_s:.1f} s; give seconds from the bag's start"
+                f"no image lies in the {what} span {span} s of a recording of "
+                f"{self._bag.duration_s:.1f} s; give seconds from its start"
             )
         return found
 
@@ -227,7 +233,7 @@ class SilhouetteSource:
     @property
     def remarks(self) -> list[str]:
         """Warnings about the images read so far."""
-        remarks = []
+        remarks = list(self._bag.remarks)
         if self._clock_ns:
             remarks.append(
                 f"the images' stamps are {abs(self._clock_ns) / 1e9:.0f} s "
@@ -244,7 +250,11 @@ class SilhouetteSource:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
         return remarks
 
-    def _images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
+    def images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
+        """Yield stamp, ns, seconds from the start, and image of every image that can be decoded.
+
+        The images are undistorted, at the working resolution.
+        """
         for number, image in enumerate(self._bag.images(self._topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns

@@ -13,10 +13,11 @@ import numpy as np
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
@@ -35,10 +36,15 @@ CSV_HEADER = (
     *JOINT_STATE_NAMES[PLACE],
 )
 
+NECK_COLUMNS = NECK_NAMES
+"""Columns that follow ``CSV_HEADER`` if the recording has points of the person."""
+
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
 
 _VIDEO_SCALE = 2
+# Rate of a video of a single image.
+_USUAL_HZ = 15.0
 
 
 class TrackFiles(NamedTuple):
@@ -47,12 +53,12 @@ class TrackFiles(NamedTuple):
     Attributes:
         csv: table with one row for each image.
         video: overlay video.
-        fps: frames per second of the video.
+        fps: frames per second of the video; None for the rate of the recording.
     """
 
     csv: Path | None = None
     video: Path | None = None
-    fps: float = 15.0
+    fps: float | None = None
 
 
 _NO_FILES = TrackFiles()
@@ -69,6 +75,7 @@ class TrackSummary:
         mean_iou: mean overlap (IoU) over the tracked images; nan without any.
         frames_uncertain: number of tracked images whose posture may be wrong.
         remarks: warnings about extrinsics that seem to be wrong.
+        body: the body at the end, whose unknown values were fitted.
     """
 
     frames: int
@@ -77,6 +84,7 @@ class TrackSummary:
     mean_iou: float
     frames_uncertain: int = 0
     remarks: tuple[str, ...] = ()
+    body: BodyModel | None = None
 
 
 def track_recording(
@@ -95,8 +103,8 @@ def track_recording(
         body: the measured person.
         config: settings of the tracker.
         seed: random seed; the same recording and seed give the same bytes.
-        start_s: seconds from the bag's start at which the person stands in the front reference
-            posture.
+        start_s: seconds from the recording's start at which the person stands in the front
+            reference posture.
         files: files to write; the table is written atomically.
         observers: called after each image, such as a progress bar or a bag writer.
 
@@ -109,22 +117,23 @@ def track_recording(
     ious: list[float] = []
     frames = frames_uncertain = 0
     with ExitStack() as stack:
-        rows = None
+        rows, has_points = None, recording.first.has_points
         if files.csv is not None:
             path = stack.enter_context(atomic_path(files.csv))
             table = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
             rows = csv.writer(table, lineterminator="\n")
-            rows.writerow(CSV_HEADER)
+            rows.writerow((*CSV_HEADER, *NECK_COLUMNS) if has_points else CSV_HEADER)
         draw = None
         if files.video is not None:
             size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
-            draw = stack.enter_context(video_file(files.video, size, files.fps))
+            draw = stack.enter_context(video_file(files.video, size, files.fps or _rate(recording)))
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
             if rows is not None:
-                rows.writerow(csv_row(frame.stamp_ns, estimate))
+                neck = _neck_fields(estimate) if has_points else []
+                rows.writerow([*csv_row(frame.stamp_ns, estimate), *neck])
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
@@ -140,14 +149,28 @@ def track_recording(
                 tracker.agreement.check()
         if frames == 0:
             raise CardboxError(
-                f"no image lies after --start {start_s:g} s; give seconds from the bag's start"
+                f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
     remarks: list[str] = []
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(recording.names[1:])
-    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks))
+    return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
+
+
+def _rate(recording: Recording) -> float:
+    """Return the images a second, Hz, as exactly as a video can have them."""
+    try:
+        return round(1e9 / max(1, recording.first.period_ns()), 2)
+    except BagError:
+        return _USUAL_HZ
+
+
+def _neck_fields(estimate: Estimate) -> list[str]:
+    if estimate.neck is None:
+        return [""] * len(NECK_COLUMNS)
+    return [f"{value:.6f}" for value in estimate.neck]
 
 
 def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.description.urdf import ROOT_LINK
 from cardbox_tracker.viewing.library import rerun
@@ -20,6 +21,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "left_arm": tuple(name for name in JOINT_NAMES if name.startswith("left")),
     "right_arm": tuple(name for name in JOINT_NAMES if name.startswith("right")),
     "torso": tuple(name for name in JOINT_NAMES[1:] if name.startswith("torso")),
+    "head": NECK_NAMES,
     "place": ("torso_y", *PLACE_NAMES),
 }
 """Joints by plot: angles in degrees, the place in metres."""
@@ -55,7 +57,7 @@ def layout() -> Any:
         views.TimeSeriesView(
             origin=f"{JOINTS}/{name}", name=f"{name.replace('_', ' ')} [{unit}]", plot_legend=legend
         )
-        for name, unit in zip(GROUPS, ("deg", "deg", "deg", "m"), strict=True)
+        for name, unit in zip(GROUPS, ("deg", "deg", "deg", "deg", "m"), strict=True)
     ]
     return views.Blueprint(
         views.Horizontal(

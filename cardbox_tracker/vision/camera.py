@@ -100,6 +100,8 @@ class Calibration:
         distortion: coefficients (n,) of ``distortion_model``; empty or all zero without distortion.
         distortion_model: ``plumb_bob``, ``rational_polynomial`` or ``equidistant``.
         frame_id: name of the optical frame.
+        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it;
+            working images are turned back, so that they are level.
     """
 
     width: int
@@ -108,6 +110,23 @@ class Calibration:
     distortion: FloatArray
     distortion_model: str = "plumb_bob"
     frame_id: str = "camera_optical_frame"
+    roll_rad: float = 0.0
+
+    @classmethod
+    def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
+        """Return an ideal lens with a field of view, degrees, across the width of the image.
+
+        Raises:
+            CameraError: the field of view is not between 0 and 180 degrees.
+        """
+        if not 0.0 < fov_deg < 180.0:
+            raise CameraError(
+                f"the field of view is {fov_deg:g} degrees; expected more than 0 and less than 180"
+            )
+        focal_px = width / 2 / np.tan(np.radians(fov_deg) / 2)
+        k = np.diag([focal_px, focal_px, 1.0])
+        k[:2, 2] = (width - 1) / 2, (height - 1) / 2
+        return cls(width, height, k, np.zeros(5))
 
     @property
     def is_distorted(self) -> bool:
@@ -120,6 +139,7 @@ class Calibration:
             (self.width, self.height) == (other.width, other.height)
             and np.array_equal(self.k, other.k)
             and self._lens() == other._lens()
+            and self.roll_rad == other.roll_rad
         )
 
     def _lens(self) -> tuple[Any, ...]:
@@ -143,24 +163,33 @@ class Calibration:
         return full.scaled(width, height)
 
     def rectifier(self, width: int, height: int) -> Rectifier | None:
-        """Return a rectifier for images of ``width`` x ``height`` px; None without distortion.
+        """Return a rectifier for images of ``width`` x ``height`` px; None if none is needed.
 
         Raises:
             CameraError: the camera is uncalibrated or its distortion model is unknown.
         """
         self._check()
-        if not self.is_distorted:
+        if not self.is_distorted and self.roll_rad == 0.0:
             return None
         camera = self.camera(width, height)
         k = np.array([(camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0)])
-        size = (width, height)
-        if self.distortion_model == "equidistant":
+        size, turn = (width, height), self._turn()
+        if not self.is_distorted:
+            maps = cv2.initUndistortRectifyMap(k, np.zeros(5), turn, k, size, cv2.CV_16SC2)
+        elif self.distortion_model == "equidistant":
             maps = cv2.fisheye.initUndistortRectifyMap(
-                k, self.distortion[:4].reshape(4, 1), np.eye(3), k, size, cv2.CV_16SC2
+                k, self.distortion[:4].reshape(4, 1), turn, k, size, cv2.CV_16SC2
             )
         else:
-            maps = cv2.initUndistortRectifyMap(k, self.distortion, np.eye(3), k, size, cv2.CV_16SC2)
+            maps = cv2.initUndistortRectifyMap(k, self.distortion, turn, k, size, cv2.CV_16SC2)
         return Rectifier(*maps)
+
+    def _turn(self) -> FloatArray:
+        """Return the rotation (3, 3) that makes the rays of a rolled camera level."""
+        if self.roll_rad == 0.0:
+            return np.eye(3)
+        c, s = np.cos(self.roll_rad), np.sin(self.roll_rad)
+        return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
 
     def rectified(self, px: FloatArray, width: int, height: int) -> FloatArray:
         """Return where pixels (N, 2) of the calibrated image lie in the working image, px.
@@ -176,6 +205,8 @@ class Calibration:
             rays[:] = cv2.fisheye.undistortPoints(px[:, None], self.k, lens).reshape(-1, 2)
         else:
             rays[:] = cv2.undistortPoints(px[:, None], self.k, self.distortion).reshape(-1, 2)
+        if self.roll_rad:
+            rays = rays @ self._turn()[:2, :2].T
         placed: FloatArray = rays * (camera.fx, camera.fy) + (camera.cx, camera.cy)
         return placed
 

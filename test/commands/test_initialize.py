@@ -24,7 +24,7 @@ SPAN = "expected T0:T1, seconds from the start of the recording"
         (("--camera-pitch-deg", "95"), "camera_pitch_rad is 1.65806 rad; expected -1.4 to 1.4 rad"),
         (("--side-turn", "back"), "invalid choice: 'back' (choose from "),
         (("--seed", "-1"), "--seed: expected a whole number of 0 or more, got '-1'"),
-        (("--front", "90:99"), "no image lies in the front span 90:99 s of a bag of"),
+        (("--front", "90:99"), "no image lies in the front span 90:99 s of a recording of"),
         (("--front", "0:3"), "reference 'front': nobody is in the image"),
         (("--side", "6.6:8"), "'front' and 'side' are too alike"),
         (("--output", "FOLDER/text.txt"), "text.txt exists; choose another name, or give"),

@@ -20,6 +20,7 @@ NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
 SHARED = {
     *("output_paths", "__init__", "arguments", "checkout", "command", "main"),
+    *("camera_arguments", "person_arguments"),
     "settings_arguments",
 }
 
@@ -71,7 +72,7 @@ def test_version(cardbox: Callable) -> None:
     [
         ((), "required: COMMAND"),
         (("dance",), "invalid choice: 'dance'"),
-        (("track",), "required: BAG, --model, --start, --csv"),
+        (("track",), "required: RECORDING"),
         (("synthesize",), "required: --output"),
         (("urdf",), "required: MODEL.yaml"),
     ],

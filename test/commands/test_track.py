@@ -14,7 +14,10 @@ import pytest
         (("--start", "-1"), "--start: expected seconds from the start of the recording, got '-1'"),
         (("--start", "soon"), "got 'soon'"),
         (("--start", "99"), "no image lies after --start 99 s"),
-        (("--background", "90:99"), "0 images lie in the background span 90:99 s of a bag of"),
+        (
+            ("--background", "90:99"),
+            "0 images lie in the background span 90:99 s of a",
+        ),
         (("--preset", "fast"), "invalid choice: 'fast' (choose from "),
         (("--strategy", "best"), "invalid choice: 'best' (choose from "),
         (

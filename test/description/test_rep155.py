@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import gaze_m, neck_rotation
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     PLACE_LIMITS,
@@ -19,7 +21,12 @@ from cardbox_tracker.body.posture import (
     TURNING_LIMITS,
     reference_posture,
 )
-from cardbox_tracker.description.rep155 import REP155_JOINTS, Rep155Joints, joint_names
+from cardbox_tracker.description.rep155 import (
+    REP155_JOINTS,
+    Rep155Joints,
+    head_joints,
+    joint_names,
+)
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
@@ -54,7 +61,7 @@ def assert_agrees(
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pose.pitch_rad)
     body = Estimate(TRACKING, posture, offset_m=np.array(place)).placed(BODY)
     frames = forward_kinematics(body, posture)
-    found = places(ROBOT, np.array([*values, *place]))
+    found = places(ROBOT, np.array([*values, *place, 0.0, 0.0]))
     expected = dict(zip(LINKS, keypoints_m(body, posture), strict=True))
     for name, point in {**expected, "head": frames.head, "body": frames.hip}.items():
         optical = camera.reference_to_optical(point)
@@ -85,6 +92,22 @@ def test_without_the_place_there_are_twelve_joints() -> None:
     robot = load(BODY, torso_place=False)
     assert set(robot.actuated_joint_names) == set(joint_names("p1", torso_place=False))
     assert len(robot.actuated_joint_names) == 12
+
+
+@pytest.mark.parametrize("neck", [(0.6, 0.0), (0.0, 0.5), (-0.9, -0.4)])
+def test_the_head_turns_as_the_neck_does(neck: tuple[float, float]) -> None:
+    """``p_head`` is positive upwards in the reference model."""
+    posture, camera = np.zeros(12), Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.15)
+    posture[1:4] = (0.1, 0.3, -0.4)
+    values = [*Rep155Joints()(posture), 0.0, 0.0, *head_joints(np.array(neck))]
+    ROBOT.update_cfg(dict(zip(joint_names("p1"), values, strict=True)))
+    frames = forward_kinematics(BODY, posture)
+    turned = frames.torso_rotation @ neck_rotation(np.array(neck))
+    head = ROBOT.get_transform("head_p1", "eye")
+    expected = camera.reference_to_optical_rotation() @ turned
+    np.testing.assert_allclose(head[:3, :3], expected, atol=1e-6)
+    middle, _ = gaze_m(body_parts(BODY.sizes), frames, np.array(neck))
+    np.testing.assert_allclose(head[:3, 3], camera.reference_to_optical(middle), atol=1e-6)
 
 
 @settings(max_examples=25)

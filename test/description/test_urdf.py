@@ -15,6 +15,8 @@ import pytest
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES, gaze_m, neck_rotation
+from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
@@ -32,8 +34,8 @@ KEYPOINT_LINKS = (
 )
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
-ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS, NECK_LIMITS])
 
 
 def child(element: Xml.Element, tag: str) -> dict[str, str]:
@@ -107,30 +109,46 @@ def test_torso_x_and_z_move_the_person_as_the_estimate_does(
 ) -> None:
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, lateral_m=0.1)
     placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
-    joints = dict(zip(ALL_NAMES, [*posture, *place], strict=True))
+    joints = dict(zip(ALL_NAMES, [*posture, *place, 0.0, 0.0], strict=True))
     assert_agrees(urdf_from_body(body), placed, posture, joints)
 
 
 def test_torso_x_is_nearer_to_the_camera_and_torso_z_is_higher() -> None:
     """By hand: 2.3 m away and 0.4 m below, then 0.5 m nearer and 0.1 m higher."""
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
-    moved = dict.fromkeys(JOINT_NAMES, 0.0) | {"torso_x": 0.5, "torso_z": 0.1}
+    moved = dict.fromkeys(ALL_NAMES, 0.0) | {"torso_x": 0.5, "torso_z": 0.1}
     poses = link_poses(urdf_from_body(body), moved)
     np.testing.assert_allclose(poses["torso"][:3, 3], (1.8, 0.0, -0.3), atol=1e-12)
     np.testing.assert_allclose(poses["hips"][:3, 3], (2.3, 0.0, -0.4), atol=1e-12)
 
 
-def test_without_the_place_only_its_two_joints_are_missing() -> None:
+def test_without_the_place_only_it_and_the_neck_are_missing() -> None:
     full = Xml.fromstring(urdf_from_body(BodyModel(), "eye"))
-    for element in [*full.findall("link"), *full.findall("joint")]:
-        if element.attrib["name"].removesuffix("_link") in PLACE_NAMES:
-            full.remove(element)
-    (parent,) = full.findall("joint[@name='torso_y']/parent")
-    parent.attrib["link"] = "hips"
     short = Xml.fromstring(urdf_from_body(BodyModel(), "eye", torso_place=False))
+    for element in [*full.findall("link"), *full.findall("joint")]:
+        if element.attrib["name"].removesuffix("_link") in (*PLACE_NAMES, *NECK_NAMES):
+            full.remove(element)
+    for joint, link in (("torso_y", "hips"), ("neck", "torso")):
+        (parent,) = full.findall(f"joint[@name='{joint}']/parent")
+        parent.attrib["link"] = link
+    fixed, same = (robot.findall("joint[@name='neck']/origin")[0] for robot in (full, short))
+    fixed.attrib["xyz"] = same.attrib["xyz"]
     assert Xml.canonicalize(Xml.tostring(full), strip_text=True) == Xml.canonicalize(
         Xml.tostring(short), strip_text=True
     )
+
+
+@pytest.mark.parametrize("neck", [(0.6, 0.0), (0.0, 0.5), (-0.9, -0.4)])
+@pytest.mark.parametrize("posture", random_postures(2))
+def test_the_head_turns_as_the_neck_does(posture: np.ndarray, neck: tuple[float, float]) -> None:
+    body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
+    values = [*posture, 0.0, 0.0, *neck]
+    head = link_poses(urdf_from_body(body), dict(zip(ALL_NAMES, values, strict=True)))["head"]
+    frames = forward_kinematics(body, posture)
+    turned = frames.torso_rotation @ neck_rotation(np.array(neck))
+    np.testing.assert_allclose(head[:3, :3], TO_ROOT @ turned, atol=1e-9)
+    middle, _ = gaze_m(body_parts(body.sizes), frames, np.array(neck))
+    np.testing.assert_allclose(head[:3, 3], TO_ROOT @ middle, atol=1e-9)
 
 
 def assert_agrees(xml: str, body: BodyModel, posture: np.ndarray, joints: dict[str, float]) -> None:
@@ -184,7 +202,7 @@ def test_yourdfpy_loads_it_and_agrees() -> None:
     posture, place = random_postures(1)[0], random_places(1)[0]
     robot = yourdfpy.URDF.load(io.BytesIO(urdf_from_body(body).encode()))
     assert robot.validate()
-    robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place], strict=True)))
+    robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place, 0.4, -0.2], strict=True)))
     placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
     for point, link in zip(keypoints_m(placed, posture), KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.drawing.overlay import (
+    GAZE_BGR,
     JOINT_BGR,
     OUTLINE_BGR,
     SKELETON_BGR,
@@ -133,3 +134,24 @@ def test_a_person_half_outside_does_not_fail() -> None:
     draw_model(canvas, BODY, CAMERA, aside)
     assert canvas[:, 250:].any()
     assert not canvas[:, :200].any()
+
+
+@pytest.mark.parametrize(("yaw_rad", "side"), [(0.8, 1), (-0.8, -1)])
+def test_the_gaze_points_where_the_face_looks(yaw_rad: float, side: int) -> None:
+    """To the person's left is to the right of the image; without a neck there is no line."""
+    seen = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, neck=np.array([yaw_rad, 0.0])))
+    columns = np.nonzero(near(seen, GAZE_BGR))[1]
+    u, _ = CAMERA.project(CAMERA.reference_to_optical(forward_kinematics(BODY, FRONT).head))
+    far = columns[np.argmax(np.abs(columns - u))]
+    assert side * (far - u) > 10
+    assert not near(draw_overlay(GREY, BODY, CAMERA, FOUND), GAZE_BGR).any()
+
+
+def test_the_skeletons_marker_has_the_gaze_last() -> None:
+    plain = marker_shapes(BODY, CAMERA, FRONT)[1].points_m
+    looking = marker_shapes(BODY, CAMERA, FRONT, neck=np.array([0.5, 0.2]))[1].points_m
+    np.testing.assert_array_equal(looking[:-2], plain)
+    start, end = CAMERA.optical_to_reference(looking[-2:])
+    direction = (end - start) / np.linalg.norm(end - start)
+    expected = (np.cos(0.5) * np.cos(0.2), np.sin(0.5) * np.cos(0.2), -np.sin(0.2))
+    np.testing.assert_allclose(direction, expected, atol=1e-9)

@@ -14,7 +14,12 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.body.posture import JOINT_NAMES, TURNING_LIMITS
 from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.ergonomics.config import RulaConfig
-from cardbox_tracker.ergonomics.distribution import ScoreDistribution, score_distribution
+from cardbox_tracker.ergonomics.distribution import (
+    SAMPLES,
+    ScoreDistribution,
+    neck_samples,
+    score_distribution,
+)
 from cardbox_tracker.ergonomics.plot import plot_scores
 from cardbox_tracker.ergonomics.recording import CSV_HEADER, RulaRow, summarize, write_csv
 from cardbox_tracker.ergonomics.rula import grand_score, rula_scores
@@ -104,6 +109,50 @@ def test_what_is_declared_counts() -> None:
     assert scores(RulaConfig(arms_supported=True), left_shoulder_flexion=30)[0] == 1
     with pytest.raises(ValueError, match=r"neck is 7; expected 1 to 6"):
         RulaConfig(neck=7)
+
+
+# Table B with the trunk's score 1 and legs 1: necks 1 to 5 give 1, 2, 3, 5, 7; A is 2.
+@pytest.mark.parametrize(
+    ("yaw_deg", "pitch_deg", "neck", "grand"),
+    [
+        (0, 0, 1, 2),
+        (0, -8, 1, 2),
+        (0, 15, 2, 2),
+        (0, 30, 3, 3),
+        (0, -15, 4, 4),
+        (30, 15, 3, 3),
+        (-30, -15, 5, 5),
+        (15, 5, 1, 2),
+    ],
+)
+def test_a_known_neck_replaces_the_declared_one(
+    yaw_deg: float, pitch_deg: float, neck: int, grand: int
+) -> None:
+    angles = np.radians([yaw_deg, pitch_deg])
+    found = rula_scores(BODY, posture(), RulaConfig(neck=6), angles)
+    assert (int(found.neck), int(found.grand)) == (neck, grand)
+    assert int(rula_scores(BODY, posture(), RulaConfig(neck=6)).neck) == 6
+
+
+def test_the_limits_of_the_neck_are_settings() -> None:
+    bent = RulaConfig(neck_extended_deg=20.0, neck_twisted_deg=40.0)
+    assert int(rula_scores(BODY, posture(), bent, np.radians([30.0, -15.0])).neck) == 1
+
+
+def test_an_uncertain_neck_spreads_the_score() -> None:
+    postures = np.tile(posture(), (SAMPLES, 1))
+    rng = np.random.default_rng(0)
+    exact, unsure = (
+        score_distribution(
+            BODY,
+            postures,
+            RulaConfig(),
+            neck_samples(np.radians([0.0, 30.0]), np.full(2, stddev), SAMPLES, rng),
+        )
+        for stddev in (0.0, 0.3)
+    )
+    assert exact.grand[2] == 1.0
+    assert 0.0 < unsure.grand[2] < 1.0
 
 
 def test_the_worse_arm_decides_and_sides_are_alike() -> None:

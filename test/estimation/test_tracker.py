@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.neck import neck_rotation
 from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.config import (
     FilterConfig,
     TrackerConfig,
@@ -26,6 +28,8 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS
+from cardbox_tracker.estimation.head import FACE_M, FACE_POINTS
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import FILTERS, Tracker
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -476,3 +480,23 @@ def test_settings_with_other_particles_start_again(change: dict[str, Any]) -> No
     assert tracker.configure(config)
     assert tracker.config == config
     assert tracker.track(seen(front())).state == TRACKING
+
+
+def test_points_of_a_face_add_the_neck_and_change_nothing_else() -> None:
+    """The points are projected from a head turned to the left on an upright torso."""
+    body, posture, silhouette = BODY, front(), seen(front())
+    rotation = neck_rotation(np.radians([30.0, 0.0]))
+    points_m = forward_kinematics(body, posture).head + FACE_M @ rotation.T
+    px = CAMERA.project(CAMERA.reference_to_optical(points_m))
+    face = {name: (*xy, 1.0) for name, xy in zip(FACE_POINTS, px.tolist(), strict=True)}
+    points = ImagePoints.of(face)
+    plain, looking = make(), make()
+    without = plain.track(Observation(silhouette))
+    first = looking.track(Observation(silhouette, points=points))
+    assert without.neck is None
+    assert first.neck is not None
+    assert np.degrees(first.neck) == pytest.approx((30.0, 0.0), abs=12.0)
+    assert_same(without, first)
+    assert_same(plain.track(Observation(silhouette)), looking.track(Observation(silhouette)))
+    looking.reset()
+    assert looking.track(Observation(silhouette)).neck is None

@@ -21,6 +21,7 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.outputs import JOINT_STATE_NAMES
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
@@ -310,10 +311,9 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
     ):
         for header in (state.header, points.header):
             assert f"{header.stamp.sec}.{header.stamp.nanosec:09d}" == row["stamp"]
-        names = (*JOINT_NAMES, *PLACE_NAMES)
-        assert tuple(state.name) == names
-        expected = [float(row[name]) for name in names]
-        np.testing.assert_allclose(state.position, expected, atol=5.1e-7)
+        assert tuple(state.name) == JOINT_STATE_NAMES
+        expected = [float(row[name]) for name in (*JOINT_NAMES, *PLACE_NAMES)]
+        np.testing.assert_allclose(state.position, [*expected, 0.0, 0.0], atol=5.1e-7)
         assert points.header.frame_id == source.frame_id
         assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x"]), abs=1e-6)
     links = LinkTransforms(messages["robot_description"][0].data)
@@ -365,3 +365,27 @@ def test_without_a_path_there_is_no_bag(
     with result_bag(None, source.frame_id) as results:
         track(recording, source, tmp_path / "person.csv", observers=(results,))
     assert os.listdir(tmp_path) == ["person.csv"]
+
+
+def test_the_neck_has_columns_where_the_person_has_points(
+    recording: Any,
+    source: SilhouetteSource,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The face is seen in the first image only."""
+    real, seen = Tracker.track, iter(range(10_000))
+
+    def looking(self: Tracker, *images: Any) -> Estimate:
+        neck = np.array([0.25, -0.5]) if next(seen) == 0 else None
+        return replace(real(self, *images), neck=neck)
+
+    track(recording, source, tmp_path / "plain.csv")
+    monkeypatch.setattr(Tracker, "track", looking)
+    monkeypatch.setattr(SilhouetteSource, "has_points", True)
+    track(recording, source, tmp_path / "points.csv")
+    header, first, second, *_ = (tmp_path / "points.csv").read_text().splitlines()
+    _, plain_first, plain_second, *_ = (tmp_path / "plain.csv").read_text().splitlines()
+    assert header == f"{HEADER},neck_yaw,neck_pitch"
+    assert first == f"{plain_first},0.250000,-0.500000"
+    assert second == f"{plain_second},,"

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, reference_posture
+from cardbox_tracker.body.neck import NECK_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, N_STATE, PLACE_NAMES, reference_posture
 from cardbox_tracker.estimation.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -33,7 +34,7 @@ from cardbox_tracker.ros.messages.conversions import camera_info_message, image_
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
 
 
 class Session:
@@ -271,7 +272,8 @@ def test_each_image_gives_joint_states_of_its_stamp(measured: tuple[Session, str
     messages = session.joint_states[first:]
     assert [message.header.stamp for message in messages] == stamps
     assert all(tuple(message.name) == ALL_NAMES for message in messages)
-    posture, place = np.split(np.array(messages[-1].position), [len(JOINT_NAMES)])
+    posture, place, neck = np.split(np.array(messages[-1].position), [len(JOINT_NAMES), N_STATE])
+    np.testing.assert_array_equal(neck, 0.0)
     body, camera = session.scene.body, session.scene.camera
     truth = reference_posture("front")
     truth[0] = body.placement.lateral_m
@@ -304,7 +306,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     assert keypoints[-1].header.frame_id == "test_optical"
     points = np.array([(p.position.x, p.position.y, p.position.z) for p in keypoints[-1].poses])
     body, camera = session.scene.body, session.scene.camera
-    posture, place = np.split(np.array(state.position), [len(JOINT_NAMES)])
+    posture, place, _ = np.split(np.array(state.position), [len(JOINT_NAMES), N_STATE])
     placed = Estimate("tracking", posture, offset_m=place).placed(body)
     expected = camera.reference_to_optical(keypoints_m(placed, posture))
     assert points.shape == (6, 3)

@@ -16,7 +16,15 @@ from visualization_msgs.msg import Marker, MarkerArray
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
 from cardbox_tracker.errors import CardboxError, NotFiniteError
-from cardbox_tracker.outputs import JointValues, Markers, Points, Text, Value, posture_from
+from cardbox_tracker.outputs import (
+    JointValues,
+    Markers,
+    Points,
+    Text,
+    Value,
+    neck_from,
+    posture_from,
+)
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
@@ -49,6 +57,16 @@ def posture_of(message: JointState) -> FloatArray:
     except ValueError as error:
         raise CardboxError(f"joint states are not the tracker's: {error}") from None
     return _finite(found, "joint states")
+
+
+def neck_of(message: JointState) -> FloatArray | None:
+    """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad, or their deviations; None if missing.
+
+    Raises:
+        NotFiniteError: a value is not a finite number.
+    """
+    found = neck_from(joint_values_of(message))
+    return None if found is None else _finite(found, "joint states")
 
 
 def points_message(header: Header, points: Points) -> PoseArray:

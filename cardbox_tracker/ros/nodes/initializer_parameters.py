@@ -78,8 +78,8 @@ class InitializerParameters(NodeParameters):
     )
     torso_place_in_urdf: bool = parameter(
         True,
-        "robot_description has the joints torso_x and torso_z; must be the same as the tracker's "
-        "torso_place",
+        "robot_description has the joints torso_x, torso_z, neck_yaw and neck_pitch; must be the "
+        "same as the tracker's torso_place",
         effect=_NEXT_MEASUREMENT,
     )
 

@@ -18,13 +18,14 @@ from cardbox_tracker.ergonomics.distribution import (
     SAMPLES,
     ScoreDistribution,
     expected,
+    neck_samples,
     score_distribution,
 )
 from cardbox_tracker.ergonomics.recording import ABOVE
 from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.results import posture_of
+from cardbox_tracker.ros.messages.results import neck_of, posture_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -53,6 +54,8 @@ class RulaParameters(NodeParameters):
     abducted_deg: float = shared(RulaConfig, "abducted_deg")
     outwards_deg: float = shared(RulaConfig, "outwards_deg")
     side_bent_deg: float = shared(RulaConfig, "side_bent_deg")
+    neck_extended_deg: float = shared(RulaConfig, "neck_extended_deg")
+    neck_twisted_deg: float = shared(RulaConfig, "neck_twisted_deg")
     upright_deg: float = shared(RulaConfig, "upright_deg")
     seed: int = parameter(
         0, "random seed of the posture samples", limits=(0, 2**31 - 1), effect=AT_START
@@ -103,7 +106,11 @@ class RulaNode(CardboxNode):
             return
         posture, stddev = posture_of(self._joints), posture_of(message)
         postures = normal_postures(posture, stddev, SAMPLES, self._rng)
-        scores = score_distribution(self._body, postures, self.parameters.value.config())
+        # The tracker leaves out the deviations of a neck that it does not know.
+        neck, neck_stddev, necks = neck_of(self._joints), neck_of(message), None
+        if neck is not None and neck_stddev is not None:
+            necks = neck_samples(neck, neck_stddev, SAMPLES, self._rng)
+        scores = score_distribution(self._body, postures, self.parameters.value.config(), necks)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
         self._report.publish(_report_message(message, scores, self.get_name()))

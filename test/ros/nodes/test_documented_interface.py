@@ -20,6 +20,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
+from cardbox_tracker.body.neck import NECK_NAMES  # noqa: E402
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES  # noqa: E402
 from cardbox_tracker.description.link_transforms import LinkTransforms  # noqa: E402
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body  # noqa: E402
@@ -54,7 +55,7 @@ ARM = {
 }
 # rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
+ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 

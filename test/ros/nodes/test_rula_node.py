@@ -45,6 +45,18 @@ def test_a_pair_is_scored_under_its_stamp(bus: Any, joints: Any) -> None:
     assert chances.sum() == pytest.approx(1)
 
 
+def test_a_neck_counts_where_its_deviations_are_known(bus: Any, joints: Any) -> None:
+    bus.send("/body_model", MODEL)
+    for number, has_deviations in ((5, False), (6, True)):
+        states, deviations = joints(number, {}), joints(number, {}, other=0.001)
+        for message, values in ((states, (0.0, 0.5)), (deviations, (0.001, 0.001))):
+            if message is states or has_deviations:
+                message.name = [*message.name, "neck_yaw", "neck_pitch"]
+                message.position = [*message.position, *values]
+        send(bus, states, deviations)
+    assert bus.texts("/rula/score") == [pytest.approx(2.0), pytest.approx(3.0)]
+
+
 def test_deviations_of_another_image_are_not_taken(bus: Any, joints: Any) -> None:
     bus.send("/body_model", MODEL)
     send(bus, joints(7, {}), joints(8, {}))

@@ -1,0 +1,78 @@
+"""The camera as a user describes it, for recordings that do not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import atan, degrees, radians, tan
+from pathlib import Path
+
+from cardbox_tracker.errors import CameraError
+from cardbox_tracker.vision.camera import Calibration, load_calibration
+
+# Largest difference of the aspect ratios of a calibration and of the images.
+_ASPECT = 0.02
+# No usual phone held upright has so large a field of view across its image, degrees.
+_UPRIGHT_DEG = 55.0
+
+
+@dataclass(frozen=True)
+class GivenCamera:
+    """Properties of one camera; None for those that are not given.
+
+    Attributes:
+        fov_deg: field of view across the width of the image as it is shown, degrees.
+        calibration: file of camera_calibration, in place of the field of view.
+        roll_rad: how far the camera is turned clockwise about its axis, seen from behind it.
+        fps: images a second, in place of the rate that the recording states.
+    """
+
+    fov_deg: float | None = None
+    calibration: Path | None = None
+    roll_rad: float = 0.0
+    fps: float | None = None
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether field of view or calibration is given."""
+        return self.fov_deg is not None or self.calibration is not None
+
+    def calibrated(self, path: Path, width: int, height: int, frame_id: str = "") -> Calibration:
+        """Return the calibration of images of ``width`` x ``height`` px in the recording ``path``.
+
+        Raises:
+            CameraError: neither field of view nor calibration is given, or they do not fit.
+        """
+        if self.calibration is not None:
+            found = load_calibration(self.calibration)
+            stretch = width * found.height / (height * found.width)
+            if not 1 - _ASPECT < stretch < 1 + _ASPECT:
+                raise CameraError(
+                    f"the calibration {self.calibration} is for images of "
+                    f"{found.width}x{found.height}, but those of {path} are {width}x{height}; "
+                    "calibrate with images of the same aspect ratio and orientation, or give "
+                    "--fov DEG"
+                )
+        elif self.fov_deg is not None:
+            found = Calibration.of_fov(width, height, self.fov_deg)
+        else:
+            raise CameraError(
+                f"{path} does not tell the camera's field of view; give --fov DEG, across the "
+                "width of the image (webcams 60 to 78, phones 60 to 70 held sideways, 36 to 43 "
+                "upright), or --calibration FILE of camera_calibration"
+            )
+        return self.rolled(replace(found, frame_id=frame_id or found.frame_id))
+
+    def remarks(self, width: int, height: int) -> list[str]:
+        """Return a remark if the field of view seems to be that of the longer side."""
+        if self.fov_deg is None or height <= width or self.fov_deg < _UPRIGHT_DEG:
+            return []
+        tall_deg = 2 * degrees(atan(tan(radians(self.fov_deg) / 2) * height / width))
+        return [
+            f"--fov {self.fov_deg:g} is across the width of these upright images, which makes "
+            f"{tall_deg:.0f} degrees from top to bottom; a phone has 60 to 70 there, for which "
+            "--fov is 36 to 43"
+        ]
+
+    def rolled(self, calibration: Calibration) -> Calibration:
+        """Return the calibration with the given roll."""
+        return replace(calibration, roll_rad=self.roll_rad) if self.roll_rad else calibration

@@ -1,0 +1,56 @@
+"""Open a recording of any kind: a bag, a video or a folder of images."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS, BagReader
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_folder import SUFFIXES, ImageFolder, image_files
+from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.video_reader import FORMATS, VideoReader
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is that of a bag, as its name or its content says."""
+    if not path.is_dir():
+        return path.suffix in FILE_ENDINGS
+    if any((folder / "metadata.yaml").exists() for folder in (path, path / "bag")):
+        return True
+    return any(file.suffix in FILE_ENDINGS for file in path.iterdir())
+
+
+def open_images(path: str | os.PathLike[str], camera: GivenCamera | None = None) -> ImageRecording:
+    """Return the context of the recording at ``path``.
+
+    Args:
+        path: rosbag2 folder or file, video, or folder of JPEG or PNG images.
+        camera: properties of the camera that the recording does not have.
+
+    Raises:
+        BagError: there is no recording of these kinds.
+    """
+    path, camera = Path(path), camera or GivenCamera()
+    if is_bag(path):
+        if camera.fps is not None:
+            raise BagError(f"--fps has no effect on {path}: the images of a bag have stamps")
+        return BagReader(path, camera)
+    if path.is_dir():
+        if image_files(path):
+            return ImageFolder(path, camera)
+        raise BagError(
+            f"{path} is not a rosbag2 recording (it has no metadata.yaml), and it has no JPEG or "
+            "PNG images; give a bag, a video, or a folder of images"
+        )
+    if not path.exists():
+        raise BagError(
+            f"there is no recording {path}; give a rosbag2 folder or file, a video ({FORMATS}), or "
+            "a folder of images"
+        )
+    if not path.is_file():
+        raise BagError(f"{path} is a pipe or a device; give a recording: a bag, a video or images")
+    if path.suffix.lower() in SUFFIXES:
+        raise BagError(f"{path} is a single image; give the folder of all images, or a video")
+    return VideoReader(path, camera)

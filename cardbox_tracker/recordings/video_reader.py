@@ -1,0 +1,144 @@
+"""Read the images of a video file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.errors import BagError, EncodingError
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import RecordedImage, working_size
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.encodings import MOST_PIXELS
+from cardbox_tracker.vision.image_headers import check_pixels
+
+FORMATS = "MP4, MOV, AVI, MKV or WebM"
+"""Common containers, for texts; any that OpenCV can read will do."""
+
+# Rate of a video that states none, and the largest rate that is believed, Hz.
+_USUAL_HZ, _MOST_HZ = 30.0, 1000.0
+# Images that a whole video may lack at its end, since containers count inexactly.
+_LACKING = 2
+
+
+class VideoReader:
+    """Context of an open video; its times count from its first image.
+
+    Images are turned as the file asks for, as those of a phone that was held upright. Methods
+    raise BagError if the video cannot be read.
+
+    Attributes:
+        path: the file.
+        working_size: see ``ImageRecording``.
+        duration_s: seconds from the first to the last image, as the file states.
+    """
+
+    start_ns = 0
+
+    def __init__(self, path: Path, camera: GivenCamera) -> None:
+        """Store the path and the camera; the video is opened on entry."""
+        self.path, self._given = path, camera
+        self.working_size, self.duration_s = (0, 0), 0.0
+        self._size, self._count, self._last = (0, 0), 0, 0
+
+    def __enter__(self) -> VideoReader:
+        """Open the video and read its first image."""
+        if not self.path.is_file():
+            raise BagError(f"there is no video {self.path}; give a file in {FORMATS}")
+        with _opened(self.path) as capture:
+            size = (capture.get(cv2.CAP_PROP_FRAME_WIDTH), capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+            try:
+                check_pixels(int(size[0]), int(size[1]), MOST_PIXELS)
+            except EncodingError as error:
+                raise BagError(f"cannot read the video {self.path}: {error}") from None
+            found, image = capture.read()
+            if not found:
+                raise BagError(
+                    f"the video {self.path} has no image that can be decoded; expected {FORMATS}: "
+                    "film again, or convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
+                )
+            self._size = image.shape[1], image.shape[0]
+            self._hz = self._given.fps or _rate(capture)
+            self._count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        self.working_size = working_size(*self._size)
+        self.duration_s = max(0, self._count - 1) / self._hz
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the video, which is only open while its images are read."""
+
+    def image_topic(self, camera: str | None = None) -> str:
+        """Return the name of the file; there is only one camera."""
+        if camera is not None:
+            raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
+        return self.path.name
+
+    def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
+        """Yield the images in order, with the time in the file or at the given rate."""
+        period_ns = 1e9 / self._hz
+        first_ms, stamp_ns = 0.0, -1
+        with _opened(self.path) as capture:
+            number = 0
+            while (read := capture.read())[0]:
+                if self._given.fps is None:
+                    in_file_ms = capture.get(cv2.CAP_PROP_POS_MSEC)
+                    first_ms = in_file_ms if number == 0 else first_ms
+                    there_ns = round(1e6 * (in_file_ms - first_ms))
+                    # Damaged files state the same time for several images.
+                    stamp_ns = there_ns if there_ns > stamp_ns else stamp_ns + round(period_ns)
+                else:
+                    stamp_ns = round(number * period_ns)
+                decoded: NDArray[np.uint8] = np.asarray(read[1], np.uint8)
+                number += 1
+                yield RecordedImage(stamp_ns, "", stamp_ns, partial(np.asarray, decoded))
+        self._last = number
+
+    def calibration(self, camera: str | None = None) -> Calibration:
+        """Return the given calibration.
+
+        Raises:
+            CameraError: none is given, or it does not fit the images.
+        """
+        self.image_topic(camera)
+        return self._given.calibrated(self.path, *self._size)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about the field of view, and about a video that ends early."""
+        found = self._given.remarks(*self._size)
+        if 0 < self._last < self._count - _LACKING:
+            found.append(
+                f"{self.path} ends after {self._last} of {self._count} images; it is damaged or "
+                "was cut off"
+            )
+        return found
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+    # Without this, FFmpeg writes its own messages between those of this package.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    capture = cv2.VideoCapture(str(path))
+    try:
+        if not capture.isOpened():
+            raise BagError(
+                f"cannot read the recording {path}: expected a rosbag2, a folder of JPEG or PNG "
+                f"images, or a video ({FORMATS}) that is not empty or cut off; 'ffmpeg -i INPUT "
+                "OUTPUT.mp4' converts others"
+            )
+        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
+        yield capture
+    finally:
+        capture.release()
+
+
+def _rate(capture: cv2.VideoCapture) -> float:
+    stated = float(capture.get(cv2.CAP_PROP_FPS))
+    return stated if 0.0 < stated <= _MOST_HZ else _USUAL_HZ
