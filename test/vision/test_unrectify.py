@@ -17,9 +17,10 @@ LENSES = {
 }
 
 
+@pytest.mark.parametrize("roll_rad", [0.0, 0.1])
 @pytest.mark.parametrize("model", LENSES)
-def test_it_is_the_inverse_of_rectifying(model: str) -> None:
-    calibration = Calibration(640, 480, K, np.array(LENSES[model]), model)
+def test_it_is_the_inverse_of_rectifying(model: str, roll_rad: float) -> None:
+    calibration = Calibration(640, 480, K, np.array(LENSES[model]), model, roll_rad=roll_rad)
     px = np.random.default_rng(0).uniform((0, 0), SIZE, (50, 2))
     back = unrectified(calibration, px, *SIZE)
     # The lens moves some pixels far, and the inverse of the lens is found by iteration.
