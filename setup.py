@@ -105,6 +105,7 @@ setup(
             f"tracker = {NAME}.start:tracker",
             f"camera = {NAME}.start:camera",
             f"play_bag = {NAME}.start:play_bag",
+            f"detector = {NAME}.start:detector",
             f"stereo_depth = {NAME}.start:stereo_depth",
             f"rula = {NAME}.start:rula",
             f"retarget = {NAME}.start:retarget",

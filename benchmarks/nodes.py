@@ -8,10 +8,11 @@ arrival in the subscriber's process is measured, too.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scene import BenchmarkScene, make_scene
 from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.detection.model_files import installed_models
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.runtime.processes import Nodes, isolate, running_nodes
 
@@ -30,6 +32,7 @@ RATES_HZ = (15, 30, 60)
 STREAMS = (("mono8", 320, 240), ("bgr8", 640, 480))
 SEPARATE = ("background", "initializer", "tracker")
 TOGETHER = ("cardbox_nodes",)
+WITH_DETECTOR = (*SEPARATE, "detector")
 PERCENTILES = (50, 95, 99)
 
 _START_S = 30.0
@@ -39,7 +42,8 @@ _LAST_S = 0.5
 def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, Any] | None:
     """Measure every stream at every rate for ``seconds``; None where ROS is not installed.
 
-    ``single_process`` in the result holds the same figures for all nodes in one process.
+    ``single_process`` in the result holds the same figures for all nodes in one process, and
+    ``with_detector`` those beside the node ``detector``, None where it is not installed.
     """
     try:
         import rclpy  # noqa: F401
@@ -47,9 +51,26 @@ def measure_nodes(seconds: float, report: Callable[[float], None]) -> dict[str, 
         return None
     isolate()
     scenes = {stream: make_scene(*stream[1:], 60) for stream in STREAMS}
-    separate = _measure(SEPARATE, scenes, seconds, lambda done: report(0.5 * done))
-    together = _measure(TOGETHER, scenes, seconds, lambda done: report(0.5 + 0.5 * done))
-    return {**separate, "single_process": together}
+    ways = {"": SEPARATE, "single_process": TOGETHER}
+    if _has_detector():
+        ways["with_detector"] = WITH_DETECTOR
+    measured: dict[str, Any] = {"with_detector": None}
+    for number, (way, processes) in enumerate(ways.items()):
+        measured[way] = _measure(processes, scenes, seconds, partial(_part, report, number, ways))
+    return {**measured.pop(""), **measured}
+
+
+def _part(report: Callable[[float], None], number: int, of: Sized, done: float) -> None:
+    """Report the finished fraction of one of several parts."""
+    report((number + done) / len(of))
+
+
+def _has_detector() -> bool:
+    try:
+        installed_models()
+    except CardboxError:
+        return False
+    return importlib.util.find_spec("ai_edge_litert") is not None
 
 
 def _measure(
@@ -135,7 +156,9 @@ class _CameraAndListener:
         began = time.monotonic()
         together = name in TOGETHER
         parameter = f"{'tracker:' * together}model_file:={model}"
-        arguments = ("--ros-args", "-p", parameter) if together or name == "tracker" else ()
+        arguments = ["--ros-args", "-p", parameter] if together or name == "tracker" else []
+        if name == "tracker" and "detector" in self._processes:
+            arguments += ["-p", "keypoints:=detector/keypoints"]
         self._nodes.start(name, *arguments)
         expected = set(SEPARATE) if together else {name}
         while not expected <= self._ready:

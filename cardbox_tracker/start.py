@@ -24,6 +24,7 @@ NODES: dict[str, str] = {
     "tracker": "cardbox_tracker.ros.nodes.tracker_node",
     "camera": "cardbox_tracker.ros.nodes.camera_node",
     "play_bag": "cardbox_tracker.ros.nodes.play_bag_node",
+    "detector": "cardbox_tracker.ros.nodes.detector_node",
     "stereo_depth": "cardbox_tracker.ros.nodes.stereo_depth_node",
     "rula": "cardbox_tracker.ros.nodes.rula_node",
     "retarget": "cardbox_tracker.ros.nodes.retarget_node",
@@ -73,6 +74,7 @@ initializer = partial(_run, "initializer")
 tracker = partial(_run, "tracker")
 camera = partial(_run, "camera")
 play_bag = partial(_run, "play_bag")
+detector = partial(_run, "detector")
 stereo_depth = partial(_run, "stereo_depth")
 rula = partial(_run, "rula")
 retarget = partial(_run, "retarget")

@@ -77,6 +77,15 @@ ARGUMENTS = {
         *("0.0", "with depth: nearer pixels are the person; 0: learn a background", float),
         limits=(0.0, 20.0),
     ),
+    "detector": Argument("false", "start the node detector: 2D points for the tracker", bool),
+    "silhouettes": Argument(
+        *(
+            "background",
+            "source of the silhouettes: background, or detector without an empty scene",
+        ),
+        choices=("background", "detector"),
+    ),
+    "keypoints": Argument("", "2D points of another detector: a topic, or a table FILE.csv"),
     "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
     "robot_file": Argument("", "start the node retarget with this robot arm, a URDF", Path),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
@@ -90,8 +99,14 @@ GIVEN = {
         *("person_distance_m", "camera_pitch_deg", "side_turn", "model_file"),
         *("cameras", "extrinsics_file", "measure_distance", "depth"),
     ),
-    "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth"),
+    "tracker": ("preset", "rep155_id", "cameras", "extrinsics_file", "depth", "keypoints"),
+    "detector": ("image_transport",),
 }
+# Nodes of cardbox_nodes; the detector always has a process of its own.
+TOGETHER = ("background", "initializer", "tracker")
+# Nodes that each camera has.
+OF_A_CAMERA = ("background", "detector")
+POINTS = "detector/keypoints"
 LAYOUT_TOPICS = ("robot_description", "markers", "keypoints", "overlay", "silhouette")
 # robot_state_publisher does not start without a description, so it gets this one at first.
 NOBODY = '<robot name="cardbox_person"><link name="camera_level"/></robot>'
@@ -134,6 +149,11 @@ def _check(context: LaunchContext) -> list[object]:
             f"launch argument within_m is {given['within_m']}; expected it with depth, the topic "
             "of depth images of one camera, and without cameras"
         )
+    if typed["silhouettes"] == "detector" and (typed["single_process"] or typed["within_m"]):
+        raise ValueError(
+            "launch argument silhouettes is detector; expected it without within_m and without "
+            "single_process, because a node background would make silhouettes, too"
+        )
     if not Path(given["config_dir"]).is_dir():
         raise ValueError(
             f"launch argument config_dir is '{given['config_dir']}'; expected a folder with the "
@@ -149,10 +169,24 @@ def _nodes(context: LaunchContext) -> list[object]:
         ("image_raw/compressed", f"{given['image']}/compressed"),
         ("camera_info", given["camera_info"]),
     ]
-    if _wanted(context, "single_process"):
-        return [_single_process(context, remappings)]
-    cameras = values(ARGUMENTS, given)["cameras"] or [""]
-    return [
+    typed = values(ARGUMENTS, given)
+    detects = typed["detector"] or typed["silhouettes"] == "detector"
+    if detects and not typed["keypoints"]:
+        given["keypoints"] = POINTS
+    cameras = typed["cameras"] or [""]
+    left_out = [] if detects else ["detector"]
+    if typed["single_process"]:
+        left_out += TOGETHER
+    elif typed["silhouettes"] == "detector":
+        left_out.append("background")
+    # The tracker needs the calibration of the images for which the points are.
+    infos = [
+        (f"{below}/camera_info".lstrip("/"), _below(below, given["camera_info"]))
+        for below in cameras
+    ]
+    own = {"background": remappings, "detector": remappings, "tracker": infos}
+    nodes = [_single_process(context, remappings)] if typed["single_process"] else []
+    return nodes + [
         Node(
             package="cardbox_tracker",
             executable=name,
@@ -162,12 +196,18 @@ def _nodes(context: LaunchContext) -> list[object]:
                 [LaunchConfiguration("config_dir"), f"/{name}.yaml"],
                 _exact(_typed(given, name, below)),
             ],
-            remappings=remappings if name == "background" else [],
+            remappings=own.get(name, []),
             output="screen",
         )
         for name in GIVEN
-        for below in (cameras if name == "background" else [""])
+        if name not in left_out
+        for below in (cameras if name in OF_A_CAMERA else [""])
     ]
+
+
+def _below(camera: str, topic: str) -> str:
+    """Return the name of a camera's topic as the tracker sees it."""
+    return topic if not camera or topic.startswith("/") else f"{camera}/{topic}"
 
 
 def _users(context: LaunchContext) -> list[object]:
@@ -211,13 +251,16 @@ def _typed(given: dict[str, str], node: str, camera: str = "") -> dict[str, obje
         path = Path(kept)
         typed["background_file"] = str(path.with_name(f"{path.stem}_{camera}{path.suffix}"))
     # An empty list has no type in ROS, so it is left out.
-    return {name: typed[name] for name in GIVEN[node] if typed[name] != []}
+    found: dict[str, object] = {name: typed[name] for name in GIVEN[node] if typed[name] != []}
+    if node == "detector":
+        found["publish_silhouette"] = typed["silhouettes"] == "detector"
+    return found
 
 
 def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -> Node:
     """Return one process with all nodes and the source of images that the launch file chose."""
     given = context.launch_configurations
-    parameters = {name: _typed(given, name) for name in GIVEN}
+    parameters = {name: _typed(given, name) for name in TOGETHER}
     source = given.get("source", "")
     if source:
         parameters[source] = yaml.safe_load(given["source_parameters"])
@@ -230,6 +273,7 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
         yaml.safe_dump(sections, file)
     rules = [word for old, new in remappings for word in ("-r", f"background:{old}:={new}")]
+    rules += ["-r", f"tracker:camera_info:={given['camera_info']}"]
     return Node(
         package="cardbox_tracker",
         executable="cardbox_nodes",

@@ -287,6 +287,45 @@ def test_a_stereo_pair_has_depth_unless_it_is_not_wanted(launch: Callable[..., A
 
 
 @pytest.mark.parametrize("single_process", ["false", "true"])
+def test_the_detector_has_a_process_of_its_own(
+    launch: Callable[..., Any], single_process: str
+) -> None:
+    given = {"single_process": single_process, "camera_info": "/eye/info", "publish_tf": "false"}
+    alone = executables(launch("nodes", **given))
+    nodes = launch("nodes", detector="true", image="/eye/image", **given)
+    assert executables(nodes) == [*alone, "detector"]
+    assert parameters_of(nodes[-1])["publish_silhouette"] is False
+    assert dict(nodes[-1].options["remappings"])["image_raw"] == "/eye/image"
+    if single_process == "true":
+        assert "tracker:camera_info:=/eye/info" in nodes[0].options["arguments"]
+    else:
+        assert parameters_of(nodes[2])["keypoints"] == "detector/keypoints"
+        assert dict(nodes[2].options["remappings"]) == {"camera_info": "/eye/info"}
+
+
+def test_silhouettes_of_the_detector_take_the_place_of_the_background(
+    launch: Callable[..., Any],
+) -> None:
+    given = {"cameras": "[left, right]", "camera_info": "info", "publish_tf": "false"}
+    nodes = launch("nodes", silhouettes="detector", **given)
+    assert executables(nodes) == ["initializer", "tracker", "detector", "detector"]
+    assert namespaces(nodes) == ["", "", "/left", "/right"]
+    assert all(parameters_of(node)["publish_silhouette"] for node in nodes[2:])
+    names = dict(nodes[1].options["remappings"])
+    assert names == {"left/camera_info": "left/info", "right/camera_info": "right/info"}
+    for wrong in ({"single_process": "true"}, {"within_m": "2.0", "depth": "depth"}):
+        with pytest.raises(Exception, match="silhouettes is detector"):
+            launch("nodes", silhouettes="detector", **wrong)
+
+
+def test_points_of_another_detector_can_be_given(launch: Callable[..., Any]) -> None:
+    nodes = launch("nodes", keypoints="/yolo/detections", publish_tf="false")
+    assert executables(nodes) == NODES
+    assert parameters_of(nodes[2])["keypoints"] == "/yolo/detections"
+    assert parameters_of(launch("nodes", publish_tf="false")[2])["keypoints"] == ""
+
+
+@pytest.mark.parametrize("single_process", ["false", "true"])
 def test_what_uses_the_posture_is_started_where_it_is_asked_for(
     launch: Callable[..., Any], single_process: str
 ) -> None:

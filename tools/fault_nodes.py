@@ -84,10 +84,10 @@ class InsideNodes:
     def send(self, sent: Sent) -> None:
         """Hand an image and its CameraInfo to the background node."""
         header = header_of(sent.stamp_ns)
-        node = self.background
+        node, images = self.background, self.background.camera_images
         try:
-            node._on_info(camera_info_message(header, self.person.camera), 0)
-            node._on_image(image_message(header, self.person.image(sent), "mono8"), 0)
+            images.on_info(camera_info_message(header, self.person.camera), 0)
+            images.on_image(image_message(header, self.person.image(sent), "mono8"), 0)
         except CardboxError as error:
             node.diagnostics.problem(str(error))
 

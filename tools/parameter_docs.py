@@ -16,6 +16,7 @@ from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.ros.nodes.background_node import BackgroundParameters
 from cardbox_tracker.ros.nodes.camera_node import CameraParameters
+from cardbox_tracker.ros.nodes.detector_node import DetectorParameters
 from cardbox_tracker.ros.nodes.initializer_parameters import InitializerParameters
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagParameters
 from cardbox_tracker.ros.nodes.retarget_node import RetargetParameters
@@ -35,11 +36,12 @@ NODES: dict[str, type[NodeParameters]] = {
     "camera": CameraParameters,
     "play_bag": PlayBagParameters,
     "stereo_depth": StereoDepthParameters,
+    "detector": DetectorParameters,
     "rula": RulaParameters,
     "retarget": RetargetParameters,
 }
 """Node name to its parameters."""
-APART = ("rula", "retarget")
+APART = ("detector", "rula", "retarget")
 """Nodes that are no part of ``cardbox_nodes``."""
 
 _TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}

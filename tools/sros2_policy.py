@@ -14,6 +14,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,10 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.detector import PersonDetector
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_node import CameraNode
+from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode
@@ -174,6 +177,9 @@ def running(
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain)
     several: dict[str, Any] = {"cameras": list(layout.cameras)} if layout.cameras else {}
+    tracked = several | {"keypoints": "detector/keypoints"}
+    network: Any = None  # no image comes, so the network files are not needed
+    detector = partial(DetectorNode, PersonDetector(network))
     robot = {
         "robot_file": str(_CONFIG / "example_arm.urdf"),
         "joint_map_file": str(_CONFIG / "example_joint_map.yaml"),
@@ -182,8 +188,9 @@ def running(
         *((CameraNode, place, {"file": str(video)}) for place in layout.places if not layout.depth),
         (PlayBagNode, "/", {"bag": str(folder / "bag")}),
         *((BackgroundNode, place, {}) for place in layout.places),
+        *((detector, place, {"publish_silhouette": True}) for place in layout.places),
         (InitializerNode, "/", several),
-        (TrackerNode, "/", several | ({"depth": "depth"} if layout.depth else {})),
+        (TrackerNode, "/", tracked | ({"depth": "depth"} if layout.depth else {})),
         *([(StereoDepthNode, "/", {})] if layout.depth or not layout.cameras else []),
         (RulaNode, "/", {}),
         (RetargetNode, "/", robot),

@@ -31,6 +31,8 @@ _DETECTOR_PX, _LANDMARK_PX = 224, 256
 _LAYERS = ((8, 2), (16, 2), (32, 6))
 _LEAST_DETECTION, _LEAST_PRESENCE = 0.5, 0.5
 _SAME_PERSON_IOU = 0.3
+# A chance of one half.
+_LEAST_MASK = 128
 # The square around the person is this much larger than the circle through the detected points.
 _SQUARE_SCALE = 1.25
 # Two further outputs of the landmark network say where the next square is: centre and scale.
@@ -74,6 +76,10 @@ class Detection(NamedTuple):
     points_px: FloatArray
     scores: FloatArray
     mask: NDArray[np.uint8]
+
+    def silhouette(self) -> NDArray[np.uint8]:
+        """Return the silhouette (H, W), 255 where a pixel more likely shows the person, else 0."""
+        return np.where(self.mask >= _LEAST_MASK, 255, 0).astype(np.uint8)
 
 
 class PoseNetwork:

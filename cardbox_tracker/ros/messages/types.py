@@ -39,7 +39,7 @@ def optional_class(package: str, name: str) -> Any:
     """Return the message class ``name`` of a package, or None if it is not installed."""
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except ImportError:
+    except (ImportError, AttributeError):
         return None
 
 

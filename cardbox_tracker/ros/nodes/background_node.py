@@ -6,31 +6,30 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import BackgroundFileError, CameraError
 from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
 from cardbox_tracker.ros.nodes.shared_parameters import (
     depth_parameter,
     image_transport_parameter,
     max_megapixels_parameter,
 )
+from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter, shared
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.ros.runtime.publishers import SinglePublisher
 from cardbox_tracker.settings import settings_of
 from cardbox_tracker.vision.background import warm_up
 from cardbox_tracker.vision.background_advice import Findings, advice
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.background_file import background_path
-from cardbox_tracker.vision.calibration_watch import CalibrationWatch
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.camera import Calibration, Camera
 from cardbox_tracker.vision.depth_silhouette import WITHIN_LIMITS_M
 from cardbox_tracker.vision.kept_background import KeptBackground
 from cardbox_tracker.vision.learning import WAYS
@@ -120,31 +119,20 @@ class BackgroundNode(CardboxNode):
         self._kept = KeptBackground(path, (settings.width, settings.height))
         self._pipeline: SilhouettePipeline | None = None
         self._image: conversions.ImageArray | None = None
-        self._image_bytes = 0
-        self._info: CameraInfo | None = None
-        self._covered = 0.0
-        self._silhouettes = self.advertise_inside(Image, "silhouette", qos.SILHOUETTE)
-        self._images = self.advertise_inside(Image, "silhouette/image", qos.SILHOUETTE)
-        self._infos = self.advertise_inside(CameraInfo, "silhouette/camera_info", qos.SILHOUETTE)
+        self._outputs = SilhouetteOutputs(self)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
-        compressed = settings.image_transport == "compressed"
-        topic = "image_raw/compressed" if compressed else "image_raw"
-        kind = CompressedImage if compressed else Image
-        self._image_topic = self.resolve(topic)
-        self._info_topic = self.resolve("camera_info")
-        self._watch = CalibrationWatch(self._info_topic, self._image_topic)
-        self._single = SinglePublisher(self, (self._image_topic, self._info_topic))
-        self.subscribe(CameraInfo, "camera_info", self._on_info, qos.SENSOR_DATA)
-        self.subscribe(kind, topic, self._on_image, qos.SENSOR_DATA)
+        self.camera_images = CameraImages(
+            self,
+            settings.image_transport,
+            lambda: self.parameters.value.max_megapixels,
+            self._on_calibration,
+            self._on_image,
+        )
         self._cut = DepthCut(self, settings.depth, self._send) if settings.depth else None
         self.offer("~/learn", self._learn)
         self.diagnostics.extra = self._values
-        self.diagnostics.source = f"images on {self._image_topic}"
         self.diagnostics.advice = self._advice
-        self.diagnostics.wait_for(
-            f"images on {self._image_topic} and their CameraInfo on {self._info_topic}"
-        )
 
     def _changed(self, settings: BackgroundParameters) -> None:
         if self._pipeline is not None:
@@ -154,64 +142,42 @@ class BackgroundNode(CardboxNode):
         if self.parameters.value.within_m > 0.0:
             return "nothing has to be learned: within_m is set, so depth shows the person"
         if self._pipeline is None or self._image is None:
+            topic, info_topic = self.camera_images.topic, self.camera_images.info_topic
             raise CameraError(
-                f"no image was received yet on {self._image_topic}, so nothing can be learned; "
-                "is the camera running, and its CameraInfo on "
-                f"{self._info_topic}? See 'ros2 topic hz {self._image_topic}'"
+                f"no image was received yet on {topic}, so nothing can be learned; is the camera "
+                f"running, and its CameraInfo on {info_topic}? See 'ros2 topic hz {topic}'"
             )
         self._kept.forget()
         self._pipeline.relearn(WAYS[self.parameters.value.learning])
-        return f"waiting for {self._pipeline.learning.waits_for(self._image_topic)}"
+        return f"waiting for {self._pipeline.learning.waits_for(self.camera_images.topic)}"
 
-    def _on_info(self, message: CameraInfo, _: int) -> None:
-        before = self._watch.remark
-        changed = self._watch.see(message)
-        if self._watch.remark and not before:
-            self.get_logger().warning(self._watch.remark)
-        calibration = self._watch.current
-        if not changed or calibration is None:
-            return
+    def _on_calibration(self, calibration: Calibration) -> None:
         settings = self.parameters.value
         if self._pipeline is not None:
-            self.get_logger().warning(
-                f"the CameraInfo on {self._info_topic} has changed for good, to {calibration}"
-            )
             self._kept.carry_over(self._pipeline.model)
-        self._image, self._info = None, message
+        self._image = None
         self._pipeline = SilhouettePipeline(
             calibration,
             (settings.width, settings.height),
             settings.config(),
             WAYS[settings.learning],
         )
-        self.diagnostics.wait_for(f"images on {self._image_topic}")
 
-    def _on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
-        if not self.diagnostics.input.add(conversions.stamp_ns(message.header.stamp)).is_usable:
-            return
-        self._image_bytes = len(message.data)
+    def _on_image(self, header: Header, full: conversions.ImageArray, sent_ns: int) -> None:
         pipeline = self._pipeline
-        if pipeline is None:
-            if not self._watch.seen:
-                self.diagnostics.wait_for(
-                    f"the CameraInfo on {self._info_topic} for the images on {self._image_topic}"
-                )
-            return
-        calibration, most = pipeline.calibration, self.parameters.value.max_megapixels
-        full = conversions.image_of(message, conversions.most_pixels_of(calibration, most))
-        conversions.check_shape(full, calibration, self._image_topic, self._info_topic)
+        assert pipeline is not None
         self._image = image = pipeline.prepare(full)
         within_m = self.parameters.value.within_m
         if self._cut is not None and within_m > 0.0:
-            self._send_image(message.header, image)
-            self._cut.add(message.header, pipeline.camera, within_m, sent_ns)
+            self._outputs.send_image(header, image)
+            self._cut.add(header, pipeline.camera, within_m, sent_ns)
             return
         if not pipeline.is_ready:
-            self._prepare(message.header, pipeline, image)
+            self._prepare(header, pipeline, image)
         if pipeline.is_ready:
-            self._send_image(message.header, image)
-            silhouette = pipeline.silhouette(image, conversions.stamp_ns(message.header.stamp))
-            self._send(message.header, silhouette, pipeline.camera, sent_ns)
+            self._outputs.send_image(header, image)
+            silhouette = pipeline.silhouette(image, conversions.stamp_ns(header.stamp))
+            self._send(header, silhouette, pipeline.camera, sent_ns)
 
     def _prepare(
         self, header: Header, pipeline: SilhouettePipeline, image: conversions.ImageArray
@@ -221,7 +187,7 @@ class BackgroundNode(CardboxNode):
         if not done:
             pipeline.learning.add(image)
             if not pipeline.has_enough:
-                self.diagnostics.wait_for(pipeline.learning.waits_for(self._image_topic))
+                self.diagnostics.wait_for(pipeline.learning.waits_for(self.camera_images.topic))
                 return
             pipeline.finish_learning()
             done = f"background learned from {pipeline.learned_images} images"
@@ -235,26 +201,19 @@ class BackgroundNode(CardboxNode):
         self._stddev.publish(conversions.image_message(header, model.stddev, "32FC1"))
         self.get_logger().info(done)
 
-    def _send_image(self, header: Header, image: conversions.ImageArray) -> None:
-        """Publish an image before its silhouette; the tracker pairs both."""
-        if self._images.get_subscription_count():
-            self._images.publish(conversions.image_message(header, image))
-
     def _send(
         self, header: Header, silhouette: conversions.ImageArray, camera: Camera, sent_ns: int
     ) -> None:
         """Publish a silhouette (H, W), 0 or 255, and then its calibration."""
-        self._silhouettes.publish(conversions.image_message(header, silhouette, "mono8"))
-        self._infos.publish(conversions.camera_info_message(header, camera, self._info))
-        self._covered = np.count_nonzero(silhouette) / silhouette.size
+        self._outputs.send(header, silhouette, camera, self.camera_images.info)
         self.diagnostics.working(sent_ns)
 
     def _values(self) -> dict[str, str]:
         values = {
             "background learned from": f"0/{self.parameters.value.learn_images}",
-            "foreground (% of the image)": f"{100 * self._covered:.1f}",
+            "foreground (% of the image)": f"{100 * self._outputs.covered:.1f}",
             "scene brightness drift (grey levels)": f"{self._drift():.1f}",
-            "ignored CameraInfo": str(self._watch.ignored),
+            "ignored CameraInfo": str(self.camera_images.watch.ignored),
         }
         if self._pipeline is not None:
             values |= self._pipeline.learning.values()
@@ -266,17 +225,17 @@ class BackgroundNode(CardboxNode):
         return self._pipeline.drift(self._image)
 
     def _advice(self) -> dict[str, str]:
-        settings, remark = self.parameters.value, self._watch.remark
+        settings = self.parameters.value
         findings = Findings(
-            self._image_topic,
+            self.camera_images.topic,
             self.diagnostics.input.loss,
-            self._image_bytes,
+            self.camera_images.image_bytes,
             self._drift(),
             settings.follow and settings.clean_up,
-            self._covered,
+            self._outputs.covered,
             settings.within_m,
         )
-        return advice(findings) | self._single.remarks() | ({"": remark} if remark else {})
+        return advice(findings) | self.camera_images.remarks()
 
 
 def main(args: list[str] | None = None) -> int:

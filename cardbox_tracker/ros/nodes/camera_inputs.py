@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,13 +19,14 @@ from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
+from cardbox_tracker.ros.nodes.input_stream import InputStream
+from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
-from cardbox_tracker.vision.stamps import StreamStatistics
 
 _SILENT_S = 3.0
 # A paused camera falls behind, so stamps are compared only while all cameras send.
@@ -68,38 +68,6 @@ class ObservationSet:
         return self.nothing if seen is None else seen
 
 
-class _Stream:
-    """Statistics and faults of the messages of one camera, or of the depth images."""
-
-    def __init__(self, name: str, topic: str) -> None:
-        self.name, self.topic = name, topic
-        self.statistics = StreamStatistics()
-        self.problem = ""
-        self.newest_ns = 0
-        self._arrived_s = self._counted_s = time.monotonic()
-        self._counted = 0
-
-    @property
-    def age_s(self) -> float:
-        """Seconds since the last message, or since the start."""
-        return time.monotonic() - self._arrived_s
-
-    def arrived(self, stamp_ns: int) -> bool:
-        """Count a message, and return whether it can be used."""
-        self._arrived_s, self.newest_ns = time.monotonic(), stamp_ns
-        return self.statistics.add(stamp_ns).is_usable
-
-    def values(self) -> dict[str, str]:
-        """Return the rate since the last call, and the age of the last message."""
-        now_s, count = time.monotonic(), self.statistics.received
-        rate = (count - self._counted) / max(now_s - self._counted_s, 1e-3)
-        self._counted_s, self._counted = now_s, count
-        return {
-            f"{self.name} rate (Hz)": f"{rate:.1f}",
-            f"{self.name} age (s)": f"{self.age_s:.1f}" if count else "never",
-        }
-
-
 class CameraInputs:
     """Subscribes to all cameras, and delivers messages of the same time in order.
 
@@ -133,12 +101,12 @@ class CameraInputs:
         self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         topics = silhouettes_of(cameras)
         self._streams = [
-            _Stream(camera.strip("/") or "camera", node.resolve(topic))
+            InputStream(camera.strip("/") or "camera", node.resolve(topic))
             for camera, topic in zip(cameras, topics, strict=True)
         ]
         self._count = len(self._streams)
         if settings.depth:
-            self._streams.append(_Stream("depth", node.resolve(settings.depth)))
+            self._streams.append(InputStream("depth", node.resolve(settings.depth)))
         self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
         self._pairings = [ImagePairing(partial(self._add, number)) for number in range(self._count)]
@@ -149,6 +117,7 @@ class CameraInputs:
             node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
+        self._keypoints = KeypointInputs(node, settings)
 
     @property
     def source(self) -> str:
@@ -177,7 +146,7 @@ class CameraInputs:
 
     def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:
         stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
-        is_usable = self._streams[number].arrived(stamp_ns)
+        is_usable = self._streams[number].arrived(stamp_ns).is_usable
         if len(self._streams) == 1:
             # The node itself drops and counts repeated and late messages.
             self._deliver(received, [received])
@@ -211,7 +180,10 @@ class CameraInputs:
         cameras = [first, *(other.camera for other in self._poses.others)]
         streams = self._streams[: self._count]
         observations = [
-            Observation(*_picture(*each)) for each in zip(streams, messages, cameras, strict=True)
+            self._with_points(number, one, Observation(*_picture(stream, one, camera)), camera)
+            for number, (stream, one, camera) in enumerate(
+                zip(streams, messages, cameras, strict=True)
+            )
         ]
         if all(one.silhouette is None for one in observations):
             problems = [stream.problem for stream in streams if stream.problem]
@@ -233,6 +205,15 @@ class CameraInputs:
             np.zeros((first.height, first.width), np.uint8),
         )
 
+    def _with_points(
+        self, number: int, received: Received | None, seen: Observation, camera: Camera
+    ) -> Observation:
+        """Return an observation with the points that have arrived; it does not wait for points."""
+        if received is None or seen.silhouette is None:
+            return seen
+        header = received.message.header
+        return replace(seen, points=self._keypoints.points(number, header, camera, seen.silhouette))
+
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
         if not received or received[0] is None:
             return None
@@ -246,8 +227,8 @@ class CameraInputs:
         return depth_m
 
     def values(self, ious: Sequence[float | None]) -> dict[str, str]:
-        """Return rate, age and fit of each stream that has a name, for the diagnostics."""
-        values: dict[str, str] = {}
+        """Return rate and age of points and of each stream that has a name, and its fit."""
+        values = self._keypoints.values()
         for number, stream in enumerate(self._streams if self._is_named else ()):
             values |= stream.values()
             if self._count > 1 and number < min(len(ious), self._count):
@@ -258,11 +239,11 @@ class CameraInputs:
         return values
 
     def warnings(self) -> dict[str, str]:
-        """Return warnings about single streams while the others continue, by kind."""
+        """Return warnings about points and single streams while the others continue, by kind."""
+        texts = self._keypoints.warnings()
         if len(self._streams) == 1:
-            return {}
+            return texts
         first, *others = self._streams
-        texts = {}
         for stream in self._streams:
             if stream.age_s > _SILENT_S:
                 texts[f"silence of {stream.name}"] = (
@@ -285,7 +266,7 @@ class CameraInputs:
 
 
 def _picture(
-    stream: _Stream, received: Received | None, camera: Camera
+    stream: InputStream, received: Received | None, camera: Camera
 ) -> tuple[ImageArray | None, ImageArray | None]:
     """Return silhouette and image of a camera; None for each that is missing or unreadable."""
     if received is None:

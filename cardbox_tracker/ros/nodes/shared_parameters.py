@@ -39,6 +39,16 @@ def depth_parameter() -> Any:
     )
 
 
+def keypoints_parameter() -> Any:
+    """Return the field of the source of 2D points."""
+    return parameter(
+        "",
+        "2D points of the person's joints: a topic, below each camera's namespace if there are "
+        "several, such as detector/keypoints, or a table FILE.csv (docs/detectors.md); empty: none",
+        effect=AT_START,
+    )
+
+
 def image_transport_parameter() -> Any:
     """Return the field of the image topic's transport."""
     return parameter(

@@ -16,6 +16,7 @@ from cardbox_tracker.ros.nodes.shared_parameters import (
     cameras_parameter,
     depth_parameter,
     extrinsics_parameter,
+    keypoints_parameter,
 )
 from cardbox_tracker.ros.runtime.parameter_fields import (
     AT_START,
@@ -166,6 +167,12 @@ class TrackerParameters(NodeParameters):
     cameras: list[str] = cameras_parameter()
     extrinsics_file: str = extrinsics_parameter()
     depth: str = depth_parameter()
+    keypoints: str = keypoints_parameter()
+
+    @property
+    def has_point_table(self) -> bool:
+        """Whether ``keypoints`` is a table; no name of a topic has a dot."""
+        return self.keypoints.endswith(".csv")
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core.
@@ -208,6 +215,11 @@ class TrackerParameters(NodeParameters):
                 "default with several cameras or depth"
             )
         camera_names(self.cameras)
+        if len(self.cameras) > 1 and self.keypoints.startswith("/") and not self.has_point_table:
+            raise ValueError(
+                f"keypoints is '{self.keypoints}', one topic for {len(self.cameras)} cameras; "
+                "expected a name below each camera's namespace, such as detector/keypoints"
+            )
         most = max(config.torso.particles, config.arm.particles)
         if most * config.cycles > MOST_MOVES:
             raise ValueError(

@@ -15,6 +15,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_srvs.srv import Trigger
 
@@ -93,10 +94,28 @@ class CardboxNode(Node):
             return publisher
         return self._intra_process.advertise(publisher)
 
-    def subscribe(self, kind: Any, topic: str, callback: Callback, profile: QoSProfile) -> None:
+    def subscribe(
+        self,
+        kind: Any,
+        topic: str,
+        callback: Callback,
+        profile: QoSProfile,
+        *,
+        has_one_type: bool = True,
+    ) -> Subscription | None:
         """Subscribe to a topic, bypassing DDS if a node of this process offers it.
 
         An exception in ``callback`` is reported, and the node continues.
+
+        Args:
+            kind: class of the messages.
+            topic: name of the topic.
+            callback: receives each message.
+            profile: quality of service, which can be overridden.
+            has_one_type: False if the caller adapts to publishers of another type.
+
+        Returns:
+            The subscription; None without DDS.
         """
 
         def guarded(message: Any, info: dict[str, Any]) -> None:
@@ -108,12 +127,13 @@ class CardboxNode(Node):
             except Exception as error:
                 self._unexpected(f"a message on {self.resolve(topic)}", error)
 
-        self._types.add(self.resolve(topic), kind)
+        if has_one_type:
+            self._types.add(self.resolve(topic), kind)
         if self._intra_process is not None and self._intra_process.subscribe(
             self.resolve(topic), guarded
         ):
-            return
-        self.create_subscription(
+            return None
+        return self.create_subscription(
             kind,
             topic,
             guarded,  # type: ignore[arg-type]  # rclpy leaves out its own second argument

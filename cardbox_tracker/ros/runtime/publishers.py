@@ -1,4 +1,4 @@
-"""Detection of no or several publishers of one camera's images or calibration."""
+"""Detection of no or several publishers of one camera's images, calibration or silhouettes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SinglePublisher:
             if len(names) > 1:
                 found[f"publishers of {topic}"] = (
                     f"{len(names)} publishers send {topic}: {', '.join(names)}; expected one "
-                    "camera. Stop all but one, or give each camera its own namespace "
+                    "for each camera. Stop all but one, or give each camera its own namespace "
                     "(docs/cameras.md); a killed publisher stays listed for some seconds"
                 )
             if topic in self._absent:

@@ -21,6 +21,8 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 SENSOR_DATA = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+# A slow subscriber gets the newest image, not those that came while it worked.
+NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Reliable publishers match subscribers of either kind (REP-2003).
 CAMERA = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
 SILHOUETTE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)

@@ -20,7 +20,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
     camera_info_message,
     image_message,
 )
-from cardbox_tracker.ros.nodes import camera_inputs, camera_poses  # noqa: E402
+from cardbox_tracker.ros.nodes import camera_poses, input_stream  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
@@ -250,8 +250,8 @@ def test_what_cannot_be_read_is_left_out_and_said(watching: Watching) -> None:
 def test_silence_and_other_clocks_are_said(
     watching: Watching, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now_s = camera_inputs.time.monotonic()
-    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s)
     watching.show("left", 100 * S)
     watching.show("right", 90 * S)
     watching.show_depth(100 * S, np.ones((48, 64)))
@@ -272,8 +272,8 @@ def test_silence_and_other_clocks_are_said(
 def test_a_camera_that_pauses_has_no_other_clock(
     watching: Watching, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now_s = camera_inputs.time.monotonic()
-    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s)
     watching.show("right", 100 * S)
     now_s += 1.5
     watching.show("left", 100 * S + 3 * S // 2)
@@ -298,8 +298,8 @@ def test_one_camera_is_a_list_of_one() -> None:
 
 
 def test_one_camera_with_a_name_has_values_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    now_s = camera_inputs.time.monotonic()
-    monkeypatch.setattr(camera_inputs.time, "monotonic", lambda: now_s)
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s)
     alone = Watching(depth="", cameras=("left",))
     for step in range(10):
         alone.show("left", S + step * S // 5)

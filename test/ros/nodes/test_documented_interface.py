@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,8 +25,10 @@ from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES  # noqa: E402
 from cardbox_tracker.description.link_transforms import LinkTransforms  # noqa: E402
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body  # noqa: E402
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
+from cardbox_tracker.recordings.detector import PersonDetector  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
 from cardbox_tracker.ros.nodes.camera_node import CameraNode  # noqa: E402
+from cardbox_tracker.ros.nodes.detector_node import DetectorNode  # noqa: E402
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
 from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode  # noqa: E402
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
@@ -40,6 +43,7 @@ NODES = (
     "play_bag",
     "background",
     "stereo_depth",
+    "detector",
     "initializer",
     "tracker",
     "rula",
@@ -143,10 +147,17 @@ def nodes_called(name: str, make: Callable[..., Any], folder: Path) -> list[Any]
         return [make(PlayBagNode, bag=str(folder / "bag"))]
     if name == "stereo_depth":
         return [make(StereoDepthNode, image_transport=kind) for kind in ("raw", "compressed")]
+    if name == "detector":
+        network: Any = None
+        kind: Any = partial(DetectorNode, PersonDetector(network))
+        return [
+            make(kind, image_transport="raw", publish_silhouette=True),
+            make(kind, image_transport="compressed"),
+        ]
     if name == "tracker":
         return [
-            make(TrackerNode, rep155_id="ID"),
-            make(TrackerNode, cameras=["CAMERA"], depth="DEPTH"),
+            make(TrackerNode, rep155_id="ID", keypoints="KEYPOINTS"),
+            make(TrackerNode, cameras=["CAMERA"], depth="DEPTH", keypoints="KEYPOINTS"),
         ]
     if name == "retarget":
         return [make(RetargetNode, **ARM)]

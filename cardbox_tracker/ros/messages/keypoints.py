@@ -1,0 +1,172 @@
+"""Conversion of 2D keypoints between messages and :class:`ImagePoints`.
+
+Points are pixels of the camera's own image, at the size that its CameraInfo has. Messages of other
+packages are read by the names of their fields, so that no package has to be installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from std_msgs.msg import Header
+
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.detection.landmarks import LANDMARKS
+from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.ros.messages.types import optional_class
+
+COCO_NAMES = (*POINT_NAMES[:13], "left_knee", "right_knee", "left_ankle", "right_ankle")
+"""The 17 points of COCO in its order."""
+MESSAGE_NAMES = (*COCO_NAMES, *POINT_NAMES[13:])
+"""The points of a PolygonStamped: those of COCO, then the knuckles, which may be left out."""
+SKELETON_NAMES = (
+    "nose",
+    "neck",
+    *("right_shoulder", "right_elbow", "right_wrist"),
+    *("left_shoulder", "left_elbow", "left_wrist"),
+    *("right_hip", "right_knee", "right_ankle"),
+    *("left_hip", "left_knee", "left_ankle"),
+    *("left_eye", "right_eye", "left_ear", "right_ear"),
+)
+"""The points of hri_msgs/Skeleton2D in its order."""
+
+POLYGON_STAMPED = "geometry_msgs/msg/PolygonStamped"
+"""Type of the messages that need no further package."""
+
+# float32 rounds a score of 1 by less.
+_MOST_SCORE = 1.001
+# A point may lie outside the image, but by no more than this multiple of the larger side.
+_MOST_OUTSIDE = 1.0
+_MOST_PERSONS = 100
+
+Size = tuple[int, int]
+"""Width and height of the camera's image in its CameraInfo, px."""
+Convert = Callable[[Any, Size], list[ImagePoints]]
+"""Takes a message; returns the points of each person. Raises CardboxError if it is malformed."""
+
+
+def keypoints_message(header: Header, px: FloatArray, scores: FloatArray) -> PolygonStamped:
+    """Return the message of the landmarks of one person.
+
+    Args:
+        header: header of the image.
+        px: column and row of each of ``LANDMARKS``, (33, 2).
+        scores: chance that each is right, (33,); all zero if nobody is there.
+    """
+    points = [
+        Point32(x=float(px[i, 0]), y=float(px[i, 1]), z=float(scores[i]))
+        for i in map(LANDMARKS.index, MESSAGE_NAMES)
+    ]
+    return PolygonStamped(header=header, polygon=Polygon(points=points))
+
+
+def skeleton_class() -> Any:
+    """Return hri_msgs/Skeleton2D; None if it is not installed, or has other points."""
+    kind = optional_class("hri_msgs", "Skeleton2D")
+    if kind is None or len(getattr(kind(), "skeleton", ())) != len(SKELETON_NAMES):
+        return None
+    return kind
+
+
+def skeleton_message(
+    kind: Any, header: Header, px: FloatArray, scores: FloatArray, size: Size
+) -> Any:
+    """Return the message ``kind``, hri_msgs/Skeleton2D, of landmarks as above."""
+    message = kind(header=header)
+    shoulders = [LANDMARKS.index(f"{side}_shoulder") for side in ("left", "right")]
+    for point, name in zip(message.skeleton, SKELETON_NAMES, strict=True):
+        of = shoulders if name == "neck" else [LANDMARKS.index(name)]
+        # Its coordinates are 0 and 1 at the edges of the image, not at the centres of pixels.
+        column, row = (px[of].mean(axis=0) + 0.5) / size
+        point.x, point.y, point.c = float(column), float(row), float(scores[of].min())
+    return message
+
+
+def persons_of_polygon(message: Any, size: Size) -> list[ImagePoints]:
+    """Return the person of a PolygonStamped, if it has points.
+
+    Raises:
+        CardboxError: the number of points is wrong, or a point is impossible.
+    """
+    points = message.polygon.points
+    if not points:
+        return []
+    if len(points) not in (len(COCO_NAMES), len(MESSAGE_NAMES)):
+        raise CardboxError(
+            f"a person has {len(points)} points; expected the {len(COCO_NAMES)} of COCO in its "
+            f"order, or {len(MESSAGE_NAMES)} with four knuckles (docs/detectors.md)"
+        )
+    named = zip(MESSAGE_NAMES, points, strict=False)
+    return [_person(((name, p.x, p.y, p.z) for name, p in named), size)]
+
+
+def persons_of_skeleton(message: Any, size: Size) -> list[ImagePoints]:
+    """Return the person of a Skeleton2D.
+
+    Raises:
+        CardboxError: the number of points is wrong, or a point is impossible.
+    """
+    points, (width, height) = message.skeleton, size
+    if len(points) != len(SKELETON_NAMES):
+        raise CardboxError(
+            f"a Skeleton2D has {len(points)} points; expected the {len(SKELETON_NAMES)} of REP-155"
+        )
+    named = zip(SKELETON_NAMES, points, strict=True)
+    placed = ((name, p.x * width - 0.5, p.y * height - 0.5, p.c) for name, p in named)
+    return [_person(placed, size)]
+
+
+def persons_of_detections(message: Any, size: Size) -> list[ImagePoints]:
+    """Return the persons of a DetectionArray of yolo_msgs that have keypoints.
+
+    Raises:
+        CardboxError: there are too many persons, a point has an unknown number, or is impossible.
+    """
+    found = message.detections
+    if len(found) > _MOST_PERSONS:
+        raise CardboxError(f"{len(found)} detections; expected at most {_MOST_PERSONS}")
+    persons = []
+    for one in found:
+        points = one.keypoints.data
+        if one.class_name not in ("", "person") or not points:
+            continue
+        if len(points) > len(COCO_NAMES) or not all(1 <= p.id <= len(COCO_NAMES) for p in points):
+            raise CardboxError(
+                f"a person has {len(points)} keypoints, or other numbers than 1 to "
+                f"{len(COCO_NAMES)}; expected those of COCO, as YOLO's pose models have them"
+            )
+        placed = ((COCO_NAMES[p.id - 1], p.point.x, p.point.y, p.score) for p in points)
+        persons.append(_person(placed, size))
+    return persons
+
+
+CONVERSIONS: dict[str, Convert] = {
+    POLYGON_STAMPED: persons_of_polygon,
+    "hri_msgs/msg/Skeleton2D": persons_of_skeleton,
+    "yolo_msgs/msg/DetectionArray": persons_of_detections,
+}
+"""Conversion of each type of message that can be read."""
+
+
+def _person(points: Iterable[tuple[str, float, float, float]], size: Size) -> ImagePoints:
+    """Return the points with name, column, row and score; those with the score 0 are missing."""
+    found = {}
+    far_px = _MOST_OUTSIDE * max(size)
+    for name, column, row, score in points:
+        if not 0.0 <= score <= _MOST_SCORE:
+            raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
+        if score == 0.0:
+            continue
+        inside = (
+            -far_px <= at <= side + far_px for at, side in zip((column, row), size, strict=True)
+        )
+        if not all(inside):
+            raise CardboxError(
+                f"{name} is at {quoted((column, row))} px; expected a place in the camera's image "
+                f"of {size[0]}x{size[1]} px, or the score 0 if the point is missing"
+            )
+        found[name] = column, row, score
+    return ImagePoints.of(found)

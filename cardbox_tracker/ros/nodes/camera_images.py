@@ -1,0 +1,119 @@
+"""The images of one camera with their calibration, for the nodes that process them first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+
+from cardbox_tracker.ros.messages import conversions
+from cardbox_tracker.ros.messages.conversions import ImageArray
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.node import CardboxNode
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
+from cardbox_tracker.vision.calibration_watch import CalibrationWatch
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.stamps import StampOrder
+
+Deliver = Callable[[Header, ImageArray, int], None]
+"""Callback that receives header, image (H, W) or (H, W, 3), bgr, and its send time, ns."""
+
+
+class CameraImages:
+    """Subscribes to images, raw or compressed, and to their CameraInfo.
+
+    Attributes:
+        topic: full name of the topic of the images.
+        info_topic: full name of the topic of their CameraInfo.
+        watch: follows the calibration.
+        info: CameraInfo in use; None before the first valid one.
+        order: relation of the stamp of the last delivered image to the one before.
+        image_bytes: size of the data of the last image.
+    """
+
+    def __init__(
+        self,
+        node: CardboxNode,
+        transport: str,
+        most_megapixels: Callable[[], float],
+        changed: Callable[[Calibration], None],
+        deliver: Deliver,
+        profile: QoSProfile = qos.SENSOR_DATA,
+    ) -> None:
+        """Subscribe with ``node`` and report on its diagnostics.
+
+        Args:
+            node: the node.
+            transport: ``raw`` or ``compressed``.
+            most_megapixels: returns the limit for images, in millions of pixels.
+            changed: called with the first calibration, and with another one that lasts.
+            deliver: called with each image once the calibration is known.
+            profile: quality of service of the images.
+        """
+        self._node = node
+        self._most_megapixels, self._changed, self._deliver = most_megapixels, changed, deliver
+        compressed = transport == "compressed"
+        topic = "image_raw/compressed" if compressed else "image_raw"
+        kind = CompressedImage if compressed else Image
+        self.topic, self.info_topic = node.resolve(topic), node.resolve("camera_info")
+        self.watch = CalibrationWatch(self.info_topic, self.topic)
+        self.info: CameraInfo | None = None
+        self.order = StampOrder.NEXT
+        self.image_bytes = 0
+        self._single = SinglePublisher(node, (self.topic, self.info_topic))
+        node.subscribe(CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
+        node.subscribe(kind, topic, self.on_image, profile)
+        node.diagnostics.source = f"images on {self.topic}"
+        node.diagnostics.wait_for(
+            f"images on {self.topic} and their CameraInfo on {self.info_topic}"
+        )
+
+    def on_info(self, message: CameraInfo, _: int) -> None:
+        """Use a CameraInfo if it is the first valid one, or lasts.
+
+        Raises:
+            CameraError: the message is invalid and no valid one has arrived yet.
+        """
+        before = self.watch.remark
+        changed = self.watch.see(message)
+        if self.watch.remark and not before:
+            self._node.get_logger().warning(self.watch.remark)
+        calibration = self.watch.current
+        if not changed or calibration is None:
+            return
+        if self.info is not None:
+            self._node.get_logger().warning(
+                f"the CameraInfo on {self.info_topic} has changed for good, to {calibration}"
+            )
+        self.info = message
+        self._changed(calibration)
+        self._node.diagnostics.wait_for(f"images on {self.topic}")
+
+    def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
+        """Deliver an image if its stamp can be used and the calibration is known.
+
+        Raises:
+            CardboxError: the image cannot be decoded, or has another shape than its calibration.
+        """
+        order = self._node.diagnostics.input.add(conversions.stamp_ns(message.header.stamp))
+        if not order.is_usable:
+            return
+        self.order, self.image_bytes = order, len(message.data)
+        calibration = self.watch.current
+        if calibration is None:
+            if not self.watch.seen:
+                self._node.diagnostics.wait_for(
+                    f"the CameraInfo on {self.info_topic} for the images on {self.topic}"
+                )
+            return
+        most = conversions.most_pixels_of(calibration, self._most_megapixels())
+        image = conversions.image_of(message, most)
+        conversions.check_shape(image, calibration, self.topic, self.info_topic)
+        self._deliver(message.header, image, sent_ns)
+
+    def remarks(self) -> dict[str, str]:
+        """Return warnings about the publishers and the calibration, by kind."""
+        remark = self.watch.remark
+        return self._single.remarks() | ({"": remark} if remark else {})

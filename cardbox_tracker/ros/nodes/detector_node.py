@@ -1,0 +1,181 @@
+"""The node ``detector``: images in, 2D points of the person's joints and silhouettes out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PolygonStamped
+from std_msgs.msg import Header
+
+from cardbox_tracker.detection.landmarks import LANDMARKS
+from cardbox_tracker.detection.pose_network import Detection
+from cardbox_tracker.recordings.detector import Detector, PersonDetector
+from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
+from cardbox_tracker.ros.messages.keypoints import (
+    keypoints_message,
+    skeleton_class,
+    skeleton_message,
+)
+from cardbox_tracker.ros.nodes.camera_images import CameraImages
+from cardbox_tracker.ros.nodes.shared_parameters import (
+    image_transport_parameter,
+    max_megapixels_parameter,
+)
+from cardbox_tracker.ros.nodes.silhouette_outputs import SilhouetteOutputs
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
+from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
+from cardbox_tracker.ros.runtime.parameters import LiveParameters
+from cardbox_tracker.ros.runtime.publishers import SinglePublisher
+from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.vision.silhouettes import SilhouettePipeline
+from cardbox_tracker.vision.stamps import WINDOW, StampOrder
+from cardbox_tracker.vision.unrectify import unrectified
+
+_DOES = "Find the person in a camera's images: images in, 2D points and silhouettes out."
+
+
+@dataclass(frozen=True)
+class DetectorParameters(NodeParameters):
+    """Find the person's joints and outline in the camera's images with a neural network."""
+
+    image_transport: str = image_transport_parameter()
+    width: int = parameter(
+        320, "working resolution, width", unit="px", limits=(32, 4096), effect=AT_START
+    )
+    height: int = parameter(
+        240, "working resolution, height", unit="px", limits=(32, 4096), effect=AT_START
+    )
+    publish_silhouette: bool = parameter(
+        False,
+        "also publish the person's mask on silhouette, instead of the node background, which must "
+        "not run beside it",
+        effect=AT_START,
+    )
+    rate_hz: float = parameter(
+        0.0,
+        "most images a second to look at, to save processor time; 0: as many as it manages",
+        unit="Hz",
+        limits=(0.0, 240.0),
+    )
+    max_megapixels: float = max_megapixels_parameter()
+
+
+class DetectorNode(CardboxNode):
+    """Looks at the newest image; images that come in the meantime are left out."""
+
+    def __init__(self, person: PersonDetector | None = None, **options: Any) -> None:
+        """Load the networks, subscribe to the camera and wait for its images.
+
+        Args:
+            person: finds the person in images; the installed detector without one.
+            options: options of :class:`CardboxNode`.
+
+        Raises:
+            CardboxError: the detector is not installed.
+        """
+        super().__init__("detector", **options)
+        self.parameters = LiveParameters(self, DetectorParameters)
+        settings = self.parameters.value
+        self._person = person or Detector.installed().start()
+        self._pipeline: SilhouettePipeline | None = None
+        self._looked_ns = 0
+        self._took_ms: deque[float] = deque(maxlen=WINDOW)
+        self._keypoints = self.advertise(PolygonStamped, "~/keypoints", qos.RESULT)
+        self._skeleton_kind = skeleton_class()
+        self._skeletons = (
+            None
+            if self._skeleton_kind is None
+            else self.advertise(self._skeleton_kind, "~/skeleton2d", qos.RESULT)
+        )
+        self._silhouettes = SilhouetteOutputs(self) if settings.publish_silhouette else None
+        self.diagnostics.extra = self._values
+        self._images = CameraImages(
+            self,
+            settings.image_transport,
+            lambda: self.parameters.value.max_megapixels,
+            self._on_calibration,
+            self._on_image,
+            # While the network works, only the newest image is kept.
+            qos.NEWEST,
+        )
+        own = (self.resolve("silhouette"),) if settings.publish_silhouette else ()
+        self._single = SinglePublisher(self, own)
+        self.diagnostics.advice = lambda: self._images.remarks() | self._single.remarks()
+
+    def _on_calibration(self, calibration: Calibration) -> None:
+        settings = self.parameters.value
+        self._pipeline = SilhouettePipeline(calibration, (settings.width, settings.height))
+        self._person.restart()
+
+    def _on_image(self, header: Header, full: ImageArray, sent_ns: int) -> None:
+        pipeline = self._pipeline
+        assert pipeline is not None
+        if self._images.order is StampOrder.RESTART:
+            self._person.restart()
+            self._looked_ns = 0
+        if not self._is_due(stamp_ns(header.stamp)):
+            return
+        began_s = time.perf_counter()
+        image = pipeline.prepare(full)
+        found = self._person(image)
+        self._took_ms.append(1e3 * (time.perf_counter() - began_s))
+        self._send_points(header, found, pipeline)
+        if self._silhouettes is not None:
+            self._silhouettes.send_image(header, image)
+            nobody = np.zeros(image.shape[:2], np.uint8)
+            silhouette = nobody if found is None else found.silhouette()
+            self._silhouettes.send(header, silhouette, pipeline.camera, self._images.info)
+        self.diagnostics.working(sent_ns)
+
+    def _is_due(self, at_ns: int) -> bool:
+        """Return whether to look at the image with this stamp, as ``rate_hz`` says."""
+        rate_hz = self.parameters.value.rate_hz
+        if rate_hz > 0.0 and at_ns:
+            # The image nearest to the time is taken, not the first one after it.
+            early_ns = self.diagnostics.input.period_ns / 2
+            if at_ns - self._looked_ns + early_ns < 1e9 / rate_hz:
+                return False
+            self._looked_ns = at_ns
+        return True
+
+    def _send_points(
+        self, header: Header, found: Detection | None, pipeline: SilhouettePipeline
+    ) -> None:
+        """Publish the points, all with the score 0 if nobody is there."""
+        calibration, camera = pipeline.calibration, pipeline.camera
+        px, scores = np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS))
+        if found is not None:
+            px = unrectified(calibration, found.points_px, camera.width, camera.height)
+            scores = found.scores
+        self._keypoints.publish(keypoints_message(header, px, scores))
+        if self._skeletons is not None:
+            size = calibration.width, calibration.height
+            kind = self._skeleton_kind
+            self._skeletons.publish(skeleton_message(kind, header, px, scores, size))
+
+    def _values(self) -> dict[str, str]:
+        values = {
+            "images without a person": str(self._person.missed),
+            "ignored CameraInfo": str(self._images.watch.ignored),
+        }
+        if self._took_ms:
+            values["time of an image (ms)"] = f"{np.median(self._took_ms):.1f}"
+        if self._silhouettes is not None:
+            values["foreground (% of the image)"] = f"{100 * self._silhouettes.covered:.1f}"
+        return values
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node; the exit code is 0 unless it could not start."""
+    return run_node(DetectorNode, plain_command_line("detector", _DOES, args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

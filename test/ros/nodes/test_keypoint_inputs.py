@@ -1,0 +1,375 @@
+"""Points for the tracker that are late, seldom, missing, malformed, or of another type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time  # noqa: E402
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped, PoseArray  # noqa: E402
+from rclpy.context import Context  # noqa: E402
+from sensor_msgs.msg import Image  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints  # noqa: E402
+from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message  # noqa: E402
+from cardbox_tracker.ros.nodes import input_stream, keypoint_topic  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet  # noqa: E402
+from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters  # noqa: E402
+from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+
+MS = 1_000_000
+T = 10_000 * MS
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+FULL = CAMERA.scaled(640, 480)
+SILHOUETTE = np.zeros((48, 64), np.uint8)
+NOSE = POINT_INDEX["nose"]
+
+
+def header(at_ns: int, frame: str = "eye") -> Header:
+    return Header(frame_id=frame, stamp=Time(sec=at_ns // 10**9, nanosec=at_ns % 10**9))
+
+
+def keypoints(at_ns: int, column: float = 100.0, frame: str = "eye") -> PolygonStamped:
+    """Return a person whose points are all in one place of the camera's image of 640x480."""
+    point = Point32(x=column, y=100.0, z=0.5)
+    return PolygonStamped(header=header(at_ns, frame), polygon=Polygon(points=[point] * 17))
+
+
+class Tracker:
+    """A node that only asks for points."""
+
+    def __init__(self, bus: Any, source: str = "points", cameras: tuple[str, ...] = ("",)) -> None:
+        self.bus = bus
+        self.node = bus.start(lambda **options: CardboxNode("tracker", **options))
+        names = [name for name in cameras if name]
+        settings = TrackerParameters(keypoints=source, cameras=names)
+        self.inputs = KeypointInputs(self.node, settings)
+        self.node.diagnostics.advice = self.inputs.warnings
+        self.cameras = cameras
+
+    def calibrate(self) -> Tracker:
+        for name in self.cameras:
+            place = f"/{name}/camera_info".replace("//", "/")
+            self.bus.send(place, camera_info_message(header(T), FULL))
+        return self
+
+    def ask(self, at_ns: int, number: int = 0, frame: str = "eye") -> ImagePoints | None:
+        return self.inputs.points(number, header(at_ns, frame), CAMERA, SILHOUETTE)
+
+    def warning(self) -> str:
+        return "; ".join(self.inputs.warnings().values())
+
+
+@pytest.fixture
+def tracker(bus: Any) -> Tracker:
+    return Tracker(bus).calibrate()
+
+
+def nose_of(points: ImagePoints | None) -> tuple[float, float]:
+    assert points is not None
+    return float(points.px[NOSE, 0]), float(points.px[NOSE, 1])
+
+
+def test_points_are_placed_in_the_silhouette(tracker: Tracker) -> None:
+    tracker.bus.send("/points", keypoints(T))
+    points = tracker.ask(T)
+    # A pixel of the silhouette is ten of the image.
+    assert nose_of(points) == pytest.approx((100.5 / 10 - 0.5, 100.5 / 10 - 0.5))
+    assert points is not None and points.stamp_ns == T
+    assert points.scores[NOSE] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "expected_ms"), [(0, 0), (100, 100), (300, 300), (301, None), (-50, 0), (-51, None)]
+)
+def test_points_join_in_time_with_their_stamp(
+    tracker: Tracker, late_ms: int, expected_ms: int | None
+) -> None:
+    tracker.bus.send("/points", keypoints(T))
+    points = tracker.ask(T + late_ms * MS)
+    assert (points is None) == (expected_ms is None)
+    if points is not None:
+        assert points.stamp_ns == T + (late_ms - (expected_ms or 0)) * MS
+
+
+def test_a_lens_throws_no_point_far_away(bus: Any) -> None:
+    tracker = Tracker(bus)
+    info = camera_info_message(header(T), FULL)
+    info.d = [-0.9, 0.9, 0.0, 0.0, 0.0]
+    bus.send("/camera_info", info)
+    for number, column in enumerate((300.0, 1200.0, -600.0)):
+        bus.send("/points", keypoints(T + number * 33 * MS, column))
+        points = tracker.ask(T + number * 33 * MS)
+        if points is not None:
+            assert np.all(np.abs(points.px[points.scores > 0.0]) < 2 * CAMERA.width)
+        assert column != 300.0 or points is not None
+
+
+def test_points_are_used_once_and_the_newest_ones(tracker: Tracker) -> None:
+    for number in range(3):
+        tracker.bus.send("/points", keypoints(T + number * 33 * MS, 100.0 + 10 * number))
+    assert nose_of(tracker.ask(T + 80 * MS))[0] == pytest.approx(12.05 - 0.5)
+    assert tracker.ask(T + 113 * MS) is None
+
+
+def test_points_that_come_seldom_join_every_sixth_image(tracker: Tracker) -> None:
+    joined = []
+    for image in range(30):
+        if image % 6 == 3 and image > 3:
+            # They were found in an image that is three images old.
+            tracker.bus.send("/points", keypoints(T + (image - 3) * 33 * MS))
+        joined.append(tracker.ask(T + image * 33 * MS) is not None)
+    assert [image for image, is_there in enumerate(joined) if is_there] == [9, 15, 21, 27]
+    values = tracker.inputs.values()
+    assert values["keypoints behind the image (ms)"] == "99"
+
+
+def test_points_of_a_newer_image_wait_for_their_silhouette(tracker: Tracker) -> None:
+    tracker.bus.send("/points", keypoints(T + 200 * MS))
+    assert tracker.ask(T) is None
+    assert tracker.ask(T + 200 * MS) is not None
+
+
+def test_nobody_gives_no_points(tracker: Tracker) -> None:
+    tracker.bus.send("/points", PolygonStamped(header=header(T)))
+    assert tracker.ask(T) is None
+    assert tracker.warning() == ""
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        (PolygonStamped(header=header(T), polygon=Polygon(points=[Point32()] * 9)), "9 points"),
+        (PolygonStamped(header=header(T), polygon=Polygon(points=[Point32()] * 10_000)), "10000"),
+        (keypoints(T, float("nan")), "expected a place"),
+        (keypoints(T, float("inf")), "expected a place"),
+        (keypoints(0), "no stamp"),
+    ],
+)
+def test_bad_messages_are_reported_and_not_used(
+    tracker: Tracker, message: Any, expected: str
+) -> None:
+    for _ in range(3):
+        tracker.bus.send("/points", message)
+    assert tracker.ask(T) is None
+    assert expected in tracker.warning() and "/points" in tracker.warning()
+    # A good one follows, and the warning ends.
+    tracker.bus.send("/points", keypoints(T + 33 * MS))
+    assert tracker.ask(T + 33 * MS) is not None
+    assert tracker.warning() == ""
+
+
+def test_another_release_of_a_foreign_message_is_reported(tracker: Tracker) -> None:
+    tracker.bus.send("/points", SimpleNamespace(header=header(T), people=[]))
+    assert tracker.ask(T) is None
+    assert "fields of geometry_msgs/msg/PolygonStamped" in tracker.warning()
+
+
+def test_points_of_another_camera_are_not_used(tracker: Tracker) -> None:
+    tracker.bus.send("/points", keypoints(T, frame="other_eye"))
+    assert tracker.ask(T) is None
+    assert "'other_eye'" in tracker.warning() and "'eye'" in tracker.warning()
+
+
+@pytest.mark.parametrize(("apart_s", "word"), [(-4, "older"), (4, "newer")])
+def test_stamps_of_another_clock_are_reported(tracker: Tracker, apart_s: int, word: str) -> None:
+    for image in range(20):
+        tracker.bus.send("/points", keypoints(T + apart_s * 1000 * MS + image * 33 * MS))
+        assert tracker.ask(T + image * 33 * MS) is None
+    assert word in tracker.warning() and "s must be that of the image" not in tracker.warning()
+    assert int(tracker.inputs.values()["keypoints not used"]) >= 5
+
+
+def test_memory_is_bounded_while_no_silhouette_comes(tracker: Tracker) -> None:
+    for image in range(1000):
+        tracker.bus.send("/points", keypoints(T + image * 33 * MS))
+    topic = tracker.inputs._topics[0]
+    assert len(topic._kept) <= 8
+
+
+def test_a_loop_of_the_recording_starts_anew(tracker: Tracker) -> None:
+    tracker.bus.send("/points", keypoints(T))
+    tracker.bus.send("/points", keypoints(T - 5000 * MS))
+    assert tracker.ask(T - 5000 * MS) is not None
+
+
+def test_without_the_cameras_calibration_it_is_said(
+    bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tracker = Tracker(bus)
+    tracker.bus.send("/points", keypoints(T))
+    assert tracker.ask(T) is None
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s + 5.0)
+    assert "no CameraInfo has come on /camera_info" in tracker.warning()
+
+
+def test_silence_is_reported(tracker: Tracker, monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s + 5.0)
+    assert "no points have come on /points" in tracker.warning()
+    tracker.bus.send("/points", keypoints(T))
+    assert tracker.warning() == ""
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s + 15.0)
+    assert "nothing has come on /points for 10 s" in tracker.warning()
+
+
+def test_one_camera_of_two_may_have_points(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    tracker = Tracker(bus, cameras=("cam0", "cam1")).calibrate()
+    tracker.bus.send("/cam1/points", keypoints(T))
+    assert tracker.ask(T, 0) is None
+    assert tracker.ask(T, 1) is not None
+    now_s = input_stream.time.monotonic()
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s + 2.9)
+    assert "cam1 keypoints rate (Hz)" in tracker.inputs.values()
+    assert tracker.inputs.values()["cam0 keypoints age (s)"] == "never"
+    assert tracker.warning() == ""
+
+
+def table(folder: Path, *rows: str, camera: bool = False) -> Path:
+    path = folder / "points.csv"
+    names = "stamp_ns,joint,u,v,score" + (",camera" if camera else "")
+    path.write_text("\n".join([names, *rows]), encoding="utf-8")
+    return path
+
+
+def test_a_table_is_looked_up_by_the_stamp(bus: Any, tmp_path: Path) -> None:
+    path = table(tmp_path, f"{T},nose,100,100,0.5", f"{T},left_knee,9,9,1")
+    tracker = Tracker(bus, str(path))
+    assert tracker.ask(T) is None
+    tracker.calibrate()
+    assert nose_of(tracker.ask(T)) == pytest.approx((9.55, 9.55))
+    assert tracker.ask(T + 33 * MS) is None
+    assert nose_of(tracker.ask(T)) == pytest.approx((9.55, 9.55))
+
+
+def test_a_table_of_several_cameras_names_them(bus: Any, tmp_path: Path) -> None:
+    path = table(tmp_path, f"{T},nose,100,100,0.5,cam1", camera=True)
+    tracker = Tracker(bus, str(path), ("cam0", "cam1")).calibrate()
+    assert tracker.ask(T, 0) is None
+    assert tracker.ask(T, 1) is not None
+
+
+def test_a_table_that_cannot_be_read_ends_the_start(bus: Any, tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match=r"nowhere\.csv"):
+        Tracker(bus, str(tmp_path / "nowhere.csv"))
+    with pytest.raises(CardboxError, match="no number"):
+        Tracker(bus, str(table(tmp_path, f"{T},nose,x,100,0.5")))
+
+
+def test_an_absolute_topic_is_of_one_camera(bus: Any) -> None:
+    tracker = Tracker(bus, "/yolo/points", ("cam0",)).calibrate()
+    tracker.bus.send("/yolo/points", keypoints(T))
+    assert tracker.ask(T) is not None
+    TrackerParameters(keypoints="/points.csv", cameras=["cam0", "cam1"]).check()
+    with pytest.raises(ValueError, match="one topic for 2 cameras"):
+        TrackerParameters(keypoints="/yolo/points", cameras=["cam0", "cam1"]).check()
+
+
+def test_an_impossible_topic_ends_the_start(bus: Any) -> None:
+    with pytest.raises(CardboxError, match="topic"):
+        Tracker(bus, "not a topic")
+
+
+def test_observations_have_the_points_of_their_camera(bus: Any) -> None:
+    found: list[ObservationSet] = []
+    node = bus.start(lambda **options: CardboxNode("tracker", **options))
+    settings = TrackerParameters(keypoints="points", use_image=False)
+    inputs = CameraInputs(
+        node, settings, lambda *_: None, lambda _, all_: found.append(inputs.observed(all_))
+    )
+    bus.send("/silhouette/camera_info", camera_info_message(header(T), CAMERA))
+    bus.send("/camera_info", camera_info_message(header(T), FULL))
+    for image in range(2):
+        # The points come after the silhouette of their image.
+        at_ns = T + image * 33 * MS
+        bus.send("/silhouette", image_message(header(at_ns), SILHOUETTE, "mono8"))
+        bus.send("/points", keypoints(at_ns))
+    first, second = (one.observations[0].points for one in found)
+    assert first is None
+    assert second is not None and second.stamp_ns == T
+    assert "keypoints rate (Hz)" in inputs.values([])
+
+
+class Foreign:
+    """A detector of another package: a node that other nodes reach over DDS only."""
+
+    def __init__(self, kind: Any) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, args=[])
+        self.node = rclpy.create_node("foreign", context=self.context, enable_rosout=False)
+        self.publisher = self.node.create_publisher(kind, "points", qos.RESULT)
+
+    def close(self) -> None:
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def tracker_node() -> Iterator[CardboxNode]:
+    rclpy.init(args=[])
+    node = CardboxNode("tracker", enable_rosout=False)
+    yield node
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def until(node: Any, condition: Callable[[], Any]) -> None:
+    """Spin a node until a condition holds."""
+    for _ in range(600):
+        if condition():
+            return
+        rclpy.spin_once(node, timeout_sec=0.05)
+    raise AssertionError("it did not come")
+
+
+def test_the_type_of_the_publisher_is_used_when_it_comes(
+    tracker_node: CardboxNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """PoseArray stands for a message of a package that may be installed."""
+    persons = [ImagePoints.of({"nose": (100.0, 100.0, 0.5)})]
+    types = keypoint_topic.CONVERSIONS | {"geometry_msgs/msg/PoseArray": lambda _, __: persons}
+    monkeypatch.setattr(keypoint_topic, "CONVERSIONS", types)
+    inputs = KeypointInputs(tracker_node, TrackerParameters(keypoints="points"))
+    topic = inputs._topics[0]
+    topic.size = (640, 480)
+
+    def said(words: str) -> bool:
+        return any(words in text for text in inputs.warnings().values())
+
+    wrong = Foreign(Image)
+    until(tracker_node, lambda: said("sensor_msgs/msg/Image"))
+    assert said("expected one of") and said("hri_msgs/msg/Skeleton2D")
+    wrong.close()
+    for kind, count in ((PoseArray, 1), (PolygonStamped, 0)):
+        foreign = Foreign(kind)
+
+        def arrived(foreign: Foreign = foreign, count: int = count) -> bool:
+            at_ns = T + topic.stream.statistics.received * 33 * MS
+            foreign.publisher.publish(foreign.publisher.msg_type(header=header(at_ns)))
+            return bool(topic._kept) and len(topic._kept[-1].persons) == count
+
+        until(tracker_node, arrived)
+        assert not said("cannot be read") and tracker_node.diagnostics.remarks() == []
+        foreign.close()
+
+
+def test_a_package_that_is_missing_is_named(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    tracker = Tracker(bus)
+    ends = [SimpleNamespace(topic_type="yolo_msgs/msg/DetectionArray")]
+    monkeypatch.setattr(tracker.node, "get_publishers_info_by_topic", lambda _: ends)
+    monkeypatch.setattr(keypoint_topic, "optional_class", lambda *_: None)
+    bus.tick()
+    assert "install that package (ros-jazzy-yolo-msgs" in tracker.warning()
