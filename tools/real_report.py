@@ -30,10 +30,10 @@ from cardbox_tracker.estimation.initialization.first_sight import upper_body
 from cardbox_tracker.estimation.initialization.references import lateral_m
 from cardbox_tracker.estimation.initialization.standing import at_height_of
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.camera import Camera
-from tools.marks import replaced
 from tools.real_sheet import contact_sheet
 from tools.silhouette_report import read_masks
 
