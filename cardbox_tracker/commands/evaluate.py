@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("background", "detector"),
         default=None,
         help="with --sessions: sources of the silhouettes, one run for each; by default the empty "
-        "scene of a session, or the masks of the detector in a session without one",
+        "scene of a session, or else the masks of the detector",
     )
     parser.add_argument(
         "--detector",

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
-from cardbox_tracker.evaluation.recorded.tracking import WITH_DEPTH
+from cardbox_tracker.evaluation.recorded.tracking import BACKGROUND, WITH_DEPTH
 from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.recordings.point_table import PointTable
 
@@ -71,16 +71,20 @@ def ways_of(folder: Path, plan: Plan) -> list[Way]:
     """Return the ways in which a session is tracked.
 
     All cameras of the session track, and each alone. A rendered session with depth is tracked with
-    depth, too. In sessions of real people the first camera also tracks with each other one.
+    depth, too. In sessions of real people the first camera also tracks with each other one, and
+    several sources of silhouettes leave out the background of a session without an empty scene.
 
     Raises:
         CardboxError: the folder is not a session.
     """
     session = load_session(folder)
     views = _with_references(session) if session.has_references else _without(session)
+    sources = plan.silhouettes
+    if "empty" not in session.spans:
+        sources = tuple(source for source in sources if source != BACKGROUND) or sources
     return [
         Way(folder, *view, silhouettes, points)
-        for view, silhouettes, points in product(views, plan.silhouettes, plan.points)
+        for view, silhouettes, points in product(views, sources, plan.points)
     ]
 
 

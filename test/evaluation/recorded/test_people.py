@@ -224,6 +224,17 @@ def test_a_session_without_an_empty_scene_needs_the_detector(
     assert silhouettes_of(load_session(unmeasured)) == load_session(unmeasured).spans["empty"]
 
 
+def test_a_background_is_left_out_where_there_is_none(unmeasured: Path, tmp_path: Path) -> None:
+    data = json.loads((unmeasured / "ground_truth.json").read_text())
+    data["segments"] = [s for s in data["segments"] if s["name"] != "empty"]
+    (tmp_path / "ground_truth.json").write_text(json.dumps(data))
+    both = Plan(silhouettes=(BACKGROUND, DETECTOR))
+    assert [way.silhouettes for way in ways_of(tmp_path, both)] == [DETECTOR]
+    assert [way.silhouettes for way in ways_of(unmeasured, both)] == [BACKGROUND, DETECTOR]
+    alone = Plan(silhouettes=(BACKGROUND,))
+    assert [way.silhouettes for way in ways_of(tmp_path, alone)] == [BACKGROUND]
+
+
 def test_cameras_track_together_in_pairs_and_alone(unmeasured: Path, tmp_path: Path) -> None:
     data = json.loads((unmeasured / "ground_truth.json").read_text())
     names = ["front", "aside", "behind"]
