@@ -206,8 +206,8 @@ def report(
     clips = list(dict.fromkeys(frames.clips.tolist()))
     yield (
         f"{len(clips)} clips, {len(frames.clips)} frames; the body is that of `cardbox body "
-        f"--stature {given.stature:g} --distance {given.distance:g}` for everybody; means over "
-        f"{given.seeds} seeds."
+        f"--stature {given.stature:g} --distance {given.distance:g}` for everybody; seeds: "
+        f"{given.seeds}."
     )
     yield ""
     yield f"| what | {_HEADER} |"
