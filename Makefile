@@ -5,6 +5,7 @@
 # make benchmark   measure the speed on this machine; writes docs/benchmarks.md
 # make experiments   repeat the paper's experiments (hours); writes docs/evaluation/report.md
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
+# make people      track the films of real people in ../shared/data; writes docs/evaluation/real-people.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
@@ -116,11 +117,25 @@ experiments: setup
 
 # This compares all recorded sessions beside the checkout with their ground truth.
 DATA ?= ../shared/data
-SESSIONS = $(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json))
+SESSIONS = $(filter-out $(DATA)/real_%,\
+	$(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json)))
 .PHONY: sessions
 sessions: setup
 	@if [ -z "$(SESSIONS)" ]; then echo "skipped: no recorded sessions in $(DATA)"; else \
 		$(BIN)/cardbox evaluate --sessions $(SESSIONS) --recovery --output docs/evaluation --force; fi
+
+# The pictures come first, because the document shows them.
+PEOPLE = $(patsubst %/ground_truth.json,%,\
+	$(wildcard $(DATA)/real_gestures/*/ground_truth.json $(DATA)/real_*/ground_truth.json))
+REPORT := docs/evaluation/real-people.md
+.PHONY: people
+people: export XDG_DATA_HOME := $(CURDIR)/$(VENV)/data
+people: setup $(VENV)/extras
+	@if [ -z "$(PEOPLE)" ]; then echo "skipped: no films of people in $(DATA)"; else \
+		$(BIN)/python -m tools.people_sheet $(PEOPLE) --output docs/images/real-people.jpg; \
+		$(BIN)/cardbox evaluate --sessions $(PEOPLE) --detector none mediapipe --output docs/evaluation --force; \
+		$(BIN)/python -m tools.real_report --session $(DATA)/real_signs --output $(REPORT) \
+			--sheet docs/images/real.jpg; fi
 
 # Fewer examples: make reliability EXAMPLES=1000
 EXAMPLES ?= 100000

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks import report as benchmark_report
+from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.evaluation.recorded.report import mean_of
 from cardbox_tracker.evaluation.results import read_json
 from cardbox_tracker.files import atomic_path
 from experiments.results import motions_in, recorded_results
-from tools.marks import replaced
 
 BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"

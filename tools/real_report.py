@@ -1,7 +1,7 @@
 r"""Track real people without measuring them, and compare with MediaPipe on the same images.
 
 python -m tools.real_report --session DIR \
-    --output docs/evaluation/real.md --sheet docs/images/real.jpg
+    --output docs/evaluation/real-people.md --sheet docs/images/real.jpg
 
 The session is a folder with ``bag/``, ``reference.json`` (segments, and MediaPipe's landmarks in
 pixels) and ``mediapipe_masks.npz``. There is no truth; MediaPipe serves as the reference.
@@ -10,11 +10,9 @@ pixels) and ``mediapipe_masks.npz``. There is no truth; MediaPipe serves as the 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -29,46 +27,21 @@ from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.first_sight import upper_body
 from cardbox_tracker.estimation.initialization.references import lateral_m
 from cardbox_tracker.estimation.initialization.standing import at_height_of
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.recordings.bag_reader import BagReader
-from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
+from cardbox_tracker.evaluation.marks import replaced
+from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.vision.camera import Camera
-from tools.marks import replaced
+from tools.real_frames import LANDMARKS, Frames, read_frames
 from tools.real_sheet import contact_sheet
-from tools.silhouette_report import read_masks
 
 Image = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]
 
-LANDMARKS = tuple(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "elbow", "wrist"))
 WRIST = 0.757
 """Elbow to wrist, of elbow to knuckles (de Leva, 1996): the model's hand is the knuckles."""
 
 BEGIN, END = "<!-- figures of tools.real_report -->", "<!-- end of the figures -->"
-_MARGIN_S = 0.2
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Every image with a person, N of them, in order.
-
-    Attributes:
-        camera: working camera.
-        images: (N, H, W, 3), bgr.
-        silhouettes: (N, H, W), 0 or 255, of the background model.
-        masks: MediaPipe's, (N, H, W), 0 or 255.
-        landmarks_px: MediaPipe's, (N, 6, 2), as ``LANDMARKS``; nan where there is none.
-        clips: name of the clip, (N,).
-        stamps_ns: stamps of the images, (N,).
-    """
-
-    camera: Camera
-    images: Image
-    silhouettes: Image
-    masks: Image
-    landmarks_px: FloatArray
-    clips: NDArray[np.str_]
-    stamps_ns: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -77,11 +50,13 @@ class Variant:
 
     Attributes:
         name: its name in the table.
-        silhouettes: ``ours``, ``region`` (the largest region of ours) or ``mediapipe``.
+        silhouettes: ``ours``, ``region`` (the largest region of ours), ``mediapipe`` (its masks in
+            the session) or ``detector`` (the masks of the installed detector).
         fits: whether the body is fitted to the first silhouette, instead of only placed there.
         distance: whether the distance is given.
         colors: whether images are given.
         anew: whether tracking starts anew with each clip.
+        points: whether the points of the installed detector are given.
     """
 
     name: str
@@ -90,6 +65,12 @@ class Variant:
     distance: bool = True
     colors: bool = True
     anew: bool = True
+    points: bool = False
+
+    @property
+    def needs_detector(self) -> bool:
+        """Whether the detector has to be installed."""
+        return self.points or self.silhouettes == "detector"
 
 
 VARIANTS = (
@@ -102,6 +83,9 @@ VARIANTS = (
     Variant("the same, one run through all clips", anew=False),
     Variant("fitted, MediaPipe's masks", "mediapipe"),
     Variant("the same without colours", "mediapipe", colors=False),
+    Variant("fitted, the detector's masks", "detector"),
+    Variant("fitted, largest region, the detector's points", points=True),
+    Variant("fitted, the detector's masks and points", "detector", points=True),
 )
 SHOWN = VARIANTS[3]
 """The variant that is reported by clip and drawn."""
@@ -115,44 +99,6 @@ class Run:
     bodies: list[BodyModel]
     errors_px: FloatArray
     iou: FloatArray
-
-
-def read_frames(folder: Path) -> Frames:
-    """Read a session, and cut out its silhouettes.
-
-    Raises:
-        CardboxError: the folder is no such session.
-    """
-    try:
-        reference = json.loads((folder / "reference.json").read_text(encoding="utf-8"))
-        masks = read_masks(folder / "mediapipe_masks.npz")
-        numbers = {f["stamp_ns"]: i for i, f in enumerate(reference["frames"])}
-        first = reference["segments"][0]
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise CardboxError(
-            f"{folder} is no session of real people: {error!r}; expected bag/, reference.json and "
-            "mediapipe_masks.npz"
-        ) from None
-    empty = TimeSpan(first["start_s"] + _MARGIN_S, first["end_s"] - _MARGIN_S)
-    with BagReader(folder / "bag") as bag:
-        source = SilhouetteSource(bag, empty)
-        frames = list(source.frames(first["end_s"]))
-    chosen = [numbers[frame.stamp_ns] for frame in frames]
-    seen = [reference["frames"][i] for i in chosen]
-    return Frames(
-        source.camera,
-        np.array([frame.image for frame in frames]),
-        np.array([frame.silhouette for frame in frames]),
-        np.where(masks[chosen], 255, 0).astype(np.uint8),
-        np.array([_landmarks(frame) for frame in seen]),
-        np.array([frame["segment"] for frame in seen]),
-        np.array([frame.stamp_ns for frame in frames]),
-    )
-
-
-def _landmarks(frame: dict[str, Any]) -> list[list[float]]:
-    found = frame.get("mediapipe_px", {})
-    return [found.get(name, [np.nan, np.nan]) for name in LANDMARKS]
 
 
 def projected(keypoints_m: FloatArray, camera: Camera) -> FloatArray:
@@ -178,7 +124,10 @@ def track(frames: Frames, variant: Variant, stature_m: float, distance_m: float,
                 body = _placed(body.with_values(unknown=()), silhouette, camera)
             tracker = Tracker(body, camera, config, np.random.default_rng(seed))
         image = frames.images[i] if variant.colors else None
-        estimate = tracker.track(silhouette, image, int(frames.stamps_ns[i]))
+        points = frames.points[i] if variant.points else None
+        stamp_ns = int(frames.stamps_ns[i])
+        seen = Observation(silhouette, image, stamp_ns=stamp_ns, points=points)
+        estimate = tracker.track(seen)
         estimates.append(estimate)
         bodies.append(tracker.body)
         if estimate.posture is None or estimate.keypoints_m is None:
@@ -194,6 +143,9 @@ def _silhouette(frames: Frames, variant: Variant, i: int) -> Image:
     if variant.silhouettes == "mediapipe":
         mask: Image = frames.masks[i]
         return mask
+    if variant.silhouettes == "detector" and frames.detected is not None:
+        found: Image = frames.detected[i]
+        return found
     seen: Image = frames.silhouettes[i]
     if variant.silhouettes == "ours":
         return seen
@@ -254,8 +206,8 @@ def report(
     clips = list(dict.fromkeys(frames.clips.tolist()))
     yield (
         f"{len(clips)} clips, {len(frames.clips)} frames; the body is that of `cardbox body "
-        f"--stature {given.stature:g} --distance {given.distance:g}` for everybody; means over "
-        f"{given.seeds} seeds."
+        f"--stature {given.stature:g} --distance {given.distance:g}` for everybody; seeds: "
+        f"{given.seeds}."
     )
     yield ""
     yield f"| what | {_HEADER} |"
@@ -298,6 +250,14 @@ def sheet_of(frames: Frames, run: Run) -> Image:
     )
 
 
+def _installed() -> Detector | None:
+    try:
+        return Detector.installed()
+    except CardboxError as error:
+        print(f"without the detector: {error}", flush=True)
+        return None
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Track, and write the document and the pictures."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
@@ -308,9 +268,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, required=True, metavar="FILE.md")
     parser.add_argument("--sheet", type=Path, metavar="FILE.jpg", help="contact sheet to write")
     options = parser.parse_args(arguments)
-    frames = read_frames(options.session)
+    frames = read_frames(options.session, _installed())
     results = {}
     for variant in VARIANTS:
+        if variant.needs_detector and not frames.points:
+            continue
         given = (options.stature, options.distance)
         results[variant] = [track(frames, variant, *given, seed) for seed in range(options.seeds)]
         chosen = np.ones(len(frames.clips), bool)

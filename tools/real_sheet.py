@@ -18,12 +18,16 @@ FloatArray = NDArray[np.float64]
 Shown = tuple[Image, Image, FloatArray, BodyModel, Estimate]
 """Image (H, W, 3), mask (H, W), landmarks (6, 2) in px, body and estimate."""
 
+REFERENCE_BGR = (255, 255, 0)
+"""Colour of the joints to which the model is compared."""
+
 ATTRIBUTION = (
     "Pictures: github.com/intel-iot-devkit/sample-videos, Intel Corporation, CC BY 4.0; changed: "
     "cut, faces and surroundings blurred, model and landmarks drawn"
 )
 
-_COLUMNS = 5
+COLUMNS = 5
+"""Pictures in a row."""
 
 
 def contact_sheet(shown: Sequence[Shown], camera: Camera) -> Image:
@@ -34,13 +38,20 @@ def contact_sheet(shown: Sequence[Shown], camera: Camera) -> Image:
         view = camera.with_pitch(body.camera_pose.pitch_rad)
         tile = draw_overlay(hidden, body, view, estimate)
         for u, v in landmarks_px[np.isfinite(landmarks_px).all(axis=1)]:
-            cv2.circle(tile, (round(u), round(v)), 3, (255, 255, 0), -1, cv2.LINE_AA)
+            cv2.circle(tile, (round(u), round(v)), 3, REFERENCE_BGR, -1, cv2.LINE_AA)
         tiles.append(tile)
+    return side_by_side(tiles, (ATTRIBUTION,))
+
+
+def side_by_side(tiles: Sequence[Image], lines: Sequence[str]) -> Image:
+    """Return pictures (H, W, 3) of one size in rows of ``COLUMNS``, and lines of text."""
     height, width = tiles[0].shape[:2]
-    strip = np.zeros((24, _COLUMNS * width, 3), np.uint8)
-    cv2.putText(strip, ATTRIBUTION, (6, 17), 0, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
-    tiles += [np.zeros((height, width, 3), np.uint8)] * (-len(tiles) % _COLUMNS)
-    rows = [np.hstack(tiles[n : n + _COLUMNS]) for n in range(0, len(tiles), _COLUMNS)]
+    strip = np.zeros((24 * len(lines), COLUMNS * width, 3), np.uint8)
+    for number, line in enumerate(lines):
+        place = (6, 24 * number + 17)
+        cv2.putText(strip, line, place, 0, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+    every = [*tiles, *[np.zeros((height, width, 3), np.uint8)] * (-len(tiles) % COLUMNS)]
+    rows = [np.hstack(every[n : n + COLUMNS]) for n in range(0, len(every), COLUMNS)]
     return np.asarray(np.vstack([*rows, strip]), np.uint8)
 
 

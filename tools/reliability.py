@@ -16,8 +16,8 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
+from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.files import atomic_path
-from tools.marks import replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = "docs/reliability.md"

@@ -23,6 +23,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
@@ -30,7 +31,6 @@ from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.hand import HandFollower
 from cardbox_tracker.retargeting.retargeter import Retargeter
 from cardbox_tracker.retargeting.robot import Robot, load_robot
-from tools.marks import replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_arm.urdf"

@@ -31,10 +31,10 @@ from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.marks import replaced
 from cardbox_tracker.evaluation.recorded.angles import comparable, true_postures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession, load_session
 from cardbox_tracker.evaluation.recorded.tracking import track_session
-from tools.marks import replaced
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "ergonomics.md"
 BEGIN, END = "<!-- rula-accuracy:begin -->", "<!-- rula-accuracy:end -->"

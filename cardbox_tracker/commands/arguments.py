@@ -145,20 +145,27 @@ def points_of(options: argparse.Namespace) -> Detector | PointTable | None:
     """Return the source of the 2D points that ``--detector`` names; None without the option.
 
     Raises:
+        CardboxError: see :func:`points_named`.
+    """
+    return None if options.detector is None else points_named(options.detector)
+
+
+def points_named(name: str) -> Detector | PointTable:
+    """Return the source of 2D points of a name: the detector's, or the path of a table.
+
+    Raises:
         CardboxError: the detector is not installed, or there is no such table.
     """
     from cardbox_tracker.recordings.detector import MEDIAPIPE, Detector
     from cardbox_tracker.recordings.point_table import PointTable
 
-    if options.detector is None:
-        return None
-    if options.detector == MEDIAPIPE:
+    if name == MEDIAPIPE:
         return Detector.installed()
-    path = Path(options.detector)
+    path = Path(name)
     if not path.is_file():
         raise CardboxError(
-            f"--detector is {options.detector!r}; expected {MEDIAPIPE}, or the file of a table of "
-            "points (docs/detectors.md)"
+            f"--detector is {name!r}; expected {MEDIAPIPE}, or the file of a table of points "
+            "(docs/detectors.md)"
         )
     return PointTable(path)
 

@@ -9,7 +9,7 @@ import argparse
 import os
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_preset, add_seed, at_least
+from cardbox_tracker.commands.arguments import add_preset, add_seed, at_least, points_named
 from cardbox_tracker.commands.checkout import from_checkout
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
@@ -45,8 +45,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=None,
         metavar="DIR",
-        help="recorded sessions (bag/, ground_truth.json) to initialize, track and compare, "
-        "instead of the paper's experiments",
+        help="recorded sessions (bag/, ground_truth.json) to track and compare, instead of the "
+        "paper's experiments; whoever takes the reference postures in a session is measured first",
+    )
+    parser.add_argument(
+        "--silhouettes",
+        nargs="+",
+        choices=("background", "detector"),
+        default=None,
+        help="with --sessions: sources of the silhouettes, one run for each; by default the empty "
+        "scene of a session, or else the masks of the detector",
+    )
+    parser.add_argument(
+        "--detector",
+        nargs="+",
+        default=["none"],
+        metavar="none|mediapipe|FILE.csv",
+        help="with --sessions: sources of 2D points as in 'cardbox track', one run for each",
     )
     parser.add_argument(
         "--seeds",
@@ -79,14 +94,12 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: a session cannot be read, the results cannot be written, or there are no
             experiments because this is not a checkout.
     """
-    name = "sessions.md" if options.sessions else "report.md"
-    inputs = options.sessions or ([options.session] if options.session else [])
-    check_outputs((), options.force, inputs=inputs, results=(options.output / name,))
-
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.sessions:
         _sessions(options, jobs)
         return
+    inputs = [options.session] if options.session else []
+    check_outputs((), options.force, inputs=inputs, results=(options.output / "report.md",))
     experiments = from_checkout("experiments.evaluate", "experiments")
     plans = from_checkout("experiments.plan", "experiments")
     plan = (plans.quick_plan if options.quick else plans.full_plan)(options.runs)
@@ -95,18 +108,21 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _sessions(options: argparse.Namespace, jobs: int) -> None:
-    from cardbox_tracker.evaluation.recorded.evaluate import evaluate_sessions
+    from cardbox_tracker.evaluation.recorded.evaluate import evaluate_sessions, result_name
+    from cardbox_tracker.evaluation.recorded.plan import NO_POINTS, Plan
     from cardbox_tracker.progress import progress_bar
 
-    seeds = tuple(range(options.seed, options.seed + options.seeds))
+    names = dict.fromkeys(result_name(folder) for folder in options.sessions)
+    results = [options.output / f"{name}.md" for name in names]
+    check_outputs((), options.force, inputs=options.sessions, results=results)
+    plan = Plan(
+        options.preset,
+        tuple(range(options.seed, options.seed + options.seeds)),
+        options.recovery,
+        tuple(options.silhouettes or (None,)),
+        {name: None if name == NO_POINTS else points_named(name) for name in options.detector},
+    )
     with progress_bar("evaluate") as show:
-        evaluate_sessions(
-            options.sessions,
-            options.output,
-            options.preset,
-            seeds,
-            jobs,
-            options.recovery,
-            show,
-        )
-    print(f"wrote {options.output}/sessions.md and {options.output}/sessions.json")
+        evaluate_sessions(options.sessions, options.output, plan, jobs, show)
+    for path in results:
+        print(f"wrote {path} and {path.with_suffix('.json')}")

@@ -16,8 +16,12 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.evaluation.metrics import SHOULDERS
 
 FloatArray = NDArray[np.float64]
+
+# A person who is about to move still stands where the recording began in this many frames.
+_FIRST_FRAMES = 10
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class TrueFrame:
         posture: d1..d12 (12,); None if the person does not have the model's joints.
         torso_rad: roll, pitch and yaw of the torso (3,); None if unknown.
         is_in_sight: True if the neck is in the image, so that the person can be tracked.
+        hips_m: middle of the hips (3,), metres in the optical frame; None if unknown.
     """
 
     segment: str
@@ -37,6 +42,7 @@ class TrueFrame:
     posture: FloatArray | None
     torso_rad: FloatArray | None
     is_in_sight: bool = True
+    hips_m: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,7 @@ class GroundTruth:
         is_rectified: True if the first two cameras are a rectified pair.
         stature_m: height of the person; None if unknown.
         depth_topic: topic of depth images with the first camera's field of view; None without.
+        source: origin and licence of the recording; empty if the file does not say.
     """
 
     frames: Mapping[int, TrueFrame]
@@ -66,16 +73,25 @@ class GroundTruth:
     is_rectified: bool = False
     stature_m: float | None = None
     depth_topic: str | None = None
+    source: str = ""
 
 
-def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
+def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -> GroundTruth:
     """Read the ``ground_truth.json`` of a session.
+
+    Args:
+        path: the file.
+        camera: namespace of the camera to which keypoints, stamps, distance and pitch belong; None
+            for the first camera. The distance to any other camera than the first is that of the
+            true hips, or else shoulders, in its first images.
 
     Raises:
         CardboxError: the file cannot be read or is not a ground truth.
     """
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
+        if camera is not None:
+            data = _seen_by(data, camera)
         frames = {}
         for entry in data["frames"]:
             if "joints_m" not in entry:
@@ -88,7 +104,12 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             if "torso_rpy_deg" in entry:
                 torso = np.radians(entry["torso_rpy_deg"])
             frames[int(entry["stamp_ns"])] = TrueFrame(
-                entry["segment"], points, posture, torso, _is_in_sight(entry, data["camera"])
+                entry["segment"],
+                points,
+                posture,
+                torso,
+                _is_in_sight(entry, data["camera"]),
+                np.array(joints["hips"]) if "hips" in joints else None,
             )
         spans: dict[str, tuple[float, float]] = {}
         for segment in data["segments"]:
@@ -98,13 +119,14 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
             frames,
             spans,
             int(data["frames"][0]["stamp_ns"]),
-            float(data["person"]["distance_m"]),
+            _distance_m(data, frames),
             float(data["camera"]["pitch_down_deg"]),
             str(data["side_posture_turns_to"]),
             tuple(str(camera["name"]) for camera in data.get("cameras", ())),
             "baseline_m" in str(data.get("cameras", ())),
             None if stature_m is None else float(stature_m),
             data.get("depth_topic"),
+            str(data.get("source", "")),
         )
     except OSError as error:
         raise CardboxError(
@@ -115,6 +137,33 @@ def load_ground_truth(path: str | os.PathLike[str]) -> GroundTruth:
         raise CardboxError(
             f"{path} is not a ground truth: {error!r}; expected the ground_truth.json of a session"
         ) from None
+
+
+def _seen_by(data: dict[str, Any], camera: str) -> dict[str, Any]:
+    """Return the ground truth with the values of one camera in place of the first one's."""
+    own = {str(one["name"]): one for one in data["cameras"]}
+    if camera == str(data["cameras"][0]["name"]):
+        return data
+    shared = ("segment", "torso_rpy_deg", "posture")
+    frames = [
+        {key: entry[key] for key in shared if key in entry} | entry["cameras"][camera]
+        for entry in data["frames"]
+    ]
+    person = {key: value for key, value in data["person"].items() if key != "distance_m"}
+    return data | {"camera": own[camera], "person": person, "frames": frames}
+
+
+def _distance_m(data: Mapping[str, Any], frames: Mapping[int, TrueFrame]) -> float:
+    """Return the horizontal distance to the person, as it is given or from the first frames."""
+    if "distance_m" in data["person"]:
+        return float(data["person"]["distance_m"])
+    first = list(frames.values())[:_FIRST_FRAMES]
+    middles = [
+        f.keypoints_m[SHOULDERS, :].mean(axis=0) if f.hips_m is None else f.hips_m for f in first
+    ]
+    pitch_rad = np.radians(float(data["camera"]["pitch_down_deg"]))
+    level = np.array([0.0, -np.sin(pitch_rad), np.cos(pitch_rad)])
+    return float(np.median(np.array(middles) @ level))
 
 
 def _is_in_sight(entry: Mapping[str, Any], camera: Mapping[str, Any]) -> bool:

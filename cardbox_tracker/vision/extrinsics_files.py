@@ -25,8 +25,8 @@ _FARTHEST_M = 30.0
 def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
     """Read the extrinsics of cameras relative to the first one.
 
-    A camera is found by its name in the file; in a camchain also by the first part of its
-    ``rostopic``.
+    A camera is found by its name in the file. In a camchain the first part of its ``rostopic`` is a
+    name, too, and counts if it is another camera's key.
 
     Args:
         path: a camchain of Kalibr, or a TOML file of aniposelib. Lengths are metres; a TOML file
@@ -107,6 +107,7 @@ def save_camchain(
 def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
     """Return transforms from the chain's first camera into each camera, by key and by topic."""
     poses: dict[str, Extrinsics] = {}
+    of_topics: dict[str, Extrinsics] = {}
     # cam0, cam1, ..., cam10
     chain = sorted(entries, key=lambda key: (len(key), key))
     pose = Extrinsics(np.eye(3), np.zeros(3), name)
@@ -118,8 +119,9 @@ def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, 
             pose = Extrinsics.of(entry["T_cn_cnm1"], f"{name}, {key}").after(pose)
         poses[key] = pose
         topic = str(entry.get("rostopic", "")).strip("/").removesuffix("/compressed")
-        poses.setdefault(topic.rpartition("/")[0] or key, pose)
-    return poses
+        of_topics.setdefault(topic.rpartition("/")[0] or key, pose)
+    # Kalibr numbers the cameras in the order of the chain, so a namespace may be another's key.
+    return poses | of_topics
 
 
 def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:

@@ -9,7 +9,8 @@ import pytest
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.vision.camera import Camera
-from tools.real_report import Run, cells, projected, read_frames
+from tools.real_frames import read_frames
+from tools.real_report import Run, cells, projected
 from tools.real_sheet import blurred
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)

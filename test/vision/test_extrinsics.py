@@ -58,6 +58,17 @@ def test_a_chain_of_kalibr_is_taken_from_any_first_camera(
         load_extrinsics(file, ["left", "right"])
 
 
+def test_a_namespace_that_is_the_key_of_another_camera_is_that_of_the_topic(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    step = random_pose(rng)
+    chain: dict[str, Any] = {"cam0": {"rostopic": "/cam1/image_raw"}}
+    chain |= {"cam1": {"rostopic": "/cam0/image_raw", "T_cn_cnm1": matrix(step)}}
+    file = tmp_path / "camchain.yaml"
+    file.write_text(yaml.safe_dump(chain), encoding="utf-8")
+    assert_same(load_extrinsics(file, ["cam1", "cam0"])["cam0"], step)
+
+
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 def test_a_group_of_aniposelib_may_be_in_millimetres(
     tmp_path: Path, rng: np.random.Generator, unit: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,21 +11,28 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, POSTURE
+from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.recovery import Recovery, measure_recovery
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.recording import STEREO, open_recording
-from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+from cardbox_tracker.recordings.point_table import PointTable
+from cardbox_tracker.recordings.recording import STEREO, FrameSet, open_recording
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 
 FloatArray = NDArray[np.float64]
 
 WITH_DEPTH = "depth"
 """Given in place of one camera's name: all cameras track, with measured depth."""
+
+BACKGROUND, DETECTOR = "background", "detector"
+"""Sources of silhouettes: the session's empty scene, or the masks of the installed detector."""
 
 Observe = Callable[[int, int, Estimate, Tracker], None]
 """Callback that receives the seed, the stamp in ns, the estimate and the tracker."""
@@ -41,11 +48,16 @@ class InputSelection:
         has_images: False to give the tracker silhouettes without their images.
         covered: returns the index of the camera that sees nothing, or None, for a time in seconds
             since tracking began.
+        silhouettes: ``BACKGROUND`` or ``DETECTOR``; None for the empty scene if the session has
+            one, and otherwise the detector.
+        points: source of the person's points in the images; None for no points.
     """
 
     only: str | None = None
     has_images: bool = True
     covered: Callable[[float], int | None] | None = None
+    silhouettes: str | None = None
+    points: Detector | PointTable | None = None
 
 
 ALL_INPUTS = InputSelection()
@@ -64,6 +76,8 @@ class SessionRun:
         postures: (n, 12), rad and metres; nan without an estimate.
         stddevs: standard deviations, (n, 12).
         milliseconds: processor time of each tracked image from silhouette to posture, (m,).
+        input_ms: median processor time of an image before that: decoding, silhouettes and points
+            of all cameras; nan if it was not measured.
     """
 
     body: BodyModel | None
@@ -73,6 +87,32 @@ class SessionRun:
     postures: FloatArray
     stddevs: FloatArray
     milliseconds: FloatArray
+    input_ms: float = float("nan")
+
+
+def silhouettes_of(session: RecordedSession, chosen: str | None = None) -> TimeSpan | Detector:
+    """Return the source of a session's silhouettes; ``chosen`` as in :class:`InputSelection`.
+
+    Raises:
+        CardboxError: the session has no empty scene, or the detector is not installed.
+    """
+    empty = session.spans.get("empty")
+    if empty is None and chosen == BACKGROUND:
+        raise CardboxError(
+            f"{session.name} has no segment 'empty' from which a background could be learned; use "
+            "the detector's masks (--silhouettes detector)"
+        )
+    if empty is not None and chosen != DETECTOR:
+        return empty
+    try:
+        return Detector.installed()
+    except CardboxError as error:
+        if chosen == DETECTOR:
+            raise
+        raise CardboxError(
+            f"{session.name} has no segment 'empty', so its silhouettes are the detector's masks, "
+            f"but {error}"
+        ) from None
 
 
 def track_session(
@@ -85,6 +125,9 @@ def track_session(
 ) -> list[SessionRun]:
     """Initialize and track one session with each of ``seeds``.
 
+    The person of a session without reference postures has the mean proportions of people of that
+    stature.
+
     Args:
         session: the session.
         config: settings of the tracker.
@@ -94,20 +137,24 @@ def track_session(
         body: the person to track; if None, the first camera measures the person.
 
     Raises:
-        CardboxError: the recording cannot be read, or lacks the selected camera.
+        CardboxError: the recording cannot be read, lacks the selected camera, or has no source of
+            silhouettes.
     """
     depth, only = None, inputs.only
     if only == WITH_DEPTH:
         depth, only = session.truth.depth_topic or STEREO, None
         config = config.with_depth()
-    cameras, empty = session.truth.cameras, session.spans["empty"]
+    cameras, scene = session.truth.cameras, silhouettes_of(session, inputs.silhouettes)
     if only is not None and only not in cameras:
         raise CardboxError(
             f"{session.name} has no camera {only}; expected one of {', '.join(cameras)}"
         )
-    with open_recording(session.bag, empty, cameras, session.extrinsics, depth) as source:
+    with open_recording(
+        session.bag, scene, cameras, session.extrinsics, depth, inputs.points
+    ) as source:
         camera = source.first.camera
         offset_s = (session.truth.start_ns - source.first.start_ns) / 1e9
+        body = body or _unmeasured(session)
         bodies = [
             _measure(session, source.first, seed) if body is None else (body, "") for seed in seeds
         ]
@@ -119,18 +166,15 @@ def track_session(
         ]
         found: list[dict[int, Estimate]] = [{} for _ in seeds]
         times: list[list[float]] = [[] for _ in seeds]
+        inputs_ms: list[float] = []
         started_ns: int | None = None
-        for taken in source.frames(session.start_s + offset_s):
+        for taken in _timed(source.frames(session.start_s + offset_s), inputs_ms):
             stamp_ns = taken.stamp_ns
             started_ns = stamp_ns if started_ns is None else started_ns
             elapsed_s = (stamp_ns - started_ns) / 1e9
             dark = inputs.covered(elapsed_s) if inputs.covered else None
             seen = [
-                replace(
-                    one,
-                    silhouette=one.silhouette if only in (None, name) and number != dark else None,
-                    image=one.image if inputs.has_images else None,
-                )
+                _seen(one, inputs, only in (None, name) and number != dark)
                 for number, (name, one) in enumerate(
                     zip(source.names, taken.observations, strict=True)
                 )
@@ -144,9 +188,31 @@ def track_session(
                 if observe is not None:
                     observe(seed, stamp_ns, estimates[stamp_ns], tracker)
     return [
-        _run(session, tracked, failure, estimates, spent)
+        replace(
+            _run(session, tracked, failure, estimates, spent),
+            input_ms=float(np.median(inputs_ms)) if inputs_ms else float("nan"),
+        )
         for (tracked, failure), estimates, spent in zip(bodies, found, times, strict=True)
     ]
+
+
+def _timed(frames: Iterable[FrameSet], milliseconds: list[float]) -> Iterator[FrameSet]:
+    """Yield frames, and append the processor time in which each was made."""
+    start = time.process_time()
+    for taken in frames:
+        milliseconds.append(1e3 * (time.process_time() - start))
+        yield taken
+        start = time.process_time()
+
+
+def _seen(observation: Observation, inputs: InputSelection, is_open: bool) -> Observation:
+    """Return the part of an observation that the tracker gets from an open or covered camera."""
+    return replace(
+        observation,
+        silhouette=observation.silhouette if is_open else None,
+        points=observation.points if is_open else None,
+        image=observation.image if inputs.has_images else None,
+    )
 
 
 def recovery_of(
@@ -163,6 +229,15 @@ def recovery_of(
         offset_s = (session.truth.start_ns - source.start_ns) / 1e9
         frames = list(source.frames(session.start_s + offset_s))
         return measure_recovery(session, frames, body, source.camera, config, seed)
+
+
+def _unmeasured(session: RecordedSession) -> BodyModel | None:
+    """Return the person of a session without reference postures; None if the session has them."""
+    truth = session.truth
+    if session.has_references or truth.stature_m is None:
+        return None
+    pitch_rad = float(np.radians(truth.pitch_deg))
+    return body_from_proportions(truth.stature_m, truth.distance_m, camera_pitch_rad=pitch_rad)
 
 
 def _measure(

@@ -12,6 +12,7 @@ from cardbox_tracker.commands.main import main
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.evaluation.recorded.evaluate import evaluate_session, evaluate_sessions
+from cardbox_tracker.evaluation.recorded.plan import Plan, Way
 from cardbox_tracker.evaluation.recorded.report import sessions_report
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.evaluation.recorded.tracking import InputSelection, track_session
@@ -91,8 +92,8 @@ def test_a_session_with_depth_images_is_tracked_with_them_too(
             new.write_raw(message.topic, message.msgtype, message.raw, message.time_ns)
         for entry in data["frames"]:
             new.write_image("/camera/depth", entry["stamp_ns"], "camera", depth, "16UC1")
-    results = evaluate_sessions([folder], tmp_path / "out", "default", (0,), jobs=1)
-    alone, ranged = results["sessions"]
+    results = evaluate_sessions([folder], tmp_path / "out", Plan(seeds=(0,)), jobs=1)
+    alone, ranged = results["sessions"]["sessions"]
     with pytest.raises(CardboxError, match=r"ranged .*left; .*camera"):
         track_session(load_session(folder), default_preset(), (0,), InputSelection("left"))
     assert (alone["name"], ranged["name"]) == ("ranged", "ranged, with depth")
@@ -100,7 +101,9 @@ def test_a_session_with_depth_images_is_tracked_with_them_too(
 
 
 def test_the_same_seed_gives_the_same_figures(session: Path) -> None:
-    first, second = (evaluate_session(session, "paper", (4,))["runs"][0] for _ in range(2))
+    first, second = (
+        evaluate_session(Way(session), Plan("paper", (4,)))["runs"][0] for _ in range(2)
+    )
     for run in (first, second):
         del run["ms"]
     assert first == second
@@ -124,7 +127,7 @@ def test_figures_of_mediapipe_that_are_none_are_refused(session: Path, tmp_path:
 
 
 def test_recovery_counts_its_trials(session: Path) -> None:
-    found = evaluate_session(session, "paper", (0,), recovery=True)
+    found = evaluate_session(Way(session), Plan("paper", (0,), recovery=True))
     recovery = found["runs"][0]["recovery"]
     assert set(recovery) == {"absent", "gap", "arm hidden"}
     for kind in recovery.values():
@@ -146,5 +149,5 @@ def test_recovery_counts_its_trials(session: Path) -> None:
 
 def test_a_session_that_cannot_be_read_is_told_in_its_row(session: Path, tmp_path: Path) -> None:
     (tmp_path / "ground_truth.json").write_text((session / "ground_truth.json").read_text())
-    found = evaluate_session(tmp_path, "paper", (0,))
+    found = evaluate_session(Way(tmp_path), Plan("paper", (0,)))
     assert "there is no recording" in found["runs"][0]["failure"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cardbox_tracker.errors import CardboxError
-from tools.marks import replaced
+from cardbox_tracker.evaluation.marks import replaced
 
 BEGIN, END = "<!-- begin -->", "<!-- end -->"
 
