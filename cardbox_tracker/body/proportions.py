@@ -1,10 +1,13 @@
 """Estimates a body from the stature: the mean sizes of people of that stature.
 
-Every size is a fraction of the stature, as in ``DEFAULT_SIZES``. The lengths of arm and trunk are
-from Drillis & Contini, "Body Segment Parameters", 1966 (also in Winter, "Biomechanics and Motor
-Control of Human Movement"), with the joint centres of de Leva, "Adjustments to
-Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996. Breadths and depths are from ANSUR II,
-2012. Among people of one stature lengths vary by about 6 % and breadths by about 20 %, so such a
+Every size is a fraction of the stature. The lengths of the trunk are from Drillis & Contini, "Body
+Segment Parameters", 1966 (also in Winter, "Biomechanics and Motor Control of Human Movement").
+Upper arm, and forearm with the hand up to its knuckles, are the means of men and women of de Leva,
+"Adjustments to Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996. Breadths and depths are
+from ANSUR II, 2012; the distance between the shoulder joints is the mean biacromial breadth of both
+sexes, 0.237 and 0.224 of the stature, less 3 cm on either side.
+
+Among people of one stature lengths vary by about 6 % and breadths by about 20 %, so such a
 body is less exact than a measured one.
 """
 
@@ -16,6 +19,8 @@ from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, FloatAr
 
 STATURE_M = 1.72
 """Stature that ``DEFAULT_SIZES`` belongs to, metres."""
+
+_SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
 
 STATURE_LIMITS_M = (1.1, 2.2)
 """Range of the stature, metres: a child of six to a very tall adult."""
@@ -35,6 +40,8 @@ BREADTHS: tuple[str, ...] = (
 def sizes_of_stature(stature_m: float) -> FloatArray:
     """Return the mean sizes (18,) of people of a stature, metres."""
     sizes: FloatArray = DEFAULT_SIZES * stature_m / STATURE_M
+    for name, share in _SHARES.items():
+        sizes[SIZE_INDEX[name]] = share * stature_m
     return sizes
 
 

@@ -44,6 +44,9 @@ class ImagePoints:
         scores: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known.
         stamp_ns: stamp of the image, ns; points may be older than the image they are used with.
             None if they are of the same image.
+        spatial_m: the points in space as the detector estimates them, (17, 3), up to a common
+            scale: x right, y down, z away from the camera, in a level frame; None without it. Only
+            directions between the points are used.
 
     Raises:
         ValueError: the arrays have another shape.
@@ -52,9 +55,15 @@ class ImagePoints:
     px: FloatArray
     scores: FloatArray
     stamp_ns: int | None = None
+    spatial_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes; points that are not finite get the score 0, and others 0 to 1."""
+        if self.spatial_m is not None and np.shape(self.spatial_m) != (len(POINT_NAMES), 3):
+            raise ValueError(
+                f"points in space have the shape {np.shape(self.spatial_m)}; expected "
+                f"{(len(POINT_NAMES), 3)}"
+            )
         px, scores = np.array(self.px, np.float64), np.array(self.scores, np.float64)
         expected = (len(POINT_NAMES), 2), (len(POINT_NAMES),)
         if (px.shape, scores.shape) != expected:

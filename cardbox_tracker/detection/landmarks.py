@@ -49,4 +49,5 @@ _USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
 
 def image_points(found: Detection) -> ImagePoints:
     """Return the points of a detection that the tracker uses."""
-    return ImagePoints(found.points_px[_USED], found.scores[_USED])
+    pixels, scores = found.points_px[_USED], found.scores[_USED]
+    return ImagePoints(pixels, scores, spatial_m=found.spatial_m[_USED])

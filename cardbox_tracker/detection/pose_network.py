@@ -71,11 +71,14 @@ class Detection(NamedTuple):
         points_px: (33, 2), column and row; (0, 0) is the centre of the first pixel.
         scores: (33,), chance that the point is in the image and visible, 0 to 1.
         mask: (H, W) uint8, 255 times the chance that a pixel shows the person.
+        spatial_m: the points in space relative to the hips, (33, 3), metres for an average person:
+            x right, y down, z away from the camera. The network takes the camera for level.
     """
 
     points_px: FloatArray
     scores: FloatArray
     mask: NDArray[np.uint8]
+    spatial_m: FloatArray
 
     def silhouette(self) -> NDArray[np.uint8]:
         """Return the silhouette (H, W), 255 where a pixel more likely shows the person, else 0."""
@@ -129,7 +132,7 @@ class PoseNetwork:
     def _located(self, image: ColorImage, square: Square) -> Detection | None:
         """Return the points and the mask in a square of an rgb image; None if nobody is there."""
         cut = _cut_out(image, square, _LANDMARK_PX, cv2.BORDER_REPLICATE)
-        raw, presence, mask, heat, _ = self._locate(cut)
+        raw, presence, mask, heat, space = self._locate(cut)
         if float(presence[0, 0]) < _LEAST_PRESENCE:
             return None
         values = raw.reshape(_OUTPUTS, 5).astype(np.float64)
@@ -142,6 +145,7 @@ class PoseNetwork:
             placed[:POINTS] - 0.5,
             np.minimum(visible, present),
             _mask_in_image(mask[0, :, :, 0], square, image.shape[:2]),
+            _turned(space.reshape(_OUTPUTS, 3)[:POINTS].astype(np.float64), square.angle_rad),
         )
 
 
@@ -245,6 +249,14 @@ def _refined(points: FloatArray, heat: FloatArray) -> FloatArray:
             (top + (rows * window).sum() / total) / height,
         )
     return refined
+
+
+def _turned(points: FloatArray, angle_rad: float) -> FloatArray:
+    """Return points (N, 3) of a turned square in the axes of the image."""
+    c, s = cos(angle_rad), sin(angle_rad)
+    x, y, z = points.T
+    turned: FloatArray = np.column_stack([c * x - s * y, s * x + c * y, z])
+    return turned
 
 
 def _mask_in_image(

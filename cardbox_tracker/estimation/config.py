@@ -10,6 +10,7 @@ from typing import Any
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
+from cardbox_tracker.estimation.cost.joint_points import JointPoints
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
@@ -217,7 +218,10 @@ def paper_preset() -> TrackerConfig:
 def default_preset() -> TrackerConfig:
     """Return the most accurate settings: the whole-body filter (``docs/architecture.md``)."""
     return TrackerConfig(
-        filter="whole_body", terms=(InnerCue(),), relocalize=True, select_person=True
+        filter="whole_body",
+        terms=(InnerCue(), JointPoints()),
+        relocalize=True,
+        select_person=True,
     )
 
 

@@ -13,9 +13,11 @@ from cardbox_tracker.errors import BodyModelError
 @pytest.mark.parametrize("stature_m", [1.1, 1.6, 1.9, 2.2])
 def test_lengths_are_those_of_the_sources(stature_m: float) -> None:
     size = body_from_proportions(stature_m).size
-    # de Leva, 1996, men: upper arm, forearm and the hand to its knuckles.
-    arm = size("upper_arm_length") + size("forearm_length")
-    assert arm / stature_m == pytest.approx((0.2817 + 0.2689 + 0.0862) / 1.741, rel=0.02)
+    # de Leva, 1996, men and women: upper arm, forearm and the hand to its knuckles.
+    upper_arm = (0.2817 / 1.741 + 0.2751 / 1.735) / 2
+    forearm = ((0.2689 + 0.0862) / 1.741 + (0.2643 + 0.0780) / 1.735) / 2
+    assert size("upper_arm_length") / stature_m == pytest.approx(upper_arm, rel=0.01)
+    assert size("forearm_length") / stature_m == pytest.approx(forearm, rel=0.01)
     # Drillis & Contini, 1966: shoulders 0.818, hips 0.530 of the stature above the floor.
     above_hips = size("waist_height") + size("torso_height") - size("shoulder_drop")
     assert above_hips / stature_m == pytest.approx(0.818 - 0.530, rel=0.04)

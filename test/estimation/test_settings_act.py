@@ -13,12 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.initialization.part_colors import learn_appearance
+from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.settings import NoEffectError, Setting, nested, settings_below
 from cardbox_tracker.simulation.motions import wave
@@ -59,34 +62,51 @@ def body() -> BodyModel:
     return BODY.with_values(appearance=learn_appearance(images, silhouettes, BODY, CAMERA))
 
 
+def detected(posture: np.ndarray) -> ImagePoints:
+    """The points of shoulders, elbows and knuckles."""
+    pixels = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(BODY, posture)))
+    names = [
+        (f"{side}_{joint}",) if joint != "hand" else (f"{side}_index", f"{side}_little_finger")
+        for side in ("left", "right")
+        for joint in ("shoulder", "elbow", "hand")
+    ]
+    return ImagePoints.of(
+        {name: (u, v, 0.9) for (u, v), same in zip(pixels, names, strict=True) for name in same}
+    )
+
+
 @cache
-def scenes() -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """A person who moves, a door that opens, noise, nobody, and the person elsewhere."""
+def scenes() -> tuple[tuple[np.ndarray, np.ndarray, ImagePoints | None], ...]:
+    """A person who moves, a door that opens, noise, nobody, and the person elsewhere.
+
+    In some of the images a detector has found the joints.
+    """
     found = []
     for i in range(14):
         posture = wave(i / 8.0)
         posture[0:4] += 0.02 * i, 0.02 * i, 0.03 * i, 0.04 * i
         posture[8:12] += np.radians((2.0, 5.0, -6.0, 6.0)) * i
-        found.append(drawn(posture, 1.0 - 0.02 * i))
+        points = detected(posture) if 4 <= i < 8 else None
+        found.append((*drawn(posture, 1.0 - 0.02 * i), points))
     image, silhouette = drawn(wave(1.0))
     door = silhouette.copy()
     door[20:, :25] = 255
-    found += [(image, door)] * 2
+    found += [(image, door, None)] * 2
     stripes = np.zeros_like(silhouette)
     stripes[:, ::5] = 255
-    found += [(image, stripes)] * 6 + [drawn(wave(1.0))] * 2
-    found.append((image, np.zeros_like(silhouette)))
+    found += [(image, stripes, None)] * 6 + [(*drawn(wave(1.0)), None)] * 2
+    found.append((image, np.zeros_like(silhouette), None))
     elsewhere = reference_posture("front")
     elsewhere[0] = -0.35
-    return (*found, *[drawn(elsewhere)] * 4)
+    return (*found, *[(*drawn(elsewhere), None)] * 4)
 
 
 def result_of(config: TrackerConfig) -> list[Any]:
     """What is estimated of the scenes, as bytes."""
     tracker = Tracker(body(), CAMERA, config, np.random.default_rng(0))
     found: list[Any] = []
-    for image, silhouette in scenes():
-        one = tracker.track(silhouette, image)
+    for image, silhouette, points in scenes():
+        one = tracker.track(Observation(silhouette, image, points=points))
         values = (one.posture, one.posture_stddev, one.offset_m)
         found.append((one.state, *(None if a is None else a.tobytes() for a in values)))
     return found
@@ -148,7 +168,7 @@ def test_an_effort_takes_as_many_states_more(effort: float) -> None:
     for factor in (1.0, effort):
         config = PRESETS["default"]().changed({"whole_body": {"effort": factor}})
         tracker = Tracker(body(), CAMERA, config, np.random.default_rng(0))
-        for image, silhouette in scenes()[:3]:
+        for image, silhouette, _ in scenes()[:3]:
             assert tracker.track(silhouette, image).posture is not None
         assert isinstance(tracker.filter, WholeBodyFilter)
         counts.append(len(tracker.filter.states))

@@ -18,7 +18,7 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import Frame, Silence, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -73,7 +73,8 @@ class MultiViewCost:
         """Set the observations of the further terms for each camera that shows the person."""
         for number, cost in enumerate(self.costs):
             counting = terms[number] if number in self.seeing else ()
-            cost.terms = tuple(term.observe(frames[number]) for term in counting)
+            observed = (term.observe(frames[number]) for term in counting)
+            cost.terms = tuple(one for one in observed if not isinstance(one, Silence))
 
     @property
     def silhouette_px(self) -> int:
@@ -116,6 +117,10 @@ class MultiViewCost:
                 areas_px += more[2]
         ratings /= len(self.seeing)
         return ratings, costs_px, areas_px
+
+    def point_costs(self, states: FloatArray) -> FloatArray:
+        """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
+        return self._sum(lambda cost, to_view: cost.point_costs(to_view(states)))
 
     def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
         """Return the IoU of a state (14,) and the silhouette of each camera.

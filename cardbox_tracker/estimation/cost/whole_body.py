@@ -24,17 +24,11 @@ from cardbox_tracker.estimation.cost import body_priors as priors
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms, joints_of_arms
 from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
 from cardbox_tracker.estimation.cost.kernel_arguments import (
-    BOTTOM,
-    FOREARM,
-    HEAD,
-    HEIGHT,
-    NECK,
-    WAIST,
-    BodyTuple,
     intrinsics_of,
     place_of,
-    shape_of,
 )
 from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
@@ -45,8 +39,6 @@ from cardbox_tracker.vision.camera import Camera
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-# Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
-_NECK_INTO_HEAD = 0.25
 _TORSO_OF_TERMS = [*range(TORSO_ANGLES.stop), TORSO_X, TORSO_Z]
 _BOTH_ARMS, _TRUNK = (False, True, True), (True, False, False)
 
@@ -71,20 +63,10 @@ class WholeBodyCost:
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
         """Prepare for one body and one camera, which includes the pitch."""
         self._model, self._camera, self._config = body, camera, config
-        self.parts, shoulder = shape_of(body.sizes, config.neck_to_head)
-        self.girdle = np.array(
-            [
-                *shoulder,
-                config.clavicle * body.size("shoulder_breadth"),
-                config.lift_gain,
-                np.radians(config.lift_from_deg),
-            ]
-        )
-        self.place, self.view = place_of(body), intrinsics_of(camera)
+        self.body = body_tuple(body, camera, config)
+        self.parts, _, self.girdle, self.place, self.view = self.body
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
-        drawn = _drawn_parts(self.parts, config)
-        self.body: BodyTuple = self.parts, drawn, self.girdle, self.place, self.view
         self._rules = _rules(config)
         self._gmm = np.array(load_gmm())
         # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
@@ -203,6 +185,14 @@ class WholeBodyCost:
             ratings += self._scale * term.postures(states)
         return ratings, costs_px, areas_px
 
+    def point_costs(self, states: FloatArray) -> FloatArray:
+        """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
+        costs = np.zeros(len(states))
+        for term in self.terms:
+            if isinstance(term, JointPointsObservation):
+                costs += self._scale * term.postures(states)
+        return costs
+
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
         points = np.empty((6, 3))
@@ -236,17 +226,6 @@ def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
     """Return the intersection over union of silhouette and model from their numbers of pixels."""
     twice_either = float(silhouette_px + model_px + differing_px)
     return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0
-
-
-def _drawn_parts(parts: FloatArray, config: WholeBodyCostConfig) -> FloatArray:
-    """Return the parts (6, 6) whose outlines are drawn."""
-    drawn = parts.copy()
-    drawn[WAIST, BOTTOM] -= config.waist_extension_m
-    drawn[WAIST, HEIGHT] += config.waist_extension_m
-    into_m = _NECK_INTO_HEAD * parts[HEAD, HEIGHT]
-    drawn[NECK, HEIGHT] += into_m
-    drawn[FOREARM, HEIGHT] += config.fingers_m
-    return drawn
 
 
 def _rules(config: WholeBodyCostConfig) -> FloatArray:

@@ -24,13 +24,13 @@ from cardbox_tracker.estimation.cost.kinematics import (
     angles_in,
     angles_of_arm,
     first_angle,
-    limb_directions,
     pose_arm,
     side_of,
     state_pose,
 )
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.filtering.joint_moves import NumbersTuple
+from cardbox_tracker.estimation.filtering.mirroring import mirror
 
 # Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
 # difference and the sum of the bones' lengths, m.
@@ -83,29 +83,6 @@ class Ray(NamedTuple):
     shoulder: Floats
     direction: Floats
     rotation: Floats
-
-
-@inlined_kernel
-def _mirror(
-    angles: Floats,
-    side: float,
-    flips: int,
-    ray: Floats,
-    arm_limits: Floats,
-    directions: Floats,
-) -> None:
-    """Mirror upper arm (bit 0 of ``flips``) and forearm (bit 1) of an arm (4,) along ``ray`` (3,).
-
-    ``ray`` is the line of sight in the torso's frame, a unit vector. The outline hardly changes.
-    """
-    limb_directions(angles, side, directions)
-    for half in range(2):
-        if (flips >> half) & 1:
-            o = 3 * half
-            along = directions[o] * ray[0] + directions[o + 1] * ray[1] + directions[o + 2] * ray[2]
-            for c in range(3):
-                directions[o + c] -= 2.0 * along * ray[c]
-    angles_of_arm(directions, side, arm_limits, angles)
 
 
 @inlined_kernel
@@ -233,7 +210,7 @@ def propose_arms(
         for d in range(ARM_ANGLES):
             angles[d] = source[first + d]
         flips = 1 + int(3.0 * uniforms[end + i, 0])
-        _mirror(angles, side, flips, sight, arm_limits, directions)
+        mirror(angles, side, flips, sight, arm_limits, directions)
     fx, fy, cx, cy = of.camera.fx, of.camera.fy, of.camera.cx, of.camera.cy
     u, v = fx * shoulder[0] / shoulder[2] + cx, fy * shoulder[1] / shoulder[2] + cy
     length_px = (parts[UPPER_ARM, HEIGHT] + parts[FOREARM, HEIGHT]) * fx / shoulder[2]

@@ -42,6 +42,7 @@ from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
+from cardbox_tracker.estimation.filtering.point_fit import PointFit
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence, presence_of
 from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.search_features import Search
@@ -94,6 +95,7 @@ class WholeBodyFilter:
         self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
         first, *others = cost.costs
         self._arm = ArmSearch(cost, self._plan)
+        self._points = PointFit(cost, self._config.cost, views)
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
         self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
         # The height of the torso's top above the hips is about that of the shoulders.
@@ -163,6 +165,7 @@ class WholeBodyFilter:
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
         cost.observe(frames, terms)
+        self._points.see()
         return location
 
     def _search(self, frames: Sequence[Frame], location: Location) -> None:
@@ -210,7 +213,10 @@ class WholeBodyFilter:
             self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos keep their hanging arms; they were rated with the arms of the last frame.
-        return np.concatenate([pool, torsos[len(torsos) - upright :]])
+        more = [torsos[len(torsos) - upright :]]
+        if self._points.is_given:
+            more.append(self._points.torsos(self._survivors, before, self._reference))
+        return np.concatenate([pool, *more])
 
     def _together(
         self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray, draws: Draws
@@ -221,6 +227,10 @@ class WholeBodyFilter:
             fitted = self._fitted(frames, states, ratings)
             states = np.concatenate([states, fitted])
             ratings = np.concatenate([ratings, cost.bodies(fitted)[0]])
+        if self._points.is_given:
+            near = self._points.bodies(states, ratings)
+            states = np.concatenate([states, near])
+            ratings = np.concatenate([ratings, cost.bodies(near)[0]])
         sigma = config.together_noise * self._sigma
         for number in range(config.rounds):
             if number == 0:
@@ -265,14 +275,22 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
+        is_by_points = self._points.is_leading
+        if is_by_points and self._points.is_given:
+            fitted = self._points.polished(fitted)
         _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
         fit_iou = iou_of(total, areas_px[1], costs_px[1])
         pixels = loss.Pixels(total, cost.frontal_px, costs_px[0], areas_px[0])
-        rating, arm_m = float(self.ratings.min()), sum(self._arm.spreads_m) / 4
+        # The coefficients of the evidence belong to a cost without points.
+        best = int(np.argmin(self.ratings))
+        rating = float(self.ratings[best] - cost.point_costs(self.states[best : best + 1])[0])
+        arm_m = sum(self._arm.spreads_m) / 4
         evidence = loss.evidence_of(pixels, rating, arm_m, stddev, mean, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         search = Search(*rated, config.spread, evidence, self._chance)
-        result = self.refine.corrected(frame, fitted, spread, fit_iou, search)
+        result = fitted
+        if not is_by_points:
+            result = self.refine.corrected(frame, fitted, spread, fit_iou, search)
         _, (cost_px,), (area_px,) = cost.bodies(result[None])
         iou = iou_of(total, area_px, cost_px)
         self._result = result
@@ -280,7 +298,9 @@ class WholeBodyFilter:
             # The fitted result replaces the worst survivor, which is the last one.
             self._survivors[-1] = fitted
         keypoints_m = cost.keypoints(result)
-        deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
+        deviations = spread
+        if not is_by_points:
+            deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],

@@ -1,0 +1,50 @@
+"""The whole-body filter's model of one person before one camera, as argument of the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    BOTTOM,
+    FOREARM,
+    HEAD,
+    HEIGHT,
+    NECK,
+    WAIST,
+    BodyTuple,
+    intrinsics_of,
+    place_of,
+    shape_of,
+)
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.vision.camera import Camera
+
+# Overlap of neck and head, as a fraction of the head's height: an outline has no gap below the jaw.
+_NECK_INTO_HEAD = 0.25
+
+
+def body_tuple(body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> BodyTuple:
+    """Return the fields of :class:`~.kernel_arguments.Body` of a body before a camera."""
+    parts, shoulder = shape_of(body.sizes, config.neck_to_head)
+    girdle = np.array(
+        [
+            *shoulder,
+            config.clavicle * body.size("shoulder_breadth"),
+            config.lift_gain,
+            np.radians(config.lift_from_deg),
+        ]
+    )
+    return parts, _drawn_parts(parts, config), girdle, place_of(body), intrinsics_of(camera)
+
+
+def _drawn_parts(parts: FloatArray, config: WholeBodyCostConfig) -> FloatArray:
+    """Return the parts (6, 6) whose outlines are drawn."""
+    drawn = parts.copy()
+    drawn[WAIST, BOTTOM] -= config.waist_extension_m
+    drawn[WAIST, HEIGHT] += config.waist_extension_m
+    into_m = _NECK_INTO_HEAD * parts[HEAD, HEIGHT]
+    drawn[NECK, HEIGHT] += into_m
+    drawn[FOREARM, HEIGHT] += config.fingers_m
+    return drawn

@@ -1,0 +1,288 @@
+"""Cost of the distance between the person's joints and the points of a detector.
+
+A silhouette does not show a hand in front of the body; a detector does. The term rates the
+projected joints against the points of ``Frame.points``, and, if the detector estimates points in
+space, the directions of the bones along the line of sight. Detectors of single images take the
+camera for level, so these directions are compared along the horizontal line of sight.
+
+The directions are used for people who were not measured; for measured people the learned
+correction, which is trained on such, estimates the depth.
+
+Points may be missing or older than the frame. Points that fit the last posture only with left and
+right exchanged are exchanged; points that are far from the last posture belong to somebody else and
+are not used, unless this lasts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cardbox_tracker.body.model import MEASURED, BodyModel
+from cardbox_tracker.body.posture import N_STATE, TORSO, TORSO_X
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.joint_points_kernels import (
+    EARS,
+    ELBOW,
+    HIPS,
+    KNUCKLES,
+    N_BONES,
+    N_POINTS,
+    POINTS_OF_ARM,
+    SHOULDER,
+    SHOULDERS,
+    WRIST,
+    EvidenceTuple,
+)
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
+from cardbox_tracker.estimation.cost.terms import (
+    ARMS,
+    ArmCosts,
+    Frame,
+    Silence,
+    Term,
+    TermObservation,
+    TorsoCosts,
+)
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.settings import Settings, setting
+from cardbox_tracker.vision.camera import Camera
+
+# Deviation of a point, m and px; speed of the joint, m/s, which makes older points uncertain.
+_JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}
+_JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
+_TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
+_POINT_PX = 1.5
+# Bones (upper arm, forearm, shoulders): deviation of the component along the line of sight, and
+# mean difference of the detector's from the true one.
+_BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.13])
+_BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05])
+_OLDEST_S = 1.0
+# Points belong to somebody else if the median of their distances from the last posture is larger;
+# after this number of such frames the last posture is taken to be wrong.
+_ELSEWHERE_M, _ELSEWHERE_FRAMES = 0.4, 10
+# Left and right are exchanged if this makes the squared distances this much smaller, and they were
+# larger than this in the mean.
+_EXCHANGED, _EXCHANGED_M = 0.3, 0.1
+
+_SIDES = tuple(ARMS)
+_OTHER_SIDE = [
+    POINT_INDEX[name.replace("left", "right") if "left" in name else name.replace("right", "left")]
+    for name in POINT_NAMES
+]
+_SILENCE = Silence()
+
+
+@dataclass(frozen=True)
+class JointPoints(Settings):
+    """Settings of the term; its joints are those of the filter ``whole_body``."""
+
+    weight: float = setting(
+        0.012,
+        "weight of a squared distance in units of its deviation, as a fraction of the silhouette's "
+        "pixels",
+        limits=(0.0, 1.0),
+    )
+
+    def build(self, body: BodyModel, camera: Camera) -> Term:
+        """Return the term for a measured person and a working camera."""
+        return JointPointsTerm(self, body, camera)
+
+
+class JointPointsTerm:
+    """The term for one body before one camera, which includes the pitch."""
+
+    def __init__(self, config: JointPoints, body: BodyModel, camera: Camera) -> None:
+        """Prepare, and compile the kernels if necessary."""
+        self.config, self._camera = config, camera
+        self._uses_bones = body.source != MEASURED
+        self.body = body_tuple(body, camera, WholeBodyCostConfig())
+        self._elsewhere = 0
+
+    def observe(self, frame: Frame) -> TermObservation:
+        """Return the term's observation, which is zero without points that can be used."""
+        points = frame.points
+        if points is None or points.is_empty:
+            return _SILENCE
+        age_s = 0.0
+        if points.stamp_ns is not None and frame.stamp_ns is not None:
+            age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
+        if age_s > _OLDEST_S:
+            return _SILENCE
+        before = frame.posture
+        if before is not None:
+            checked = self._checked(points, _whole(before[None])[0])
+            if checked is None:
+                return _SILENCE
+            points = checked
+        evidence = self._evidence(points, age_s)
+        weight = self.config.weight * max(frame.foreground_px, 1)
+        return JointPointsObservation(self.body, evidence, weight, before)
+
+    def _checked(self, points: ImagePoints, before: FloatArray) -> ImagePoints | None:
+        """Return the points, with left and right exchanged if necessary; None if not this person's.
+
+        ``before`` is the last state, (14,).
+        """
+        pixels = np.empty((N_POINTS, 3))
+        kernels.project(before, self.body, pixels)
+        found = _points(points)
+        exchanged = replace(
+            points,
+            px=points.px[_OTHER_SIDE],
+            scores=points.scores[_OTHER_SIDE],
+            spatial_m=None if points.spatial_m is None else points.spatial_m[_OTHER_SIDE],
+        )
+        away_m, other_m = (self._distances(one, pixels) for one in (found, _points(exchanged)))
+        if not np.isfinite(away_m).any():
+            return points
+        square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
+        if square > _EXCHANGED_M**2 and other < _EXCHANGED * square:
+            points, away_m = exchanged, other_m
+        self._elsewhere = self._elsewhere + 1 if np.nanmedian(away_m) > _ELSEWHERE_M else 0
+        is_elsewhere = 0 < self._elsewhere <= _ELSEWHERE_FRAMES
+        return None if is_elsewhere else points
+
+    def _distances(self, found: FloatArray, pixels: FloatArray) -> FloatArray:
+        """Return the distance of each point (10, 3) from the projected joint, m; nan if unknown."""
+        metre_px = self._camera.fx / np.maximum(pixels[:, 2], 0.1)
+        distances: FloatArray = np.linalg.norm(found[:, :2] - pixels[:, :2], axis=1) / metre_px
+        distances[found[:, 2] <= 0.0] = np.nan
+        return distances
+
+    def _evidence(self, points: ImagePoints, age_s: float) -> EvidenceTuple:
+        found = _points(points)
+        deviations = np.empty((N_POINTS, 2))
+        for arm in range(2):
+            for joint, metres in _JOINT_M.items():
+                moved_m = age_s * _JOINT_M_PER_S[joint]
+                deviations[POINTS_OF_ARM * arm + joint] = np.hypot(metres, moved_m), _POINT_PX
+        deviations[[HIPS, EARS]] = np.hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), _POINT_PX
+        bones = np.zeros((N_BONES, 3))
+        bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
+        away = np.array([0.0, 0.0, 1.0])
+        shoulders = found[[SHOULDER, POINTS_OF_ARM + SHOULDER]]
+        if self._uses_bones and points.spatial_m is not None and shoulders[:, 2].min() > 0.0:
+            bones[:, :2] = _bones(points.spatial_m, found)
+            bones[:, 0] -= _BONE_OFFSETS
+            camera = self._camera
+            bearing = np.arctan2(shoulders[:, 0].mean() - camera.cx, camera.fx)
+            down, ahead = -np.sin(camera.pitch_rad), np.cos(camera.pitch_rad)
+            away = np.array([np.sin(bearing), *(np.cos(bearing) * np.array([down, ahead]))])
+        return found, deviations, bones, away
+
+
+@dataclass(frozen=True, eq=False)
+class JointPointsObservation:
+    """The points of one frame.
+
+    Attributes:
+        body: fields of :class:`~.kernel_arguments.Body`.
+        evidence: fields of :class:`~.joint_points_kernels.Evidence`.
+        weight_px: cost of a squared residual of 1, px.
+        before: state of the previous frame; None at the start of tracking.
+    """
+
+    body: BodyTuple
+    evidence: EvidenceTuple
+    weight_px: float
+    before: FloatArray | None
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`~.terms.TermObservation`."""
+        lifted = arms if arms is not None else self.before
+        of = np.zeros(N_STATE) if lifted is None else _whole(lifted[None])[0]
+
+        def rate(torsos: FloatArray) -> FloatArray:
+            costs = np.empty(len(torsos))
+            kernels.rate_torsos(_with_torsos(torsos), of, self.body, self.evidence, costs)
+            return self.weight_px * costs
+
+        return rate
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`~.terms.TermObservation`."""
+        state = _with_torsos(torso[None])[0]
+
+        def rate(side: str, arms: FloatArray) -> FloatArray:
+            costs, arm = np.empty(len(arms)), _SIDES.index(side)
+            angles = np.ascontiguousarray(arms, np.float64)
+            kernels.rate_arms(angles, arm, state, self.body, self.evidence, costs)
+            return self.weight_px * costs
+
+        return rate
+
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """See :class:`~.terms.TermObservation`."""
+        costs = np.empty(len(postures))
+        kernels.rate_bodies(_whole(postures), self.body, self.evidence, costs)
+        return self.weight_px * costs
+
+
+def _points(points: ImagePoints) -> FloatArray:
+    """Return column, row and score of the ten points that are compared, (10, 3)."""
+    found = np.zeros((N_POINTS, 3))
+    for arm, side in enumerate(_SIDES):
+        for joint, name in ((SHOULDER, "shoulder"), (ELBOW, "elbow"), (WRIST, "wrist")):
+            found[POINTS_OF_ARM * arm + joint] = _middle(points, f"{side}_{name}")
+        knuckles = f"{side}_index", f"{side}_little_finger"
+        found[POINTS_OF_ARM * arm + KNUCKLES] = _middle(points, *knuckles)
+    found[HIPS] = _middle(points, "left_hip", "right_hip")
+    found[EARS] = _middle(points, "left_ear", "right_ear")
+    return found
+
+
+def _middle(points: ImagePoints, *names: str) -> FloatArray:
+    """Return column, row and score (3,) of the middle of points; zeros if one is unknown."""
+    indices = [POINT_INDEX[name] for name in names]
+    score = points.scores[indices].min()
+    if score <= 0.0:
+        return np.zeros(3)
+    return np.array([*points.px[indices].mean(axis=0), score])
+
+
+def _bones(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
+    """Return component along z as a fraction of the length, and score, of each bone, (5, 2)."""
+
+    def at(*names: str) -> FloatArray:
+        middle: FloatArray = spatial_m[[POINT_INDEX[name] for name in names]].mean(axis=0)
+        return middle
+
+    bones = np.zeros((N_BONES, 2))
+    for arm, side in enumerate(_SIDES):
+        shoulder, elbow = at(f"{side}_shoulder"), at(f"{side}_elbow")
+        hand = at(f"{side}_index", f"{side}_little_finger")
+        scores = found[POINTS_OF_ARM * arm : POINTS_OF_ARM * (arm + 1), 2]
+        upper_arm, forearm = elbow - shoulder, hand - elbow
+        bones[2 * arm] = _depth(upper_arm), min(scores[SHOULDER], scores[ELBOW])
+        bones[2 * arm + 1] = _depth(forearm), min(scores[ELBOW], scores[WRIST])
+    shoulders = found[SHOULDER, 2], found[POINTS_OF_ARM + SHOULDER, 2]
+    bones[SHOULDERS] = _depth(at("left_shoulder") - at("right_shoulder")), min(shoulders)
+    bones[~np.isfinite(bones).all(axis=1)] = 0.0
+    return bones
+
+
+def _depth(bone: FloatArray) -> float:
+    """Return the component of a vector (3,) along z as a fraction of its length."""
+    length = float(np.linalg.norm(bone))
+    return float(bone[2]) / length if length > 0.0 else float("nan")
+
+
+def _with_torsos(torsos: FloatArray) -> FloatArray:
+    """Return states (N, 14) with torsos (N, 4), or (N, 6) with the place; the arms hang."""
+    states = np.zeros((len(torsos), N_STATE))
+    states[:, TORSO] = torsos[:, TORSO]
+    if torsos.shape[1] > TORSO.stop:
+        states[:, TORSO_X:] = torsos[:, TORSO.stop :]
+    return states
+
+
+def _whole(postures: FloatArray) -> FloatArray:
+    """Return states (N, 14) of postures (N, 12) or (N, 14)."""
+    states = np.zeros((len(postures), N_STATE))
+    states[:, : postures.shape[1]] = postures
+    return states

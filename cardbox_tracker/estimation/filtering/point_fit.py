@@ -1,0 +1,150 @@
+"""States that fit a detector's points, as proposals of the whole-body filter.
+
+A joint's point gives its line of sight. With the lengths of the bones, its depth is determined up
+to the mirror image of each bone along this line, so all combinations are fitted and rated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cardbox_tracker.body.posture import (
+    ARM_ANGLES,
+    N_STATE,
+    PITCH,
+    ROLL,
+    STATE_LIMITS,
+    TORSO_X,
+    TORSO_Y,
+    TORSO_Z,
+    YAW,
+)
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
+from cardbox_tracker.estimation.cost.joint_points_fit import FittedTuple, fit_states
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
+from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.filtering import state_choice
+from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
+from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
+
+# Gauss-Newton steps, and deviation of a value in a step, rad and m.
+_STEPS, _STEP_DEVIATION = 3, 0.25
+# Deviations (14,) of a result's values in its last fit, and steps of this fit.
+_POLISH_DEVIATION = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02])
+_POLISH_STEPS = 2
+# Frames without points after which the learned correction determines the depth again.
+_MISSING_FRAMES = 30
+# Number of states that are fitted, number of similar ones, least distance of the others, m.
+_DIFFERENT = (6, 1, 0.1)
+
+
+class PointFit:
+    """Fits states of one body to the points of all cameras.
+
+    Attributes:
+        is_given: whether there are points in this frame.
+        is_leading: whether points, instead of the learned correction, determine the depth: the
+            person was not measured, and there were points a short time ago.
+    """
+
+    def __init__(
+        self, cost: MultiViewCost, config: WholeBodyCostConfig, views: Sequence[View]
+    ) -> None:
+        """Prepare for the cameras of ``cost``."""
+        self._cost, self._config = cost, config
+        self._turned = [np.eye(N_STATE), *(view.turned for view in views)]
+        self._moved = [np.zeros(N_STATE), *(view.moved for view in views)]
+        self._damping = np.full(N_STATE, 1.0 / _STEP_DEVIATION**2)
+        self.is_given = self.is_leading = False
+        self._missing = _MISSING_FRAMES
+
+    def see(self) -> None:
+        """Take the points of the present frame from the observations of the cost's terms."""
+        found = [
+            (number, term)
+            for number, cost in enumerate(self._cost.costs)
+            for term in cost.terms
+            if isinstance(term, JointPointsObservation)
+        ]
+        self.is_given = bool(found)
+        self._missing = 0 if found else self._missing + 1
+        is_measured = self._cost.costs[0].is_measured
+        self.is_leading = self._missing < _MISSING_FRAMES and not is_measured
+        if not found:
+            return
+        points, deviations, bones, away = zip(*(term.evidence for _, term in found), strict=True)
+        numbers = [number for number, _ in found]
+        self._fitted: FittedTuple = (
+            np.array(points),
+            np.array(deviations),
+            np.array(bones),
+            np.array(away),
+            np.array([self._turned[number] for number in numbers]),
+            np.array([self._moved[number] for number in numbers]),
+            np.array([(*term.body[3], *term.body[4]) for _, term in found]),
+        )
+
+    def torsos(
+        self, survivors: FloatArray, before: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Return fitted states (4, 14), from survivors (N, 14), a turned and an upright state.
+
+        Args:
+            survivors: states of the last frame, the best first.
+            before: the last state, (14,).
+            reference: state of the front reference posture, (14,).
+        """
+        turned, upright = before.copy(), reference.copy()
+        turned[YAW] *= -1.0
+        upright[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
+        return self._fitted_from(np.array([survivors[0], survivors[-1], turned, upright]))
+
+    def bodies(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
+        """Return fits (N, 14) of the best different states, and of the best one's mirror images.
+
+        Args:
+            states: rated states, (M, 14).
+            ratings: their ratings, (M,).
+        """
+        cost = self._cost
+        kept = state_choice.choose_apart(states, ratings, *_DIFFERENT, cost.parts, cost.girdle)
+        mirrored = mirrored_states(states[kept[0]], cost.body, ARM_LIMITS)
+        return self._fitted_from(np.concatenate([states[kept], mirrored[1:]]))
+
+    def _fitted_from(self, states: FloatArray) -> FloatArray:
+        """Return states (N, 14) near ``states`` that fit the points and the torso's priors."""
+        fitted = np.ascontiguousarray(states).copy()
+        bounds = STATE_LIMITS, STATE_STEP
+        prior = self._prior()
+        body = self._cost.body
+        fit_states(fitted, body, self._fitted, prior, self._damping, bounds, _STEPS)
+        return fitted
+
+    def polished(self, state: FloatArray) -> FloatArray:
+        """Return the state (14,) near ``state``, mainly in depth, that fits the points."""
+        fitted, bounds = state[None].copy(), (STATE_LIMITS, STATE_STEP)
+        prior = state, _POLISH_DEVIATION**-2
+        none = np.zeros(N_STATE)
+        fit_states(fitted, self._cost.body, self._fitted, prior, none, bounds, _POLISH_STEPS)
+        polished: FloatArray = fitted[0]
+        return polished
+
+    def _prior(self) -> tuple[FloatArray, FloatArray]:
+        """Return mean and inverse variance (14,) of the cost's priors of the torso."""
+        config, (x_m, z_m, home_m, yaw_rad) = self._config, self._cost.anchor.tolist()
+        mean, inverse = np.zeros((2, N_STATE))
+        inverse[ROLL] = np.radians(config.roll_deg) ** -2
+        inverse[PITCH] = np.radians(config.pitch_forward_deg) ** -2
+        mean[YAW], inverse[YAW] = yaw_rad, np.radians(config.yaw_deg) ** -2
+        step, home = config.x_step_m**-2, config.x_home_m**-2
+        inverse[TORSO_X] = step + home
+        mean[TORSO_X] = (step * x_m + home * home_m) / inverse[TORSO_X]
+        step, home = config.z_step_m**-2, config.z_home_m**-2
+        inverse[TORSO_Z] = step + home
+        mean[TORSO_Z] = step * z_m / inverse[TORSO_Z]
+        return mean, inverse
