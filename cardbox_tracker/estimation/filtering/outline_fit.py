@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, STATE_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import (
     SHARES,
@@ -29,10 +30,14 @@ from cardbox_tracker.estimation.cost.outline_points import POINTS
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.filtering import state_choice
 from cardbox_tracker.vision.camera import Camera
 
 # Standard deviations of the prior around the filter's state: angles in rad, places in m.
 _STDDEV = 0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])
+# Fit of several states: number of states, number of similar states, least distance of the others,
+# m; Gauss-Newton steps.
+_DIFFERENT, _STEPS_OF_DIFFERENT = (3, 1, 0.1), 2
 # Weight of the last correction in the next one, against jitter.
 _KEPT = 0.6
 # Margin around the silhouette, larger than the limit of the distances.
@@ -119,6 +124,18 @@ class OutlineFit:
         before = correction if self._correction is None else self._correction
         self._correction = _KEPT * before + (1.0 - _KEPT) * correction
         return np.clip(state + self._correction, *STATE_LIMITS.T)
+
+    def different(
+        self,
+        frames: Sequence[Frame],
+        states: FloatArray,
+        ratings: FloatArray,
+        cost: MultiViewCost,
+    ) -> FloatArray:
+        """Return fits (N, 14) of the best different states of ``states`` (M, 14)."""
+        kept = state_choice.choose_apart(states, ratings, *_DIFFERENT, cost.parts, cost.girdle)
+        fitted = [self.fitted(frames, state, _STEPS_OF_DIFFERENT) for state in states[kept]]
+        return np.clip(np.array(fitted), *STATE_LIMITS.T)
 
     def fitted(self, frames: Sequence[Frame], state: FloatArray, steps: int) -> FloatArray:
         """Return the state (14,) that fits the silhouettes of these frames, without smoothing."""

@@ -28,7 +28,7 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering import state_choice
+from cardbox_tracker.estimation.filtering import point_doubt, state_choice
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
 
@@ -78,7 +78,8 @@ class PointFit:
         if not found:
             return
         points, deviations, bones, away = zip(*(term.evidence for _, term in found), strict=True)
-        numbers = [number for number, _ in found]
+        self._numbers = numbers = [number for number, _ in found]
+        self._observations = [term for _, term in found]
         self._fitted: FittedTuple = (
             np.array(points),
             np.array(deviations),
@@ -133,6 +134,22 @@ class PointFit:
         fit_states(fitted, self._cost.body, self._fitted, prior, none, bounds, _POLISH_STEPS)
         polished: FloatArray = fitted[0]
         return polished
+
+    def is_doubtful(self, state: FloatArray) -> bool:
+        """Return whether a result, state (14,), is uncertain; see :mod:`.point_doubt`."""
+        cost = self._cost
+        if not self.is_given:
+            # Between seldom points, the depth of such a person in one camera is a guess.
+            return self.is_leading and len(cost.seeing) == 1
+        states = [cost.to_views[number](state) for number in self._numbers]
+        farthest_m = point_doubt.distance_to_points(states, self._observations)
+        if farthest_m > point_doubt.FAR_M:
+            return True
+        if not self.is_leading or len(cost.seeing) > 1 or self._numbers != [0]:
+            return False
+        seen = self._observations[0]
+        features = point_doubt.features_of(cost.keypoints(state), seen, farthest_m)
+        return point_doubt.chance_of_error(features) > point_doubt.UNCERTAIN_FROM
 
     def _prior(self) -> tuple[FloatArray, FloatArray]:
         """Return mean and inverse variance (14,) of the cost's priors of the torso."""

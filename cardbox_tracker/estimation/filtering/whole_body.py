@@ -51,9 +51,6 @@ from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 _HOME_LIMIT_M = 0.7
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-# Fit of several states to the outlines: number of states, number of similar states, least distance
-# of the others, m; Gauss-Newton steps.
-_FITTED, _FIT_STEPS = (3, 1, 0.1), 2
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 
@@ -224,7 +221,7 @@ class WholeBodyFilter:
         """Move all joints of the best states together; then choose the survivors."""
         config, cost = self._config, self._cost
         if self._plan.fits_outlines:
-            fitted = self._fitted(frames, states, ratings)
+            fitted = self.refine.outline.different(frames, states, ratings, cost)
             states = np.concatenate([states, fitted])
             ratings = np.concatenate([ratings, cost.bodies(fitted)[0]])
         if self._points.is_given:
@@ -252,15 +249,6 @@ class WholeBodyFilter:
         self.states, self.ratings = states, ratings
         self._survivors = self._apart(states, ratings)
 
-    def _fitted(
-        self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray
-    ) -> FloatArray:
-        """Return a few different states (N, 14) after a fit to all outlines."""
-        cost, outline = self._cost, self.refine.outline
-        kept = state_choice.choose_apart(states, ratings, *_FITTED, cost.parts, cost.girdle)
-        fitted = [outline.fitted(frames, state, _FIT_STEPS) for state in states[kept]]
-        return np.clip(np.array(fitted), *STATE_LIMITS.T)
-
     def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
         c, cost = self._config, self._cost
         kept = (c.survivors, c.alike, c.apart_m)
@@ -281,8 +269,7 @@ class WholeBodyFilter:
         _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
         fit_iou = iou_of(total, areas_px[1], costs_px[1])
         pixels = loss.Pixels(total, cost.frontal_px, costs_px[0], areas_px[0])
-        # The coefficients of the evidence belong to a cost without points.
-        best = int(np.argmin(self.ratings))
+        best = int(np.argmin(self.ratings))  # the evidence belongs to a cost without points
         rating = float(self.ratings[best] - cost.point_costs(self.states[best : best + 1])[0])
         arm_m = sum(self._arm.spreads_m) / 4
         evidence = loss.evidence_of(pixels, rating, arm_m, stddev, mean, self._age)
@@ -307,7 +294,7 @@ class WholeBodyFilter:
             keypoints_m=keypoints_m,
             cost_px=int(cost_px),
             iou=iou,
-            is_uncertain=self._chance > config.uncertain_from,
+            is_uncertain=self._chance > config.uncertain_from or self._points.is_doubtful(result),
             is_poor=self._chance > config.lost_from or fit_iou < self._lost_iou,
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
