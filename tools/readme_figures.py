@@ -21,11 +21,12 @@ from cardbox_tracker.evaluation.recorded.report import mean_of
 from cardbox_tracker.evaluation.results import read_json
 from cardbox_tracker.files import atomic_path
 from experiments.results import motions_in, recorded_results
+from tools.people_rows import people_rows
 
 BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"
 RESULTS = Path("docs/evaluation")
-ACCURACY, SESSIONS_REPORT = "accuracy.json", "sessions.md"
+ACCURACY, SESSIONS_REPORT, PEOPLE = "accuracy.json", "sessions.md", "real-people.json"
 BENCHMARKS = Path("docs/benchmarks.json")
 
 
@@ -69,7 +70,8 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
 
     Args:
         results: ``sessions.json``, the rendered recordings; its means are the last row.
-        others: rows of ``accuracy.json``, errors in cm; a pair is a range, null is not measured.
+        others: rows of real people and of ``accuracy.json``, errors in cm; a pair is a range, null
+            is not measured.
     """
     sessions = results["sessions"]
     means = {
@@ -99,8 +101,9 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
             "correction learned from:"
         ),
         "",
-        "| people | cameras | left out | aligned | MediaPipe | absolute | measured on |",
-        "|---|---|---|---|---|---|---|",
+        "| people | cameras | left out | aligned | with detector | MediaPipe | absolute "
+        "| with detector | measured on |",
+        "|---|---|---|---|---|---|---|---|---|",
         *(_accuracy_row(row) for row in (*others, rendered)),
         "",
         *_wrapped(
@@ -117,9 +120,9 @@ def current(root: Path) -> str:
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
     text = replaced((root / "README.md").read_text(encoding="utf-8"), section, BEGIN, END)
-    sessions = sessions_section(
-        read_json(folder / "sessions.json"), read_json(folder / ACCURACY)["rows"]
-    )
+    more = read_json(folder / ACCURACY)
+    people = people_rows(read_json(folder / PEOPLE), more["mediapipe"])
+    sessions = sessions_section(read_json(folder / "sessions.json"), [*people, *more["rows"]])
     text = replaced(text, sessions, SESSIONS_BEGIN, SESSIONS_END)
     speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))
     return replaced(text, speed, benchmark_report.BEGIN, benchmark_report.END)
@@ -163,14 +166,16 @@ def _row(name: str, motion: Mapping[str, Any]) -> str:
 
 def _accuracy_row(row: Mapping[str, Any]) -> str:
     aligned, absolute = _range(row["aligned"]), _range(row["absolute"])
-    if "hands" in row:
-        aligned += f" (hands {row['hands']:.0f})"
     if "without_correction" in row:
         without = row["without_correction"]
         aligned += f" ({without[0]:.1f} without the correction)"
         absolute += f" ({without[1]:.1f})"
-    cells = (row["people"], row["cameras"], row["left_out"], aligned, _range(row["mediapipe"]))
-    return f"| {' | '.join(cells)} | {absolute} | {row['source']} |"
+    cells = (
+        *(row["people"], row["cameras"], row["left_out"], aligned),
+        *(_range(row.get("with_detector")), _range(row["mediapipe"]), absolute),
+        *(_range(row.get("absolute_with_detector")), row["source"]),
+    )
+    return f"| {' | '.join(cells)} |"
 
 
 def _range(value_cm: float | Sequence[float] | None) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from cardbox_tracker.evaluation.results import read_json
 from experiments.results import motions_in, recorded_results
+from tools.people_rows import people_rows
 from tools.readme_figures import (
     BEGIN,
     END,
@@ -106,15 +107,43 @@ def test_sessions_by_hand() -> None:
     text = sessions_section(
         results,
         [
-            other | {"aligned": [4.06, 6.7], "absolute": 7.3, "hands": 22.6},
+            other | {"aligned": [4.06, 6.7], "absolute": 7.3, "with_detector": 3.2},
             other | {"aligned": 7.0, "absolute": 10.6, "without_correction": [6.7, 8.8]},
         ],
     )
     *rest, last = [line for line in text.splitlines() if " cm " in line]
-    assert "(2 recordings) | one | recording; used in development | 6.5 cm | 7.0 cm | 9.0" in last
-    assert rest[0] == "| real | two | body | 4.1 to 6.7 cm (hands 23) |  | 7.3 cm | elsewhere |"
-    assert "| 7.0 cm (6.7 without the correction) |  | 10.6 cm (8.8) |" in rest[1]
+    assert (
+        "(2 recordings) | one | recording; used in development | 6.5 cm |  | 7.0 cm | 9.0" in last
+    )
+    assert rest[0] == "| real | two | body | 4.1 to 6.7 cm | 3.2 cm |  | 7.3 cm |  | elsewhere |"
+    assert "| 7.0 cm (6.7 without the correction) |  |  | 10.6 cm (8.8) |" in rest[1]
     words = " ".join(text.split())
     assert "on 1 of the 2 rendered recordings" in words
     assert "An image takes 2.5 ms" in words
     assert "2 seeds" in words
+
+
+def test_rows_of_people_are_means_with_and_without_points() -> None:
+    def session(name: str, points: str, aligned: float, cameras: list[str]) -> dict[str, Any]:
+        peer = {} if name.startswith("P0_") else {"aligned": 9.7}
+        run = {"aligned": aligned, "absolute": 2 * aligned}
+        return {
+            "name": name,
+            "points": points,
+            "cameras": cameras,
+            "mediapipe": peer,
+            "runs": [run],
+        }
+
+    films = [("P0_1", []), ("P0_2", []), ("real_balance", ["cam02", "cam01"])]
+    sessions = [
+        session(name, points, number + factor, cameras)
+        for number, (name, cameras) in enumerate(films, 1)
+        for points, factor in (("none", 10.0), ("mediapipe", 2.0))
+    ]
+    one, two = people_rows({"sessions": sessions}, {"P0_": 7.7})
+    assert (one["aligned"], one["with_detector"], one["mediapipe"]) == (11.5, 3.5, 7.7)
+    assert (one["absolute"], one["absolute_with_detector"]) == (23.0, 7.0)
+    assert (two["cameras"], two["aligned"], two["with_detector"]) == ("two", 13.0, 5.0)
+    # MediaPipe's figure is of one camera.
+    assert two["mediapipe"] is None
