@@ -32,6 +32,8 @@ from cardbox_tracker.estimation.cost.linear_kernels import solve
 _N_RESIDUALS = 2 * N_POINTS + N_BONES
 # A point that is too far away to count in the cost still pulls.
 _MOST = 4.0 * MOST
+# Step of the differences, rad and m; the projection is smooth.
+_STEP = 1e-4
 
 
 class Fitted(NamedTuple):
@@ -97,7 +99,7 @@ def fit_states(
     fitted: FittedTuple,
     prior: tuple[Floats, Floats],
     damping: Floats,
-    bounds: tuple[Floats, Floats],
+    limits: Floats,
     count: int,
 ) -> None:
     """Move states (N, 14) of the first camera in place, by ``count`` damped Gauss-Newton steps.
@@ -108,16 +110,14 @@ def fit_states(
         fitted: fields of :class:`Fitted`.
         prior: mean and inverse variance of each value, (14,) each.
         damping: inverse variance of a step, (14,).
-        bounds: limits of the values, (14, 2), and steps of the central differences, (14,).
+        limits: lowest and highest value of each, (14, 2).
         count: number of steps.
     """
     of, seen = body_of(body), Fitted(*fitted)
     mean, inverse = prior
-    limits, steps = bounds
     scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
     there, trial = np.empty(N_STATE), np.empty(N_STATE)
     now, above = np.empty(_N_RESIDUALS), np.empty(_N_RESIDUALS)
-    below = np.empty(_N_RESIDUALS)
     jacobian, weights = np.empty((N_STATE, _N_RESIDUALS)), np.empty(_N_RESIDUALS)
     matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
     for n in range(states.shape[0]):
@@ -147,15 +147,12 @@ def fit_states(
                 _residuals(there, moved, one, scratch, posed, points, now)
                 trial[:] = state
                 for j in range(N_STATE):
-                    trial[j] = state[j] + steps[j]
+                    trial[j] = state[j] + _STEP
                     _there(trial, turned, offset, there)
                     _residuals(there, moved, one, scratch, posed, points, above)
-                    trial[j] = state[j] - steps[j]
-                    _there(trial, turned, offset, there)
-                    _residuals(there, moved, one, scratch, posed, points, below)
                     trial[j] = state[j]
                     for i in range(_N_RESIDUALS):
-                        jacobian[j, i] = (above[i] - below[i]) / (2.0 * steps[j])
+                        jacobian[j, i] = (above[i] - now[i]) / _STEP
                 for i in range(N_POINTS):
                     square = now[2 * i] ** 2 + now[2 * i + 1] ** 2
                     weight = one.points[i, 2] * exp(-square / _MOST)

@@ -25,7 +25,6 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
 from cardbox_tracker.estimation.cost.joint_points_fit import FittedTuple, fit_states
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering import point_doubt, state_choice
@@ -120,18 +119,15 @@ class PointFit:
     def _fitted_from(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) near ``states`` that fit the points and the torso's priors."""
         fitted = np.ascontiguousarray(states).copy()
-        bounds = STATE_LIMITS, STATE_STEP
-        prior = self._prior()
-        body = self._cost.body
-        fit_states(fitted, body, self._fitted, prior, self._damping, bounds, _STEPS)
+        given = self._fitted, self._prior(), self._damping
+        fit_states(fitted, self._cost.body, *given, STATE_LIMITS, _STEPS)
         return fitted
 
     def polished(self, state: FloatArray) -> FloatArray:
         """Return the state (14,) near ``state``, mainly in depth, that fits the points."""
-        fitted, bounds = state[None].copy(), (STATE_LIMITS, STATE_STEP)
-        prior = state, _POLISH_DEVIATION**-2
-        none = np.zeros(N_STATE)
-        fit_states(fitted, self._cost.body, self._fitted, prior, none, bounds, _POLISH_STEPS)
+        fitted, prior = state[None].copy(), (state, _POLISH_DEVIATION**-2)
+        given = self._fitted, prior, np.zeros(N_STATE)
+        fit_states(fitted, self._cost.body, *given, STATE_LIMITS, _POLISH_STEPS)
         polished: FloatArray = fitted[0]
         return polished
 
