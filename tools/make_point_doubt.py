@@ -11,8 +11,9 @@ it would leave out wrong results.
 A logistic regression on ``point_doubt.FEATURES`` estimates the chance that a joint is wrong by more
 than 20 cm. Each source weighs alike (the films of one repository are one source, and so are the
 rendered sessions), and so do wrong and right images. The tool prints the coefficients beside those
-of the package, the area under the ROC curve of both for sources outside the training data, and how
-many images the package would call certain. scikit-learn is needed: ``pip install '.[learn]'``.
+of the package; for each source the area under the ROC curve of coefficients fitted to the others;
+and by threshold how many images are certain, and how many of these are wrong. scikit-learn is
+needed: ``pip install '.[learn]'``.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ def fitted(frames: Fit, inverse_penalty: float = INVERSE_PENALTY) -> FloatArray:
     Raises:
         ValueError: all frames are right, or all wrong.
     """
-    if frames.is_wrong.all() or not frames.is_wrong.any():
+    if not _has_both(frames):
         raise ValueError("all frames are of one class")
     shares = [float(frames.weights[frames.is_wrong == one].sum()) for one in (False, True)]
     weights = frames.weights / np.array(shares)[frames.is_wrong.astype(int)]
@@ -168,7 +169,7 @@ def kept(frames: Fit, found: FloatArray, threshold: float) -> tuple[float, float
 
 
 def report(sessions: Sequence[Frames], inverse_penalty: float = INVERSE_PENALTY) -> str:
-    """Return coefficients, quality for sources that are left out, and shares by threshold.
+    """Return coefficients, figures of each source, and shares by threshold.
 
     Raises:
         ValueError: all frames are right, or all wrong.
@@ -178,11 +179,14 @@ def report(sessions: Sequence[Frames], inverse_penalty: float = INVERSE_PENALTY)
     lines = [f"{'':20} {'fitted':>8} {'shipped':>8}"]
     for name, *pair in zip(("intercept", *point_doubt.FEATURES), own, SHIPPED, strict=True):
         lines.append(f"{name:20} {pair[0]:8.2f} {pair[1]:8.2f}")
-    lines += ["", f"{'AUC':20} {'left out':>8} {'shipped':>8}"]
+    limit = point_doubt.UNCERTAIN_FROM
+    heads = "left out", "AUC", "wrong, %", "kept, %", "wrong, %"
+    lines += ["", f"{'':20} {'AUC':>8} {'shipped:':>8} {'':8} certain up to {limit}"]
+    lines.append(" ".join([f"{'':20}", *(f"{head:>8}" for head in heads)]))
     for source in sorted({one.source for one in sessions}):
         of_source = together([one for one in sessions if one.source == source])
         others = [one for one in sessions if one.source != source]
-        lines.append(f"{source[-20:]:20} {_left_out(others, of_source, inverse_penalty)}")
+        lines.append(f"{source[-20:]:20} {_figures(of_source, others, inverse_penalty)}")
     lines += ["", f"{'certain up to':20} {'kept, %':>8} {'wrong, %':>8}   shipped: the same"]
     pairs = [chances(own, every.features), chances(SHIPPED, every.features)]
     for threshold in THRESHOLDS:
@@ -191,18 +195,25 @@ def report(sessions: Sequence[Frames], inverse_penalty: float = INVERSE_PENALTY)
     return "\n".join(lines)
 
 
-def _left_out(others: Sequence[Frames], frames: Fit, inverse_penalty: float) -> str:
-    """Return the AUC of coefficients fitted to other sources, and that of the shipped ones."""
-    if frames.is_wrong.all() or not frames.is_wrong.any():
-        return "all frames are wrong" if frames.is_wrong.all() else "no frame is wrong"
-    columns = [f"{'-':>8}", f"{_area(SHIPPED, frames):8.3f}"]
-    if others:
-        columns[0] = f"{_area(fitted(together(others), inverse_penalty), frames):8.3f}"
-    return " ".join(columns)
+def _figures(frames: Fit, others: Sequence[Frames], inverse_penalty: float) -> str:
+    """Return AUC of coefficients fitted to other sources, and figures of the shipped ones."""
+    areas = float("nan"), _area(SHIPPED, frames)
+    if others and _has_both(together(others)):
+        areas = _area(fitted(together(others), inverse_penalty), frames), areas[1]
+    shares = kept(frames, chances(SHIPPED, frames.features), point_doubt.UNCERTAIN_FROM)
+    percent = [100.0 * share for share in (float(frames.is_wrong.mean()), *shares)]
+    return "{:8.3f} {:8.3f} {:8.1f} {:8.1f} {:8.1f}".format(*areas, *percent)
+
+
+def _has_both(frames: Fit) -> bool:
+    """Return whether there are wrong frames, and right ones."""
+    return bool(frames.is_wrong.any() and not frames.is_wrong.all())
 
 
 def _area(coefficients: FloatArray, frames: Fit) -> float:
-    """Return the area under the ROC curve."""
+    """Return the area under the ROC curve; nan if all frames are right, or all wrong."""
+    if not _has_both(frames):
+        return float("nan")
     return float(roc_auc_score(frames.is_wrong, chances(coefficients, frames.features)))
 
 
