@@ -239,7 +239,10 @@ def main(args: list[str] | None = None) -> int:
         for folder, one in zip(given.sessions, sessions, strict=True):
             print(f"{folder.name}: {one.is_wrong.sum()} of {len(one.is_wrong)} images wrong")
         print(report(sessions, given.inverse_penalty))
-    except (CardboxError, ValueError) as error:
+    except CardboxError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except ValueError as error:
         print(f"no fit: {error}; give sessions with right and wrong images", file=sys.stderr)
         return 1
     return 0

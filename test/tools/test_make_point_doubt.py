@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from cardbox_tracker.body.model import PROPORTIONS
 from cardbox_tracker.estimation.filtering import point_doubt
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.evaluation.truth import GroundTruth
+from tools import make_point_doubt as tool
 from tools.make_point_doubt import SHIPPED, Frames, chances, fitted, kept, report, together
 
 TRUE = np.array([-1.0, 4.0, -2.0, 20.0, 0.5])
@@ -77,3 +87,48 @@ def test_without_wrong_frames_there_is_no_fit() -> None:
     right = frames("a", 100, 8)._replace(is_wrong=np.zeros(100, bool))
     with pytest.raises(ValueError, match="class"):
         report([right])
+
+
+def test_images_with_truth_and_points_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hand that is 21 cm off makes an image wrong; images without points have no features."""
+    shipped = point_doubt.chance_of_error
+    stamps_ns = [10, 20, 30, 40]
+    off_m = dict(zip([*stamps_ns, 50], [0.19, 0.21, 0.5, 0.0, 0.5], strict=True))
+    true_m = np.zeros((4, 6, 3))
+    true_m[3, 0] = np.nan
+    session = RecordedSession(
+        *("name", Path("bag"), None),
+        GroundTruth({}, {}, 0, 2.5, 10.0, "left", stature_m=1.6, source="films, CC0"),
+        *({}, 0.0, np.array(stamps_ns), np.full(4, "a"), true_m, np.zeros((4, 3)), {}, None),
+    )
+    bodies: list[Any] = []
+
+    class Tracker:
+        def __init__(self, body: Any, *_: object) -> None:
+            bodies.append(body)
+
+        def track(self, stamp_ns: int) -> SimpleNamespace:
+            # The image 30 is without points.
+            if stamp_ns != 30:
+                assert np.isinf(point_doubt.FAR_M)
+                point_doubt.chance_of_error(np.full(4, float(stamp_ns)))
+            found = np.zeros((6, 3))
+            found[5, 2] = off_m[stamp_ns]
+            return SimpleNamespace(keypoints_m=found)
+
+    @contextmanager
+    def opened(_: RecordedSession) -> Iterator[SimpleNamespace]:
+        yield SimpleNamespace(first=SimpleNamespace(camera=None))
+
+    images = [SimpleNamespace(stamp_ns=stamp, observations=stamp) for stamp in off_m]
+    monkeypatch.setattr(tool, "first_camera_of", lambda _: session)
+    monkeypatch.setattr(tool, "opened", opened)
+    monkeypatch.setattr(tool, "motions", lambda *_: images)
+    monkeypatch.setattr(tool, "Tracker", Tracker)
+    found = tool.frames_of(Path("films"))
+    assert found.source == "films"
+    np.testing.assert_array_equal(found.features[:, 0], [10.0, 20.0])
+    assert found.is_wrong.tolist() == [False, True]
+    (body,) = bodies
+    assert body.source == PROPORTIONS and body.placement.distance_m == 2.5
+    assert point_doubt.chance_of_error is shipped and np.isfinite(point_doubt.FAR_M)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
+from cardbox_tracker.evaluation.recorded.session import RecordedSession
+from cardbox_tracker.evaluation.truth import GroundTruth
 from cardbox_tracker.vision.camera import Camera
 from tools import point_deviations as tool
 
@@ -120,3 +128,42 @@ def test_unknown_kinds_have_a_dash() -> None:
     hidden = session("a", [seen()])
     hidden.px[:, kernels.HIPS], hidden.metres[:, kernels.HIPS] = np.nan, np.nan
     assert tool.report({"one": hidden}).splitlines()[2].endswith("| - |")
+
+
+def measured(monkeypatch: pytest.MonkeyPatch, stamps_ns: list[int]) -> tool.Differences:
+    """Measure images, of which that of 10 ns has a truth, and that of 20 ns nobody."""
+    session = RecordedSession(
+        *("name", Path("bag"), None),
+        GroundTruth({}, {}, 0, 2.5, float(np.degrees(PITCH_RAD)), "left", source="films, CC0"),
+        *({}, 0.0, np.array([10, 20]), np.full(2, "a"), np.array([KEYPOINTS_M] * 2)),
+        *(np.zeros((2, 3)), {}, None, np.array([HIPS_M] * 2)),
+    )
+
+    @contextmanager
+    def opened(_: RecordedSession) -> Iterator[SimpleNamespace]:
+        yield SimpleNamespace(first=SimpleNamespace(camera=CAMERA.with_pitch(0.0)))
+
+    images = [
+        SimpleNamespace(
+            stamp_ns=stamp, first=SimpleNamespace(points=None if stamp == 20 else seen())
+        )
+        for stamp in stamps_ns
+    ]
+    monkeypatch.setattr(tool, "first_camera_of", lambda _: session)
+    monkeypatch.setattr(tool, "opened", opened)
+    monkeypatch.setattr(tool, "motions", lambda *_: images)
+    return tool.measured(Path("films"))
+
+
+def test_images_with_truth_are_measured_with_the_pitch_of_the_truth(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = measured(monkeypatch, [10, 20, 30])
+    assert found.source == "films" and len(found.px) == 1
+    np.testing.assert_allclose(found.px, 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.bones, 0.0, atol=1e-3)
+
+
+def test_a_session_in_which_nobody_is_found_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(CardboxError, match="finds nobody in the images of films"):
+        measured(monkeypatch, [20, 30])
