@@ -58,7 +58,7 @@ _JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
 _TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
 _POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders): deviation of the component along the line of sight, and
-# mean difference of the detector's from the true one.
+# mean difference of the detector's from the true one (tools/point_deviations.py).
 _BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.13])
 _BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05])
 _OLDEST_S = 1.0
@@ -130,14 +130,14 @@ class JointPointsTerm:
         """
         pixels = np.empty((N_POINTS, 3))
         kernels.project(before, self.body, pixels)
-        found = _points(points)
+        found = points_of(points)
         exchanged = replace(
             points,
             px=points.px[_OTHER_SIDE],
             scores=points.scores[_OTHER_SIDE],
             spatial_m=None if points.spatial_m is None else points.spatial_m[_OTHER_SIDE],
         )
-        away_m, other_m = (self._distances(one, pixels) for one in (found, _points(exchanged)))
+        away_m, other_m = (self._distances(one, pixels) for one in (found, points_of(exchanged)))
         if not np.isfinite(away_m).any():
             return points
         square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
@@ -155,7 +155,7 @@ class JointPointsTerm:
         return distances
 
     def _evidence(self, points: ImagePoints, age_s: float) -> EvidenceTuple:
-        found = _points(points)
+        found = points_of(points)
         deviations = np.empty((N_POINTS, 2))
         for arm in range(2):
             for joint, metres in _JOINT_M.items():
@@ -167,12 +167,9 @@ class JointPointsTerm:
         away = np.array([0.0, 0.0, 1.0])
         shoulders = found[[SHOULDER, POINTS_OF_ARM + SHOULDER]]
         if self._uses_bones and points.spatial_m is not None and shoulders[:, 2].min() > 0.0:
-            bones[:, :2] = _bones(points.spatial_m, found)
+            bones[:, :2] = bones_of(points.spatial_m, found)
             bones[:, 0] -= _BONE_OFFSETS
-            camera = self._camera
-            bearing = np.arctan2(shoulders[:, 0].mean() - camera.cx, camera.fx)
-            down, ahead = -np.sin(camera.pitch_rad), np.cos(camera.pitch_rad)
-            away = np.array([np.sin(bearing), *(np.cos(bearing) * np.array([down, ahead]))])
+            away = level_sight(self._camera, float(shoulders[:, 0].mean()))
         return found, deviations, bones, away
 
 
@@ -223,8 +220,19 @@ class JointPointsObservation:
         return self.weight_px * costs
 
 
-def _points(points: ImagePoints) -> FloatArray:
-    """Return column, row and score of the ten points that are compared, (10, 3)."""
+def level_sight(camera: Camera, column_px: float) -> FloatArray:
+    """Return the horizontal direction to a column of the image, (3,), in the optical frame."""
+    bearing = np.arctan2(column_px - camera.cx, camera.fx)
+    down, ahead = -np.sin(camera.pitch_rad), np.cos(camera.pitch_rad)
+    return np.array([np.sin(bearing), *(np.cos(bearing) * np.array([down, ahead]))])
+
+
+def points_of(points: ImagePoints) -> FloatArray:
+    """Return column, row and score of the ten points that are compared, (10, 3).
+
+    Each arm has four, the left one first: shoulder, elbow, wrist and knuckles. The middle of the
+    hips and that of the ears follow. Unknown points have the score 0.
+    """
     found = np.zeros((N_POINTS, 3))
     for arm, side in enumerate(_SIDES):
         for joint, name in ((SHOULDER, "shoulder"), (ELBOW, "elbow"), (WRIST, "wrist")):
@@ -245,8 +253,16 @@ def _middle(points: ImagePoints, *names: str) -> FloatArray:
     return np.array([*points.px[indices].mean(axis=0), score])
 
 
-def _bones(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
-    """Return component along z as a fraction of the length, and score, of each bone, (5, 2)."""
+def bones_of(spatial_m: FloatArray, found: FloatArray) -> FloatArray:
+    """Return component along z as a fraction of the length, and score, of each bone, (5, 2).
+
+    The bones are upper arm and forearm of each arm, the left one first, and the line from the right
+    to the left shoulder.
+
+    Args:
+        spatial_m: ``ImagePoints.spatial_m``, (17, 3).
+        found: see :func:`points_of`.
+    """
 
     def at(*names: str) -> FloatArray:
         middle: FloatArray = spatial_m[[POINT_INDEX[name] for name in names]].mean(axis=0)
