@@ -312,3 +312,20 @@ def test_of_an_image_turned_upright_only_what_is_asked_for_is_there() -> None:
     part[30:90, 40:90] = 0
     assert not part.any()
     assert not view.upright(image, box=(0, 0, 0, 0)).any()
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, 0.02, -0.6, 1.57, 3.1, -1.5])
+def test_points_of_a_turned_camera_go_where_its_pixels_go(roll_rad: float) -> None:
+    view = View.of(BODY, CAMERA, aside(roll_rad))
+    px = np.random.default_rng(0).uniform((0, 0), (view.camera.width, view.camera.height), (50, 2))
+    raw = px @ view.raw_px[:, :2].T + view.raw_px[:, 2]
+    np.testing.assert_allclose(view.upright_px(raw), px, atol=1e-9)
+    assert np.isnan(view.upright_px(np.full((1, 2), np.nan))).all()
+    if view.turn is None:
+        np.testing.assert_array_equal(raw, px)
+        return
+    # Rounding to whole pixels moves a pixel by up to half of one.
+    u, v = (np.arange(5, 100, 10), np.arange(5, 100, 10)[:, None])
+    found = view.upright_px(view.turn[v, u].reshape(-1, 2).astype(np.float64))
+    expected = np.stack(np.broadcast_arrays(u, v), axis=-1).reshape(-1, 2)
+    assert np.abs(found - expected).max() < 0.8
