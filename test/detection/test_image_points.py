@@ -83,9 +83,8 @@ def test_other_types_and_shapes_are_refused(values: dict[str, Any], words: str) 
 
 
 def test_lists_and_whole_numbers_of_numpy_are_taken() -> None:
-    spatial_m = np.ones((COUNT, 3)).tolist()
-    stamp_ns: Any = np.int64(5)
-    points = ImagePoints(PX.tolist(), SCORES.tolist(), stamp_ns, spatial_m)
+    lists: Any = PX.tolist(), SCORES.tolist(), np.int64(5), np.ones((COUNT, 3)).tolist()
+    points = ImagePoints(*lists)
     assert points.spatial_m is not None
     assert points.spatial_m.shape == (COUNT, 3)
     assert points.stamp_ns == 5
