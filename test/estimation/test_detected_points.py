@@ -18,7 +18,7 @@ from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
@@ -112,8 +112,13 @@ class Scene:
 
 def of_hand(found: tuple[np.ndarray, list[Estimate]], begin: int = 12) -> float:
     """Mean error of the hidden hand, px of 12 mm."""
-    assert {estimate.state for estimate in found[1]} == {TRACKING}
     return float(found[0][begin:, HAND].mean())
+
+
+def is_tracked(found: tuple[np.ndarray, list[Estimate]]) -> bool:
+    """Whether all frames were, but for a few that were doubted."""
+    states = [estimate.state for estimate in found[1]]
+    return set(states) <= {TRACKING, UNCERTAIN} and states.count(TRACKING) > 0.8 * len(states)
 
 
 both = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
@@ -125,6 +130,7 @@ def test_a_hand_before_the_torso_is_found_with_points_only(
 ) -> None:
     scene = Scene(detected, body)
     without, found = scene.track(lambda number: None), scene.track(scene.points)
+    assert is_tracked(found)
     assert of_hand(found) < 3.0
     assert of_hand(without) > 2.0 * of_hand(found)
     # The others are no worse than without.
@@ -154,7 +160,7 @@ def test_a_time_without_points_is_bridged_and_over_with_the_first_one(
 ) -> None:
     scene = Scene(detected, body)
     gap = scene.track(lambda number: None if 15 <= number < 25 else scene.points(number))
-    of_hand(gap)
+    assert is_tracked(gap)
     assert gap[0][15:17, HAND].max() < 6.0
     assert gap[0][27:, HAND].max() < 6.0
 
@@ -184,7 +190,7 @@ def test_points_of_somebody_else_for_some_frames_are_not_followed(
         return moved(points, across_px) if 15 <= number < 20 else points
 
     found = scene.track(given)
-    of_hand(found)
+    assert is_tracked(found)
     others = [0, 1, 3, 4, 5]
     assert found[0][12:, others].max() < 8.0
     assert found[0][22:, HAND].max() < 6.0
@@ -266,10 +272,11 @@ def test_good_points_win_against_a_wrong_silhouette(
         return wrong(person) if number >= 15 else person
 
     # The state says that the silhouette does not fit; this is about the posture.
-    found, _ = scene.track(scene.points, seen, 30, lost_frames=1000, lost_iou=0.0)
-    assert found[18:].mean(axis=0).max() < 5.0
-    without, _ = scene.track(lambda number: None, seen, 30, lost_frames=1000, lost_iou=0.0)
-    assert np.nanmean(without[18:]) > 3.0 * found[18:].mean()
+    usual = {"whole_body": default_preset().whole_body, "lost_frames": 1000, "lost_iou": 0.0}
+    found, _ = scene.track(scene.points, seen, 30, **usual)
+    assert found[18:].mean(axis=0).max() < 4.0
+    without, _ = scene.track(lambda number: None, seen, 30, **usual)
+    assert np.nanmean(without[18:]) > 4.0 * found[18:].mean()
 
 
 def beside() -> OtherCamera:

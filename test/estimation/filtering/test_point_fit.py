@@ -224,6 +224,9 @@ def test_points_lead_for_whom_nobody_measured(
     assert not one.fit.is_leading and not one.fit.is_given
     fit = one.see(points)
     assert (fit.is_given, fit.is_leading) == (True, leads)
+    # A silhouette with which the best of all states does not agree is wrong.
+    assert [fit.leads(iou) for iou in (0.9, 0.7, 0.5, 0.0)] == [leads, leads, True, True]
+    assert one.see(None).leads(0.5) == leads
 
 
 def test_points_lead_for_two_seconds_after_the_last_one(detected: Detect) -> None:
