@@ -8,7 +8,8 @@ camera for level, so these directions are compared along the horizontal line of 
 The directions are used for people who were not measured; for measured people the learned
 correction, which is trained on such, estimates the depth.
 
-Points may be missing or older than the frame. Points that fit the last posture only with left and
+Points may be older than the frame. Without new ones, the last ones count for up to a second, less
+and less, because joints may have moved. Points that fit the last posture only with left and
 right exchanged are exchanged; points that are far from the last posture belong to somebody else and
 are not used, unless this lasts.
 """
