@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import index
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.errors import quoted
 
 POINT_NAMES: tuple[str, ...] = (
     "nose",
@@ -31,6 +34,8 @@ POINT_NAMES: tuple[str, ...] = (
 """``left`` is the person's left. The first 13 are those of COCO, in its order; fingers are the
 knuckles at the base."""
 
+_FARTHEST = 1e6
+
 POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
 
 
@@ -40,7 +45,7 @@ class ImagePoints:
 
     Attributes:
         px: column and row of each of ``POINT_NAMES``, (17, 2); (0, 0) is the centre of the first
-            pixel. A point that is not known is nan.
+            pixel. A point that is not known is nan, as is one a million pixels away.
         scores: chance that the point is right, 0 to 1, (17,); 0 for a point that is not known.
         stamp_ns: stamp of the image, ns; points may be older than the image they are used with.
             None if they are of the same image.
@@ -49,7 +54,7 @@ class ImagePoints:
             directions between the points are used.
 
     Raises:
-        ValueError: the arrays have another shape.
+        ValueError: an array has another shape or is not numeric, or the stamp is no whole number.
     """
 
     px: FloatArray
@@ -58,23 +63,25 @@ class ImagePoints:
     spatial_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Check the shapes; points that are not finite get the score 0, and others 0 to 1."""
-        if self.spatial_m is not None and np.shape(self.spatial_m) != (len(POINT_NAMES), 3):
-            raise ValueError(
-                f"points in space have the shape {np.shape(self.spatial_m)}; expected "
-                f"{(len(POINT_NAMES), 3)}"
-            )
-        px, scores = np.array(self.px, np.float64), np.array(self.scores, np.float64)
-        expected = (len(POINT_NAMES), 2), (len(POINT_NAMES),)
-        if (px.shape, scores.shape) != expected:
-            raise ValueError(
-                f"points have the shape {px.shape} and scores {scores.shape}; expected "
-                f"{expected[0]} and {expected[1]}, ordered as POINT_NAMES"
-            )
-        known = np.isfinite(px).all(axis=1) & (scores > 0.0)
+        """Check the types; points that are not finite get the score 0, and others 0 to 1."""
+        count = len(POINT_NAMES)
+        px, scores = _array("px", self.px, (count, 2)), _array("scores", self.scores, (count,))
+        known = _is_finite(px) & (scores > 0.0)
         px[~known] = np.nan
         object.__setattr__(self, "px", px)
         object.__setattr__(self, "scores", np.where(known, np.clip(scores, 0.0, 1.0), 0.0))
+        if self.spatial_m is not None:
+            spatial_m = _array("spatial_m", self.spatial_m, (count, 3))
+            spatial_m[~_is_finite(spatial_m)] = np.nan
+            object.__setattr__(self, "spatial_m", spatial_m)
+        if self.stamp_ns is not None:
+            try:
+                object.__setattr__(self, "stamp_ns", index(self.stamp_ns))
+            except TypeError:
+                raise ValueError(
+                    f"stamp_ns of points is {quoted(self.stamp_ns)}; expected a whole number of "
+                    "nanoseconds, or None"
+                ) from None
 
     @classmethod
     def of(
@@ -84,11 +91,33 @@ class ImagePoints:
         px, scores = np.full((len(POINT_NAMES), 2), np.nan), np.zeros(len(POINT_NAMES))
         for name, (column, row, score) in found.items():
             if name in POINT_INDEX:
-                index = POINT_INDEX[name]
-                px[index], scores[index] = (column, row), score
+                place = POINT_INDEX[name]
+                px[place], scores[place] = (column, row), score
         return cls(px, scores, stamp_ns)
 
     @property
     def is_empty(self) -> bool:
         """Whether no point is known."""
         return not self.scores.any()
+
+
+def _array(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return a copy of ``values`` if it has the expected shape."""
+    try:
+        array = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(
+            f"{name} of points is {quoted(values)}; expected numbers of the shape {shape}, ordered "
+            "as POINT_NAMES"
+        ) from None
+    if array.shape != shape:
+        raise ValueError(
+            f"{name} of points has the shape {array.shape}; expected {shape}, ordered as "
+            "POINT_NAMES"
+        )
+    return array
+
+
+def _is_finite(points: FloatArray) -> NDArray[np.bool_]:
+    """Return whether all coordinates of each point are finite and below a million, (N,)."""
+    return np.asarray((np.abs(points) < _FARTHEST).all(axis=1))

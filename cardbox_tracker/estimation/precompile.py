@@ -13,6 +13,7 @@ from cardbox_tracker.body.appearance import PARTS, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation import person_region
 from cardbox_tracker.estimation.config import PRESETS, TrackerConfig
 from cardbox_tracker.estimation.cost.view import OtherCamera
@@ -32,6 +33,7 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
     camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
+    points = ImagePoints(np.full((len(POINT_NAMES), 2), 12.0), np.ones(len(POINT_NAMES)))
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.
         for shape in (silhouette.shape, (*silhouette.shape, 3)):
@@ -45,7 +47,8 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
                 person = body.with_values(appearance=looks)
                 tracker = Tracker(person, camera, config, others=others)
                 for _ in range(2):
-                    tracker.track([Observation(silhouette, image)] * (1 + len(others)))
+                    one = Observation(silhouette, image, points=points)
+                    tracker.track([one] * (1 + len(others)))
 
 
 def quickest(config: TrackerConfig) -> TrackerConfig:

@@ -10,6 +10,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
 from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Silhouette, Term
@@ -83,7 +84,8 @@ class TrackedCamera:
             interval_s: time since the previous frame, s.
 
         Raises:
-            ValueError: the size of the silhouette or the image is not the camera's.
+            ValueError: the size of the silhouette or the image is not the camera's, or the points
+                are no ImagePoints.
         """
         posture, depth_m = before, None
         stamp_ns = None if observation is None else observation.stamp_ns
@@ -109,6 +111,12 @@ class TrackedCamera:
         return Frame(*seen, posture, depth_m, interval_s, stamp_ns, points)
 
     def _check(self, observation: Observation) -> None:
+        points = observation.points
+        if points is not None and not isinstance(points, ImagePoints):
+            raise ValueError(
+                f"points are of the type {type(points).__name__}; expected ImagePoints, such as "
+                "ImagePoints.of(...), or None"
+            )
         for name, pixels, most in (
             ("silhouette", observation.silhouette, 2),
             ("image", observation.image, 3),

@@ -166,9 +166,9 @@ class Tracker:
                 frame is 1/15 s.
 
         Raises:
-            ValueError: the size of a silhouette or an image is not its camera's; there are more
-                observations than cameras; or ``image`` or ``stamp_ns`` is given in addition to
-                observations.
+            ValueError: the size of a silhouette or an image is not its camera's; points are no
+                ImagePoints; there are more observations than cameras; or ``image`` or ``stamp_ns``
+                is given in addition to observations.
         """
         if isinstance(observations, np.ndarray):
             observations = Observation(observations, image, stamp_ns=stamp_ns)

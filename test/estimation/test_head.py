@@ -98,7 +98,8 @@ def test_a_face_without_noise_gives_its_angles_back(
     posture = np.zeros(12)
     posture[1:4] = np.radians(torso_deg)
     found = found_deg(face(yaw_deg, pitch_deg, posture, moved_m), posture)
-    np.testing.assert_allclose(found, (yaw_deg, pitch_deg), atol=2.0)
+    # The prior draws a head that turns or nods far towards the middle.
+    np.testing.assert_allclose(found, (yaw_deg, pitch_deg), atol=1.5, rtol=0.12)
 
 
 def test_a_face_to_the_persons_left_has_a_positive_yaw() -> None:

@@ -12,6 +12,7 @@ from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation import person_region, still_things
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost import (
@@ -20,6 +21,8 @@ from cardbox_tracker.estimation.cost import (
     body_priors,
     cardbox_kernels,
     inner_cue_kernels,
+    joint_points_fit,
+    joint_points_kernels,
     kinematics,
     outline_fit_kernels,
     pose_prior,
@@ -33,6 +36,7 @@ from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering import (
     arm_proposals,
     joint_moves,
+    mirroring,
     particle_kernels,
     state_choice,
     torso_proposals,
@@ -57,6 +61,7 @@ def compiled() -> dict[str, int]:
         *(kinematics, rasterisation, union, cardbox_kernels, inner_cue_kernels, row_sums),
         *(pose_prior, body_outline, body_priors, whole_body_kernels, arm_points),
         *(outline_fit_kernels, particle_kernels, person_region, still_things),
+        *(joint_points_fit, joint_points_kernels, mirroring),
         *(arm_proposals, joint_moves, state_choice, torso_proposals),
         *(contrast, regions, chroma, shadows, light, window),
     )
@@ -109,4 +114,19 @@ def test_nor_does_one_of_several_cameras() -> None:
     for seen in ([person, person], [None, person], [person, None]):
         estimate = tracker.track([Observation(one) for one in seen])
     assert estimate.keypoints_m is not None
+    assert compiled() == before
+
+
+def test_nor_do_the_first_points_of_a_detector() -> None:
+    compile_all()
+    before = compiled()
+    assert before["cardbox_tracker.estimation.cost.joint_points_fit.fit_states"] > 0
+    body = BodyModel()
+    person = render(cardbox_patches(body, reference_posture("front")), CAMERA)
+    count = len(POINT_NAMES)
+    px = np.stack([np.linspace(100.0, 220.0, count), np.full(count, 120.0)], axis=1)
+    points = ImagePoints(px, np.ones(count), spatial_m=np.eye(count, 3))
+    tracker = Tracker(body.with_values(source="proportions"), CAMERA, PRESETS["default"]())
+    for given in (points, points, None):
+        assert tracker.track(Observation(person, points=given)).posture is not None
     assert compiled() == before

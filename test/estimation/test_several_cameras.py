@@ -14,7 +14,7 @@ from cardbox_tracker.errors import CameraError, InitializationError
 from cardbox_tracker.estimation.config import default_preset, paper_preset
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.terms import Frame, Silence
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -141,6 +141,24 @@ def test_the_rating_is_the_mean_of_the_cameras_with_priors_once() -> None:
         views.see(both(states[1]), states[1])
         views.choose(seeing)
         np.testing.assert_allclose(views.bodies(states)[0], shares[seeing[0]] + priors, atol=1e-12)
+
+
+def test_terms_of_each_camera_get_the_number_of_pixels_that_count() -> None:
+    """Otherwise a camera whose silhouette has legs would weigh its points twice."""
+    counted_px = []
+
+    class Counting(Silence):
+        def observe(self, frame: Frame) -> Silence:
+            counted_px.append(frame.foreground_px)
+            return self
+
+    views, state = MultiViewCost(BODY, CAMERA, [VIEW], CONFIG), state_of(0.2)
+    silhouettes = both(state)
+    views.see(silhouettes, state)
+    views.choose((0, 1))
+    views.observe([Frame(one, 120, 10**6) for one in silhouettes], [[Counting()], [Counting()]])
+    assert counted_px == [cost.silhouette_px for cost in views.costs]
+    assert min(counted_px) > 500
 
 
 def track(tracker: Tracker, state: np.ndarray, seeing: tuple[int, ...] = (0, 1)) -> Estimate:
@@ -312,3 +330,20 @@ def test_of_an_image_turned_upright_only_what_is_asked_for_is_there() -> None:
     part[30:90, 40:90] = 0
     assert not part.any()
     assert not view.upright(image, box=(0, 0, 0, 0)).any()
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, 0.02, -0.6, 1.57, 3.1, -1.5])
+def test_points_of_a_turned_camera_go_where_its_pixels_go(roll_rad: float) -> None:
+    view = View.of(BODY, CAMERA, aside(roll_rad))
+    px = np.random.default_rng(0).uniform((0, 0), (view.camera.width, view.camera.height), (50, 2))
+    raw = px @ view.raw_px[:, :2].T + view.raw_px[:, 2]
+    np.testing.assert_allclose(view.upright_px(raw), px, atol=1e-9)
+    assert np.isnan(view.upright_px(np.full((1, 2), np.nan))).all()
+    if view.turn is None:
+        np.testing.assert_array_equal(raw, px)
+        return
+    # Rounding to whole pixels moves a pixel by up to half of one.
+    u, v = (np.arange(5, 100, 10), np.arange(5, 100, 10)[:, None])
+    found = view.upright_px(view.turn[v, u].reshape(-1, 2).astype(np.float64))
+    expected = np.stack(np.broadcast_arrays(u, v), axis=-1).reshape(-1, 2)
+    assert np.abs(found - expected).max() < 0.8

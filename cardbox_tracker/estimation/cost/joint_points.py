@@ -8,7 +8,8 @@ camera for level, so these directions are compared along the horizontal line of 
 The directions are used for people who were not measured; for measured people the learned
 correction, which is trained on such, estimates the depth.
 
-Points may be missing or older than the frame. Points that fit the last posture only with left and
+Points may be older than the frame. Without new ones, the last ones count for up to a second, less
+and less, because joints may have moved. Points that fit the last posture only with left and
 right exchanged are exchanged; points that are far from the last posture belong to somebody else and
 are not used, unless this lasts.
 """
@@ -102,26 +103,33 @@ class JointPointsTerm:
         self._uses_bones = body.source != MEASURED
         self.body = body_tuple(body, camera, WholeBodyCostConfig())
         self._elsewhere = 0
+        self._newest_points: ImagePoints | None = None
+        self._age_s = 0.0
 
     def observe(self, frame: Frame) -> TermObservation:
         """Return the term's observation, which is zero without points that can be used."""
-        points = frame.points
-        if points is None or points.is_empty:
+        points, before = self._newest(frame), frame.posture
+        if points is None:
             return _SILENCE
-        age_s = 0.0
-        if points.stamp_ns is not None and frame.stamp_ns is not None:
-            age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
-        if age_s > _OLDEST_S:
-            return _SILENCE
-        before = frame.posture
-        if before is not None:
-            checked = self._checked(points, _whole(before[None])[0])
-            if checked is None:
-                return _SILENCE
-            points = checked
-        evidence = self._evidence(points, age_s)
+        evidence = self._evidence(points, self._age_s)
         weight = self.config.weight * max(frame.foreground_px, 1)
         return JointPointsObservation(self.body, evidence, weight, before)
+
+    def _newest(self, frame: Frame) -> ImagePoints | None:
+        """Return the newest points of this person, which may be of an earlier frame, if any."""
+        self._age_s += frame.interval_s
+        before, points = frame.posture, frame.points
+        if before is None:
+            self._newest_points, self._elsewhere = None, 0
+        if points is not None and not points.is_empty:
+            age_s = 0.0
+            if points.stamp_ns is not None and frame.stamp_ns is not None:
+                age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
+            if age_s <= _OLDEST_S and before is not None:
+                points = self._checked(points, _whole(before[None])[0])
+            if age_s <= _OLDEST_S and points is not None:
+                self._newest_points, self._age_s = points, age_s
+        return self._newest_points if self._age_s <= _OLDEST_S else None
 
     def _checked(self, points: ImagePoints, before: FloatArray) -> ImagePoints | None:
         """Return the points, with left and right exchanged if necessary; None if not this person's.

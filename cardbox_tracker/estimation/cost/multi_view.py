@@ -73,7 +73,9 @@ class MultiViewCost:
         """Set the observations of the further terms for each camera that shows the person."""
         for number, cost in enumerate(self.costs):
             counting = terms[number] if number in self.seeing else ()
-            observed = (term.observe(frames[number]) for term in counting)
+            # The pixels that count; those of the legs of a further camera's silhouette do not.
+            frame = replace(frames[number], foreground_px=cost.silhouette_px)
+            observed = (term.observe(frame) for term in counting)
             cost.terms = tuple(one for one in observed if not isinstance(one, Silence))
 
     @property

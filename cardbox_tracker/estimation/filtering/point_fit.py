@@ -38,6 +38,8 @@ _POLISH_DEVIATION = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES),
 _POLISH_STEPS = 2
 # Frames without points after which the learned correction determines the depth again.
 _MISSING_FRAMES = 30
+# A search that also rates points differs so much from wrong silhouettes only.
+_WRONG_IOU = 0.6
 # Number of states that are fitted, number of similar ones, least distance of the others, m.
 _DIFFERENT = (6, 1, 0.1)
 
@@ -88,6 +90,15 @@ class PointFit:
             np.array([self._moved[number] for number in numbers]),
             np.array([(*term.body[3], *term.body[4]) for _, term in found]),
         )
+
+    def leads(self, iou: float) -> bool:
+        """Return whether points, instead of outline and learned correction, determine the result.
+
+        Args:
+            iou: intersection over union of the silhouettes and the search's result. It is low if
+                the silhouettes are wrong, such as those of a background that has changed.
+        """
+        return self.is_leading or (self.is_given and iou < _WRONG_IOU)
 
     def torsos(
         self, survivors: FloatArray, before: FloatArray, reference: FloatArray

@@ -263,7 +263,8 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
-        is_by_points = self._points.is_leading
+        _, (differ_px,), (drawn_px,) = cost.bodies(mean[None])
+        is_by_points = self._points.leads(iou_of(total, drawn_px, differ_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
         _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
