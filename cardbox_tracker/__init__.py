@@ -42,7 +42,8 @@ if TYPE_CHECKING:
     from cardbox_tracker.estimation.tracker import Tracker
     from cardbox_tracker.vision.background import SilhouetteExtractor
     from cardbox_tracker.vision.background_config import BackgroundConfig
-    from cardbox_tracker.vision.camera import Calibration, Camera, load_calibration
+    from cardbox_tracker.vision.calibration_file import load_calibration
+    from cardbox_tracker.vision.camera import Calibration, Camera
     from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
     from cardbox_tracker.vision.extrinsics import Extrinsics
     from cardbox_tracker.vision.extrinsics_files import load_extrinsics
@@ -113,7 +114,8 @@ _MODULES = {
     "estimation.tracker": ("Tracker",),
     "vision.background": ("SilhouetteExtractor",),
     "vision.background_config": ("BackgroundConfig",),
-    "vision.camera": ("Calibration", "Camera", "load_calibration"),
+    "vision.calibration_file": ("load_calibration",),
+    "vision.camera": ("Calibration", "Camera"),
     "vision.empty_scene": ("BackgroundLearner", "BackgroundModel"),
     "vision.extrinsics": ("Extrinsics",),
     "vision.extrinsics_files": ("load_extrinsics",),

@@ -7,7 +7,8 @@ from math import atan, degrees, radians, tan
 from pathlib import Path
 
 from cardbox_tracker.errors import CameraError
-from cardbox_tracker.vision.camera import Calibration, load_calibration
+from cardbox_tracker.vision.calibration_file import load_calibration
+from cardbox_tracker.vision.camera import Calibration
 
 # Largest difference of the aspect ratios of a calibration and of the images.
 _ASPECT = 0.02

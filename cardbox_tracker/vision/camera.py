@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import CameraError, cut, quoted
-from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
+from cardbox_tracker.errors import CameraError, quoted
 from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_problem
 
 FloatArray = NDArray[np.float64]
@@ -283,47 +281,3 @@ class Rectifier:
         """
         rectified = cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(rectified, dtype=np.uint8)
-
-
-def load_calibration(path: str | os.PathLike[str]) -> Calibration:
-    """Read a YAML file as camera_calibration writes it.
-
-    Raises:
-        CameraError: the file cannot be read or lacks a key; the text names the key.
-    """
-    name = os.fspath(path)
-    try:
-        text = read_small_text(path)
-    except SmallYamlError as error:
-        raise CameraError(
-            f"cannot read the calibration {name}: {error}; give a YAML file as "
-            "camera_calibration writes it"
-        ) from None
-    try:
-        data = parse_small_yaml(text)
-    except SmallYamlError as error:
-        raise CameraError(f"calibration {name}: {error}") from None
-    if not isinstance(data, dict):
-        raise CameraError(f"calibration {name}: expected a mapping as camera_calibration writes it")
-    try:
-        k = np.array(data["camera_matrix"]["data"], dtype=np.float64)
-        distortion = np.array(data["distortion_coefficients"]["data"], dtype=np.float64).ravel()
-        calibration = Calibration(
-            int(data["image_width"]),
-            int(data["image_height"]),
-            k.reshape(3, 3),
-            distortion,
-            str(data["distortion_model"]),
-        )
-    except KeyError as error:
-        raise CameraError(
-            f"calibration {name}: missing key {error}; expected a file as camera_calibration "
-            "writes it"
-        ) from None
-    except (TypeError, ValueError, OverflowError) as error:
-        raise CameraError(f"calibration {name}: malformed value: {cut(str(error))}") from None
-    try:
-        calibration.camera(calibration.width, calibration.height)
-    except CameraError as error:
-        raise CameraError(f"calibration {name}: {error}") from None
-    return calibration

@@ -29,7 +29,8 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.small_yaml import parse_small_yaml
-from cardbox_tracker.vision.camera import Camera, load_calibration
+from cardbox_tracker.vision.calibration_file import load_calibration
+from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.camera_info import calibration_from_info
 from cardbox_tracker.vision.encodings import (
     SUPPORTED_ENCODINGS,

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.errors import CameraError
-from cardbox_tracker.vision.camera import Calibration, Camera, load_calibration
+from cardbox_tracker.vision.calibration_file import load_calibration
+from cardbox_tracker.vision.camera import Calibration, Camera
 
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5)
 K = np.array([(600.0, 0, 319.5), (0, 600.0, 239.5), (0, 0, 1)])

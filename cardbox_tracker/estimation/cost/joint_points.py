@@ -111,8 +111,8 @@ class JointPointsTerm:
         points, before = self._newest(frame), frame.posture
         if points is None:
             return _SILENCE
-        evidence = self._evidence(points, self._age_s)
         weight = self.config.weight * max(frame.foreground_px, 1)
+        evidence = self._evidence(points, self._age_s)
         return JointPointsObservation(self.body, evidence, weight, before)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:

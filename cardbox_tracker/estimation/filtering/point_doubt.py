@@ -14,6 +14,7 @@ from math import exp
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
 from cardbox_tracker.estimation.cost.joint_points_kernels import (
     ELBOW,
@@ -36,7 +37,12 @@ FAR_M = 0.15
 """Distance of a point from its joint that makes any result uncertain."""
 
 _LIMBS = [POINTS_OF_ARM * arm + joint for arm in (0, 1) for joint in (ELBOW, WRIST, KNUCKLES)]
-_LEAST_SCORE = 0.5
+_LEAST_SCORE, _SHARE = 0.5, 0.5
+
+
+def shows_person(points: ImagePoints | None) -> bool:
+    """Return whether at least half of the points are certain."""
+    return points is not None and float(np.mean(points.scores >= _LEAST_SCORE)) >= _SHARE
 
 
 def distance_to_points(

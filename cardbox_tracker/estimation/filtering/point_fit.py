@@ -142,14 +142,27 @@ class PointFit:
         polished: FloatArray = fitted[0]
         return polished
 
+    def confirm(self, state: FloatArray) -> bool:
+        """Return whether a result, state (14,), agrees with certain points in this frame.
+
+        A silhouette that it does not fit is then taken to be wrong.
+        """
+        if not self.is_given:
+            return False
+        certain = max(float(np.mean(one.evidence[0][:, 2] >= 0.5)) for one in self._observations)
+        return certain >= 0.5 and self._farthest_m(state) <= point_doubt.FAR_M
+
+    def _farthest_m(self, state: FloatArray) -> float:
+        states = [self._cost.to_views[number](state) for number in self._numbers]
+        return point_doubt.distance_to_points(states, self._observations)
+
     def is_doubtful(self, state: FloatArray) -> bool:
         """Return whether a result, state (14,), is uncertain; see :mod:`.point_doubt`."""
         cost = self._cost
         if not self.is_given:
             # Between seldom points, the depth of such a person in one camera is a guess.
             return self.is_leading and len(cost.seeing) == 1
-        states = [cost.to_views[number](state) for number in self._numbers]
-        farthest_m = point_doubt.distance_to_points(states, self._observations)
+        farthest_m = self._farthest_m(state)
         if farthest_m > point_doubt.FAR_M:
             return True
         if not self.is_leading or len(cost.seeing) > 1 or self._numbers != [0]:

@@ -42,6 +42,7 @@ from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
+from cardbox_tracker.estimation.filtering.point_doubt import shows_person
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence, presence_of
 from cardbox_tracker.estimation.filtering.refinement import Refinement
@@ -128,7 +129,10 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
         limits = self._config.smallest_person, self._config.largest_person
-        found = [presence_of(c.silhouette_px / c.frontal_px, *limits) for c in self._cost.costs]
+        found = [
+            presence_of(cost.silhouette_px / cost.frontal_px, *limits, shows_person(frame.points))
+            for cost, frame in zip(self._cost.costs, frames, strict=True)
+        ]
         self._seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if self._seeing:
             return Presence.PERSON
@@ -263,15 +267,16 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
-        _, (differ_px,), (drawn_px,) = cost.bodies(mean[None])
-        is_by_points = self._points.leads(iou_of(total, drawn_px, differ_px))
+        _, (mean_differs_px,), (mean_px,) = cost.bodies(mean[None])
+        is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
-        _, costs_px, areas_px = cost.bodies(np.array([mean, fitted]))
-        fit_iou = iou_of(total, areas_px[1], costs_px[1])
-        pixels = loss.Pixels(total, cost.frontal_px, costs_px[0], areas_px[0])
-        best = int(np.argmin(self.ratings))  # the evidence belongs to a cost without points
-        rating = float(self.ratings[best] - cost.point_costs(self.states[best : best + 1])[0])
+        _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
+        fit_iou = iou_of(total, drawn_px, differs_px)
+        pixels = loss.Pixels(total, cost.frontal_px, mean_differs_px, mean_px)
+        best = self.states[int(np.argmin(self.ratings))]
+        # The evidence belongs to a cost without points.
+        rating = float(self.ratings.min() - cost.point_costs(best[None])[0])
         arm_m = sum(self._arm.spreads_m) / 4
         evidence = loss.evidence_of(pixels, rating, arm_m, stddev, mean, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
@@ -289,6 +294,7 @@ class WholeBodyFilter:
         deviations = spread
         if not is_by_points:
             deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
+        is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
@@ -296,7 +302,7 @@ class WholeBodyFilter:
             cost_px=int(cost_px),
             iou=iou,
             is_uncertain=self._chance > config.uncertain_from or self._points.is_doubtful(result),
-            is_poor=self._chance > config.lost_from or fit_iou < self._lost_iou,
+            is_poor=is_poor and not self._points.confirm(result),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             seen=fitted,

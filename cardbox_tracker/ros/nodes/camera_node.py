@@ -20,7 +20,8 @@ from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
-from cardbox_tracker.vision.camera import Calibration, load_calibration
+from cardbox_tracker.vision.calibration_file import load_calibration
+from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.camera_device import (
     describe_devices,
     lock_exposure,
