@@ -245,9 +245,9 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES
     from cardbox_tracker.body.posture import (
         JOINT_NAMES,
-        PLACE_LIMITS,
         PLACE_NAMES,
         TURNING_LIMITS,
+        place_limits,
     )
 
     rows = re.findall(
@@ -255,7 +255,7 @@ def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     )
     limits = dict(zip(JOINT_NAMES, np.degrees(TURNING_LIMITS), strict=True))
     limits["torso_y"] = TURNING_LIMITS[0]
-    limits |= dict(zip(PLACE_NAMES, PLACE_LIMITS, strict=True))
+    limits |= dict(zip(PLACE_NAMES, place_limits(2.0), strict=True))
     limits |= dict(zip(NECK_NAMES, np.degrees(NECK_LIMITS), strict=True))
     assert len(rows) == 12
     for name, lowest, highest in rows:

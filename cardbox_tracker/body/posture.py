@@ -90,19 +90,37 @@ TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
 TURNING_LIMITS[YAW] = np.radians([-_TURN_DEG, _TURN_DEG])
 TURNING_LIMITS.setflags(write=False)
 
-TORSO_X_LIMIT_M = 0.9
-"""Range of ``torso_x``, a step or two; beyond it, measure the person at another distance."""
-TORSO_Z_LIMIT_M = 0.3
-"""Range of ``torso_z`` between standing on tiptoe and bent knees."""
+NEAREST_M, FARTHEST_M = 0.5, 10.0
+"""Distances of the hips from the camera between which a person is searched, metres."""
+TORSO_Z_LIMITS_M = (-0.6, 0.3)
+"""Range of ``torso_z`` between sitting on a low stool and standing on tiptoe, metres."""
+_FARTHER_M = 1.0
 
-PLACE_LIMITS: FloatArray = np.array(
-    [[-TORSO_X_LIMIT_M, TORSO_X_LIMIT_M], [-TORSO_Z_LIMIT_M, TORSO_Z_LIMIT_M]]
-)
-"""Shape (2, 2): lowest and highest value of each of ``PLACE_NAMES``, metres."""
-PLACE_LIMITS.setflags(write=False)
 
-STATE_LIMITS: FloatArray = np.vstack([TURNING_LIMITS, PLACE_LIMITS])
-"""Shape (14, 2): lowest and highest value of each value of a state."""
+def place_limits(distance_m: float) -> FloatArray:
+    """Return the lowest and highest value of each of ``PLACE_NAMES``, (2, 2), metres.
+
+    The person moves between ``NEAREST_M`` and ``FARTHEST_M`` from the camera; the range always
+    contains the measured place, and a step away from it.
+
+    Args:
+        distance_m: distance of the hips in the body model.
+    """
+    farthest_m = max(FARTHEST_M, distance_m + _FARTHER_M)
+    nearest_m = min(NEAREST_M, distance_m)
+    return np.array([[distance_m - farthest_m, distance_m - nearest_m], TORSO_Z_LIMITS_M])
+
+
+def state_limits(distance_m: float) -> FloatArray:
+    """Return the lowest and highest value of each value of a state, (14, 2); not writable.
+
+    Args:
+        distance_m: distance of the hips in the body model, metres.
+    """
+    limits: FloatArray = np.vstack([TURNING_LIMITS, place_limits(distance_m)])
+    limits.setflags(write=False)
+    return limits
+
 
 REFERENCE_NAMES: tuple[str, ...] = ("front", "side", "arms")
 SIDE_TURNS: tuple[str, ...] = ("left", "right")

@@ -21,7 +21,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import NECK_LIMITS, head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import PLACE_LIMITS, TURNING_LIMITS
+from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
@@ -54,9 +54,10 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
     shoulders_m = parts.shoulder_height_m
     origin = _seen_from_camera(body)
     parent = optical_frame
+    x_limits, z_limits = place_limits(body.placement.distance_m).tolist()
     place = {
-        "x_body": Movement("prismatic", (1, 0, 0), PLACE_LIMITS[0].tolist()),
-        "z_body": Movement("prismatic", (0, 0, 1), PLACE_LIMITS[1].tolist()),
+        "x_body": Movement("prismatic", (1, 0, 0), x_limits),
+        "z_body": Movement("prismatic", (0, 0, 1), z_limits),
     }
     trunk = {
         "body": Movement("prismatic", (0, 1, 0), TURNING_LIMITS[0].tolist()),

@@ -28,7 +28,7 @@ from cardbox_tracker.body.neck import (
     neck_pivot_m,
 )
 from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TURNING_LIMITS, place_limits
 from cardbox_tracker.description.urdf_elements import (
     AT_PARENT,
     PATCH_THICKNESS_M,
@@ -46,8 +46,8 @@ ROOT_LINK = "camera_level"
 
 _LIMITS = dict(
     zip(
-        (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES),
-        [*TURNING_LIMITS.tolist(), *PLACE_LIMITS.tolist(), *NECK_LIMITS.tolist()],
+        (*JOINT_NAMES, *NECK_NAMES),
+        [*TURNING_LIMITS.tolist(), *NECK_LIMITS.tolist()],
         strict=True,
     )
 )
@@ -78,20 +78,21 @@ def urdf_from_body(
     place_m = (body.placement.distance_m, 0.0, body.placement.hip_height_m)
     add_joint(robot, "camera_to_hips", ROOT_LINK, "hips", Origin(place_m, (0.0, 0.0, math.pi)))
     parts = body_parts(body.sizes)
-    _trunk(robot, parts, _place(robot) if torso_place else "hips")
+    _trunk(robot, parts, _place(robot, body) if torso_place else "hips")
     _head(robot, parts, has_neck=torso_place)
     _arm(robot, parts, "left", 1.0)
     _arm(robot, parts, "right", -1.0)
     return xml_text(robot)
 
 
-def _place(robot: Xml.Element) -> str:
+def _place(robot: Xml.Element, body: BodyModel) -> str:
     """Add the joints of the place below the hips and return their last link."""
     parent = "hips"
-    for joint, axis in zip(PLACE_NAMES, ((1, 0, 0), (0, 0, 1)), strict=True):
+    limits = place_limits(body.placement.distance_m).tolist()
+    for joint, axis, ends in zip(PLACE_NAMES, ((1, 0, 0), (0, 0, 1)), limits, strict=True):
         child = f"{joint}_link"
         add_link(robot, child)
-        movement = Movement("prismatic", axis, _LIMITS[joint])
+        movement = Movement("prismatic", axis, ends)
         add_joint(robot, joint, parent, child, movement=movement)
         parent = child
     return parent

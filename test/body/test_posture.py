@@ -12,6 +12,7 @@ from cardbox_tracker.body import posture as posture_module
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
+    FARTHEST_M,
     FIRST_ANGLES,
     JOINT_LIMITS,
     JOINT_NAMES,
@@ -19,16 +20,20 @@ from cardbox_tracker.body.posture import (
     MIRROR_SIGNS,
     MIRRORED,
     N_STATE,
+    NEAREST_M,
     PLACE,
     PLACE_NAMES,
     POSTURE,
     REFERENCE_NAMES,
     RIGHT_ARM,
-    STATE_LIMITS,
     TORSO,
+    TORSO_X,
+    TORSO_Z,
     TURNS,
     clip_to_limits,
+    place_limits,
     reference_posture,
+    state_limits,
 )
 
 
@@ -57,7 +62,7 @@ def test_the_indices_are_those_of_the_names() -> None:
 
 @given(shares=arrays(np.float64, N_STATE, elements=st.floats(0.0, 1.0)))
 def test_the_mirror_image_of_a_state_has_the_mirrored_keypoints(shares: np.ndarray) -> None:
-    low, high = STATE_LIMITS.T
+    low, high = state_limits(2.0).T
     state = low + shares * (high - low)
     body = BodyModel()
     left, right = (
@@ -125,3 +130,21 @@ def test_clipping_moves_into_the_limits_and_only_what_is_outside(postures: np.nd
     np.testing.assert_array_equal(clip_to_limits(clipped), clipped)
     limits = np.broadcast_to(np.where(postures < low, low, high), postures.shape)
     np.testing.assert_array_equal(clipped[~inside], limits[~inside])
+
+
+@given(distance_m=st.floats(0.3, 20.0))
+def test_the_limits_of_the_place_are_distances_from_the_camera(distance_m: float) -> None:
+    (low_m, high_m), (lower_m, upper_m) = place_limits(distance_m).tolist()
+    assert low_m < 0.0 <= high_m, "the measured place is within its limits"
+    assert lower_m < 0.0 < upper_m
+    # torso_x is positive towards the camera, which a person never reaches.
+    assert distance_m - high_m == pytest.approx(min(NEAREST_M, distance_m))
+    assert distance_m - low_m >= FARTHEST_M - 1e-9
+    limits = state_limits(distance_m)
+    np.testing.assert_array_equal(limits[[TORSO_X, TORSO_Z]], place_limits(distance_m))
+    assert not limits.flags.writeable
+
+
+def test_people_who_were_measured_apart_have_the_same_range_in_the_room() -> None:
+    near, far = place_limits(1.5)[0], place_limits(4.0)[0]
+    np.testing.assert_allclose(1.5 - near, 4.0 - far)

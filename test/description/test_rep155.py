@@ -16,9 +16,9 @@ from cardbox_tracker.body.neck import gaze_m, neck_rotation
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
-    PLACE_LIMITS,
     RIGHT_ARM,
     TURNING_LIMITS,
+    place_limits,
     reference_posture,
 )
 from cardbox_tracker.description.rep155 import (
@@ -83,7 +83,7 @@ def test_joints_of_any_sequence_put_the_limbs_where_they_are(postures: list[np.n
 
 
 @settings(max_examples=10)
-@given(within_limits(), st.tuples(*(st.floats(*limits) for limits in PLACE_LIMITS.tolist())))
+@given(within_limits(), st.tuples(*(st.floats(*limits) for limits in place_limits(2.3).tolist())))
 def test_the_place_moves_all_of_the_body(posture: np.ndarray, place: tuple[float, float]) -> None:
     assert_agrees(posture, Rep155Joints()(posture), place)
 

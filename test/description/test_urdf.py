@@ -17,7 +17,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
 from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES, gaze_m, neck_rotation
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_LIMITS, PLACE_NAMES, TURNING_LIMITS
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TURNING_LIMITS, place_limits
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
@@ -35,6 +35,7 @@ KEYPOINT_LINKS = (
 # From the reference frame (X to the camera, Y right) to the URDF's root (X away, Y left).
 TO_ROOT = np.diag([-1.0, -1.0, 1.0])
 ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+PLACE_LIMITS = place_limits(2.0)
 ALL_LIMITS = np.vstack([TURNING_LIMITS, PLACE_LIMITS, NECK_LIMITS])
 
 

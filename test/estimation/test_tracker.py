@@ -13,7 +13,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import neck_rotation
-from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture
+from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture, state_limits
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.config import (
     FilterConfig,
@@ -27,7 +27,6 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.filtering.cycles import Cycles
-from cardbox_tracker.estimation.filtering.whole_body import STATE_LIMITS
 from cardbox_tracker.estimation.head import FACE_M, FACE_POINTS
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import FILTERS, Tracker
@@ -37,6 +36,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 from experiments.reference import ReferenceSilhouette
 
+STATE_LIMITS = state_limits(2.0)
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 NOBODY = np.zeros((120, 160), np.uint8)

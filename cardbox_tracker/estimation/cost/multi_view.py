@@ -17,12 +17,16 @@ from dataclasses import replace
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import NEAREST_M, TORSO_X
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame, Silence, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
+
+# Distance for which the units of the priors of ``torso_x`` were chosen, m.
+_NORMAL_M = 2.5
 
 ToView = Callable[[FloatArray], FloatArray]
 """Transforms states (N, 14) or (14,) of the first camera into those of another camera."""
@@ -36,6 +40,7 @@ class MultiViewCost:
     Attributes:
         costs: the cost of each camera, the first camera's first.
         to_views: transform of states for each camera.
+        x_factor: factor on the units of the priors of ``torso_x``.
         seeing: indices of the cameras that show the person in this frame.
     """
 
@@ -55,12 +60,22 @@ class MultiViewCost:
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle
         self.place, self.view, self.body = first.place, first.view, first.body
-        self.anchor = first.anchor
+        self.x_factor = 1.0
+        self.anchor, self.limits = first.anchor, first.limits
 
     def see(self, silhouettes: Sequence[Silhouette], state: FloatArray) -> None:
         """Set the silhouettes (H, W) of all cameras; the person is near the place of ``state``."""
         for cost, to_view, silhouette in zip(self.costs, self.to_views, silhouettes, strict=True):
             cost.see(silhouette, to_view(state))
+
+    def expect(self, x_m: float, z_m: float, home_m: float, yaw_rad: float) -> None:
+        """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
+
+        An outline of a person who is twice as far away determines the distance half as well.
+        """
+        self.anchor[:] = x_m, z_m, home_m, yaw_rad
+        self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
+        self.costs[0].loosen_x(self.x_factor)
 
     def choose(self, seeing: Sequence[int]) -> None:
         """Use only the cameras with these indices in this frame."""
@@ -87,6 +102,33 @@ class MultiViewCost:
     def frontal_px(self) -> int:
         """Pixels of the model in the front reference posture, summed over the same cameras."""
         return sum(self.costs[number].frontal_px for number in self.seeing)
+
+    def shares(self, state: FloatArray) -> list[tuple[float, float]]:
+        """Return each camera's silhouette as shares of the frontal model's area.
+
+        Returns:
+            The share of the larger and of the smaller one of the areas at the measured distance and
+            at that of ``state`` (14,), for each camera.
+        """
+        found = []
+        for cost, scale in zip(self.costs, self._scales(state), strict=True):
+            share = cost.silhouette_px / cost.frontal_px
+            found.append((share / max(scale, 1.0), share / min(scale, 1.0)))
+        return found
+
+    def frontal_px_at(self, state: FloatArray) -> int:
+        """Return :attr:`frontal_px` for the distance of ``state`` (14,)."""
+        scales = self._scales(state)
+        areas_px = (scales[number] * self.costs[number].frontal_px for number in self.seeing)
+        return max(round(sum(areas_px)), 1)
+
+    def _scales(self, state: FloatArray) -> list[float]:
+        """Return areas at the distance of ``state`` (14,), as multiples of the measured ones."""
+        found = []
+        for cost, to_view in zip(self.costs, self.to_views, strict=True):
+            away_m = max(cost.place[0] - float(to_view(state)[TORSO_X]), NEAREST_M)
+            found.append((cost.place[0] / away_m) ** 2)
+        return found
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
         """Rate torsos (N,); the arms of the state ``arms_of`` keep their place in the images."""

@@ -18,6 +18,7 @@ from cardbox_tracker.body.posture import (
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
+    state_limits,
 )
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import body_priors as priors
@@ -52,6 +53,8 @@ class WholeBodyCost:
         girdle: girdle of ``body``, (5,).
         place: place of the hips of ``body``.
         view: camera of ``body``.
+        size: width and height of the image, px.
+        limits: lowest and highest value of each value of a state, (14, 2).
         pitch_rad: pitch of the camera, rad, positive downwards.
         is_measured: whether the body was measured, not estimated from proportions.
         frontal_px: pixels of the model in the front reference posture.
@@ -65,6 +68,8 @@ class WholeBodyCost:
         self._model, self._camera, self._config = body, camera, config
         self.body = body_tuple(body, camera, config)
         self.parts, _, self.girdle, self.place, self.view = self.body
+        self.size = camera.width, camera.height
+        self.limits = state_limits(body.placement.distance_m)
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
         self._rules = _rules(config)
@@ -100,6 +105,11 @@ class WholeBodyCost:
             ends = (int(np.clip(end, 0, camera.width)) for end in (column - half, column + half))
             self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
+
+    def loosen_x(self, factor: float) -> None:
+        """Multiply the units of the priors of ``torso_x`` by ``factor``, at any call the same."""
+        self._rules[priors.X_STEP] = factor * self._config.x_step_m
+        self._rules[priors.X_HOME] = factor * self._config.x_home_m
 
     def hips(self, state: FloatArray, camera: Camera) -> FloatArray:
         """Return the middle of the hips (3,) of a state (14,), metres in the optical frame."""

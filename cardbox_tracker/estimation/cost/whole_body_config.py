@@ -87,7 +87,7 @@ class WholeBodyCostConfig(Settings):
         9.0, "largest cost of one of the torso's angles", limits=(0.1, 1000.0)
     )
     x_step_m: float = restarting(
-        0.06,
+        0.1,
         "unit of the torso's motion along the line of sight from frame to frame",
         unit="m",
         limits=(0.001, 10.0),

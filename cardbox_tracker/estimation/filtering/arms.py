@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from cardbox_tracker.body.posture import LEFT_ARM, STATE_LIMITS
+from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.pose_prior import sample_bank
@@ -14,7 +14,7 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering import arm_proposals
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
-ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[LEFT_ARM])
+ARM_LIMITS = np.ascontiguousarray(JOINT_LIMITS[LEFT_ARM])
 """Lowest and highest angles of an arm, (4, 2), rad."""
 
 

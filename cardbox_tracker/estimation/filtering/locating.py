@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import STATE_LIMITS, TORSO_X, TORSO_Y
+from cardbox_tracker.body.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.terms import Frame
@@ -82,7 +82,7 @@ class Locator:
             return Location(bearings[0], step_m)
         there = np.array([float(before[TORSO_X]) - self._distance_m, float(before[TORSO_Y])])
         x, y = crossing_of([self._line(*one) for one in bearings.items()], there)
-        x_m = float(np.clip(x + self._distance_m, *STATE_LIMITS[TORSO_X]))
+        x_m = float(np.clip(x + self._distance_m, *self._cost.limits[TORSO_X]))
         stddev_m = None if list(seeing) == [0] else _CROSSING_M
         return Location(y / max(-x, 1e-3), step_m, x_m, stddev_m)
 

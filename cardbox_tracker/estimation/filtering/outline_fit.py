@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, STATE_LIMITS
+from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
@@ -102,6 +102,7 @@ class OutlineFit:
             steps: number of Gauss-Newton steps; with 0 the fit returns the state unchanged.
             others: costs of the further cameras, and their views of the body.
         """
+        self._limits = cost.limits
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))
         self._lenses = [_Lens(cost, camera, np.eye(N_STATE), np.zeros(N_STATE))]
         self._lenses += [_Lens(there, v.camera, v.turned, v.moved) for there, v in others]
@@ -123,7 +124,7 @@ class OutlineFit:
         correction = self.fitted(frames, state, self._steps) - state
         before = correction if self._correction is None else self._correction
         self._correction = _KEPT * before + (1.0 - _KEPT) * correction
-        return np.clip(state + self._correction, *STATE_LIMITS.T)
+        return np.clip(state + self._correction, *self._limits.T)
 
     def different(
         self,
@@ -135,7 +136,8 @@ class OutlineFit:
         """Return fits (N, 14) of the best different states of ``states`` (M, 14)."""
         kept = state_choice.choose_apart(states, ratings, *_DIFFERENT, cost.parts, cost.girdle)
         fitted = [self.fitted(frames, state, _STEPS_OF_DIFFERENT) for state in states[kept]]
-        return np.clip(np.array(fitted), *STATE_LIMITS.T)
+        clipped: FloatArray = np.clip(np.array(fitted), *cost.limits.T)
+        return clipped
 
     def fitted(self, frames: Sequence[Frame], state: FloatArray, steps: int) -> FloatArray:
         """Return the state (14,) that fits the silhouettes of these frames, without smoothing."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cardbox_tracker.body.posture import POSTURE, STATE_LIMITS
+from cardbox_tracker.body.posture import POSTURE, TURNING_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.filtering.loss import calibrated_deviations
 
@@ -37,5 +37,6 @@ class Particles:
         weights = np.exp((self.ratings.min() - self.ratings) / self.spread)
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
         deviations = self.scale * calibrated_deviations(self.states[chosen] - self.mean, rng)
-        drawn: FloatArray = np.clip(around + deviations, *STATE_LIMITS.T)
-        return drawn[:, POSTURE]
+        postures = (around + deviations)[:, POSTURE]
+        drawn: FloatArray = np.clip(postures, *TURNING_LIMITS.T)
+        return drawn

@@ -15,7 +15,6 @@ from cardbox_tracker.body.posture import (
     N_STATE,
     PITCH,
     ROLL,
-    STATE_LIMITS,
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
@@ -131,14 +130,14 @@ class PointFit:
         """Return states (N, 14) near ``states`` that fit the points and the torso's priors."""
         fitted = np.ascontiguousarray(states).copy()
         given = self._fitted, self._prior(), self._damping
-        fit_states(fitted, self._cost.body, *given, STATE_LIMITS, _STEPS)
+        fit_states(fitted, self._cost.body, *given, self._cost.limits, _STEPS)
         return fitted
 
     def polished(self, state: FloatArray) -> FloatArray:
         """Return the state (14,) near ``state``, mainly in depth, that fits the points."""
         fitted, prior = state[None].copy(), (state, _POLISH_DEVIATION**-2)
         given = self._fitted, prior, np.zeros(N_STATE)
-        fit_states(fitted, self._cost.body, *given, STATE_LIMITS, _POLISH_STEPS)
+        fit_states(fitted, self._cost.body, *given, self._cost.limits, _POLISH_STEPS)
         polished: FloatArray = fitted[0]
         return polished
 
@@ -178,7 +177,8 @@ class PointFit:
         inverse[ROLL] = np.radians(config.roll_deg) ** -2
         inverse[PITCH] = np.radians(config.pitch_forward_deg) ** -2
         mean[YAW], inverse[YAW] = yaw_rad, np.radians(config.yaw_deg) ** -2
-        step, home = config.x_step_m**-2, config.x_home_m**-2
+        units_m = self._cost.x_factor * np.array([config.x_step_m, config.x_home_m])
+        step, home = (units_m**-2).tolist()
         inverse[TORSO_X] = step + home
         mean[TORSO_X] = (step * x_m + home * home_m) / inverse[TORSO_X]
         step, home = config.z_step_m**-2, config.z_home_m**-2

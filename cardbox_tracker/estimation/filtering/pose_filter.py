@@ -25,22 +25,6 @@ class Presence(Enum):
     TOO_MUCH = "more foreground than a person can be"
 
 
-def presence_of(
-    share: float, smallest: float, largest: float, is_detected: bool = False
-) -> Presence:
-    """Return the presence.
-
-    Args:
-        share: the silhouette's area divided by the frontal model's.
-        smallest: least share of a person.
-        largest: largest share of a person.
-        is_detected: whether a detector finds the person, so that a spoilt silhouette does no harm.
-    """
-    if share < smallest:
-        return Presence.NOBODY
-    return Presence.TOO_MUCH if share > largest and not is_detected else Presence.PERSON
-
-
 @dataclass(frozen=True)
 class Fit:
     """The result of a filter in a frame.

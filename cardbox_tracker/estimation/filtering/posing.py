@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.body.posture import ARM_ANGLES, STATE_LIMITS, TURNS
+from cardbox_tracker.body.posture import ARM_ANGLES, TURNS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
@@ -41,6 +41,6 @@ class SmoothedPosing:
         posed = state.copy()
         posed[TURNS] = self._turns(state[TURNS], interval_s)
         wanted_m = self._keypoints(keypoints_m, interval_s)
-        pose_at_keypoints(posed, cost.body, wanted_m, STATE_LIMITS)
-        fit_keypoints(posed, cost.body, wanted_m, _STDDEV, STATE_LIMITS, STATE_STEP, _STEPS)
+        pose_at_keypoints(posed, cost.body, wanted_m, cost.limits)
+        fit_keypoints(posed, cost.body, wanted_m, _STDDEV, cost.limits, STATE_STEP, _STEPS)
         return posed

@@ -18,7 +18,6 @@ from cardbox_tracker.body.posture import (
     PLACE,
     POSTURE,
     RIGHT_ARM,
-    STATE_LIMITS,
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
@@ -37,19 +36,25 @@ from cardbox_tracker.estimation.filtering import (
     state_choice,
     torso_proposals,
 )
+from cardbox_tracker.estimation.filtering.approach import (
+    Approach,
+    nearer_and_farther,
+    with_upright,
+)
 from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
+from cardbox_tracker.estimation.filtering.evidence import evidence_in
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.point_doubt import shows_person
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
-from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence, presence_of
+from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
+from cardbox_tracker.estimation.filtering.presence import PersonPresence
 from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
+from cardbox_tracker.estimation.filtering.visibility import is_trackable
 
-_HOME_LIMIT_M = 0.7
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Lateral step, m, after which the legs have left their last columns.
@@ -85,6 +90,7 @@ class WholeBodyFilter:
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
+        self._approach = Approach(c.home_rate)
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
@@ -92,6 +98,7 @@ class WholeBodyFilter:
         self._body, camera, views = silhouette.body, silhouette.camera, self._views
         self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
         first, *others = cost.costs
+        self._presence = PersonPresence(cost, self._config)
         self._arm = ArmSearch(cost, self._plan)
         self._points = PointFit(cost, self._config.cost, views)
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
@@ -104,7 +111,9 @@ class WholeBodyFilter:
         self._survivors = self._reference[None].copy()
         self._seeing: list[int] = []
         self._is_new, self._is_lost = True, False
-        self._age, self._home_m = 0, 0.0
+        self._age = 0
+        self._presence.forget()
+        self._approach.begin(0.0)
         self._locator.forget()
         self._output: FloatArray | None = None
         self.refine.forget()
@@ -128,25 +137,18 @@ class WholeBodyFilter:
     def look(self, frames: Sequence[Frame]) -> Presence:
         """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
-        limits = self._config.smallest_person, self._config.largest_person
-        found = [
-            presence_of(cost.silhouette_px / cost.frontal_px, *limits, shows_person(frame.points))
-            for cost, frame in zip(self._cost.costs, frames, strict=True)
-        ]
-        self._seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
-        if self._seeing:
-            return Presence.PERSON
-        return Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY
+        presence, self._seeing = self._presence.see(frames, self._survivors[0])
+        self._is_lost = self._is_lost or self._presence.is_too_long_too_much
+        return presence
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
         location = self._observe(frames, terms)
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
-            self._home_m = 0.0
-            self._survivors[-1] = self._reference
-            place_m = location.bearing * self._body.placement.distance_m
-            self._survivors[-1, TORSO_Y] = np.clip(place_m, *STATE_LIMITS[TORSO_Y])
+            given = self._survivors, self._reference, location.bearing, self._is_new
+            self._survivors = with_upright(self._cost, frames, *given)
+            self._approach.begin(float(self._survivors[0, TORSO_X]))
         moved = self._survivors[0].copy()
         moved[TORSO_Y] += location.step_m
         if self._is_new or abs(location.step_m) > _STEP_M:
@@ -174,21 +176,18 @@ class WholeBodyFilter:
         config, cost = self._config, self._cost
         draws = Draws(self._rng, config, self._plan.candidates)
         before = self._survivors[0].copy()
-        self._home_m += config.home_rate * (before[TORSO_X] - self._home_m)
-        self._home_m = min(max(self._home_m, -_HOME_LIMIT_M), _HOME_LIMIT_M)
-        cost.anchor[:] = before[TORSO_X], before[TORSO_Z], self._home_m, self._locator.yaw_rad
+        approach = self._approach
+        approach.see(float(before[TORSO_X]))
+        z_m, yaw_rad = float(before[TORSO_Z]), self._locator.yaw_rad
+        cost.expect(approach.expected_m, z_m, approach.home_m, yaw_rad)
 
         pool = self._torsos(before, location, draws)
         ratings = cost.bodies(pool)[0]
         best = pool[np.argmin(ratings)]
         by_rating = state_choice.best_states(pool, ratings, min(len(pool), config.survivors))
         cost.fix_torso(best)
-        (left, left_ratings), (right, right_ratings) = (
-            self._arm(by_rating, arm, draws) for arm in (0, 1)
-        )
-        pairs = joint_moves.combine(
-            best, left, left_ratings, right, right_ratings, config.paired_arms
-        )
+        left, right = (self._arm(by_rating, arm, draws) for arm in (0, 1))
+        pairs = joint_moves.combine(best, *left, *right, config.paired_arms)
         states = np.concatenate([pool, pairs])
         ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
         self._together(frames, states, ratings, draws)
@@ -203,7 +202,7 @@ class WholeBodyFilter:
         upright = config.fresh_torsos if is_settled else config.torso_explorers
         torsos = torso_proposals.propose_torsos(
             self._survivors,
-            (self._torso_sigma, STATE_LIMITS, self._lever_m),
+            (self._torso_sigma, cost.limits, self._lever_m),
             location.step_m,
             config.torso_explorers,
             (upright, fresh, fresh_x_m, location.bearing, self._body.placement.distance_m),
@@ -214,7 +213,7 @@ class WholeBodyFilter:
             self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos keep their hanging arms; they were rated with the arms of the last frame.
-        more = [torsos[len(torsos) - upright :]]
+        more = [torsos[len(torsos) - upright :], nearer_and_farther(before, cost)]
         if self._points.is_given:
             more.append(self._points.torsos(self._survivors, before, self._reference))
         return np.concatenate([pool, *more])
@@ -234,15 +233,12 @@ class WholeBodyFilter:
             ratings = np.concatenate([ratings, cost.bodies(near)[0]])
         sigma = config.together_noise * self._sigma
         for number in range(config.rounds):
-            if number == 0:
-                sources = self._apart(states, ratings)
-            else:
-                sources = state_choice.best_states(
-                    states, ratings, min(config.survivors, len(states))
-                )
+            most = min(config.survivors, len(states))
+            is_first, best = number == 0, state_choice.best_states
+            sources = self._apart(states, ratings) if is_first else best(states, ratings, most)
             moved = joint_moves.move_all(
                 sources,
-                (sigma, STATE_LIMITS, self._lever_m),
+                (sigma, cost.limits, self._lever_m),
                 int(config.differing * config.together),
                 config.difference_scale,
                 draws.for_states(config.together),
@@ -267,23 +263,18 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
-        _, (mean_differs_px,), (mean_px,) = cost.bodies(mean[None])
-        is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
+        _, (differs_px,), (drawn_px,) = cost.bodies(mean[None])
+        drawn = differs_px, drawn_px
+        is_by_points = self._points.leads(iou_of(total, drawn_px, differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
         _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
         fit_iou = iou_of(total, drawn_px, differs_px)
-        pixels = loss.Pixels(total, cost.frontal_px, mean_differs_px, mean_px)
-        best = self.states[int(np.argmin(self.ratings))]
-        # The evidence belongs to a cost without points.
-        rating = float(self.ratings.min() - cost.point_costs(best[None])[0])
-        arm_m = sum(self._arm.spreads_m) / 4
-        evidence = loss.evidence_of(pixels, rating, arm_m, stddev, mean, self._age)
+        evidence = evidence_in(cost, rated, (mean, stddev), drawn, self._arm.spreads_m, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         search = Search(*rated, config.spread, evidence, self._chance)
-        result = fitted
-        if not is_by_points:
-            result = self.refine.corrected(frame, fitted, spread, fit_iou, search)
+        seen = frame, fitted, spread, fit_iou, search
+        result = fitted if is_by_points else self.refine.corrected(*seen)
         _, (cost_px,), (area_px,) = cost.bodies(result[None])
         iou = iou_of(total, area_px, cost_px)
         self._result = result
@@ -291,17 +282,18 @@ class WholeBodyFilter:
             # The fitted result replaces the worst survivor, which is the last one.
             self._survivors[-1] = fitted
         keypoints_m = cost.keypoints(result)
-        deviations = spread
-        if not is_by_points:
-            deviations = self.refine.deviations(frame, result, spread, keypoints_m, iou)
+        found = frame, result, spread, keypoints_m, iou
+        deviations = spread if is_by_points else self.refine.deviations(*found)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
+        is_uncertain = self._chance > config.uncertain_from or not is_trackable(cost, fitted)
+        is_uncertain = is_uncertain or self._points.is_doubtful(result)
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
             keypoints_m=keypoints_m,
             cost_px=int(cost_px),
             iou=iou,
-            is_uncertain=self._chance > config.uncertain_from or self._points.is_doubtful(result),
+            is_uncertain=is_uncertain,
             is_poor=is_poor and not self._points.confirm(result),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
 from cardbox_tracker.estimation.cost.joint_points import (
@@ -32,6 +32,7 @@ Detect = Callable[..., ImagePoints]
 PITCH = 0.2
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5, PITCH)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, camera_pitch_rad=PITCH)
+STATE_LIMITS = state_limits(2.3)
 GUESSED = BODY.with_values(source="proportions")
 COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
 FOREGROUND_PX = 1000

@@ -205,7 +205,7 @@ def test_the_torsos_prior_by_hand() -> None:
     assert prior(raised) == pytest.approx(home + capped(4.0, 2.0) + capped(0.25, 4.0))
     stepped = rest.copy()
     stepped[12] = 0.22
-    assert prior(stepped) == pytest.approx(capped(4.0, 2.0) + capped(1.0, 4.0))
+    assert prior(stepped) == pytest.approx(capped(1.44, 2.0) + capped(1.0, 4.0))
 
 
 def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -29,6 +29,7 @@ from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.vision.camera import Camera
 
+STATE_LIMITS = state_limits(2.3)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
 FRONT = np.append(reference_posture("front"), [0.0, 0.0])

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.deviations import DATA, deviations_of
@@ -15,6 +15,7 @@ from cardbox_tracker.estimation.filtering.networks import Network, load_network
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints, features_of
 from cardbox_tracker.vision.camera import Camera
 
+STATE_LIMITS = state_limits(2.3)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
 UNIT = np.ones(7)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
@@ -21,6 +21,7 @@ from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit, signed_
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
+STATE_LIMITS = state_limits(2.3)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.45)
 COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())

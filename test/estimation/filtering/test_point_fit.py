@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
 from cardbox_tracker.estimation.cost.joint_points import JointPoints
@@ -29,6 +29,7 @@ Detect = Callable[..., ImagePoints]
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, 0.1)
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, camera_pitch_rad=0.1)
+STATE_LIMITS = state_limits(2.3)
 GUESSED = BODY.with_values(source="proportions")
 CONFIG = WholeBodyCostConfig()
 BEGIN = np.append(reference_posture("arms"), [0.0, 0.0])

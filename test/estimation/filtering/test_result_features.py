@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS
+from cardbox_tracker.body.posture import state_limits
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.result_features import (
@@ -18,6 +18,7 @@ from cardbox_tracker.estimation.filtering.result_features import (
 )
 from cardbox_tracker.vision.camera import Camera
 
+STATE_LIMITS = state_limits(2.3)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 COST = WholeBodyCost(BodyModel.of(distance_m=2.3), CAMERA, WholeBodyCostConfig())
 VIEWPOINTS = Viewpoints(0.25, 1.0, 0.5, 0.2, is_measured=True)

@@ -12,7 +12,7 @@ import pytest
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import STATE_LIMITS, reference_posture
+from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -25,6 +25,7 @@ from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
 
+STATE_LIMITS = state_limits(2.0)
 CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
