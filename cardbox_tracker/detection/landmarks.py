@@ -50,4 +50,5 @@ _USED = np.array([LANDMARKS.index(name) for name in POINT_NAMES])
 def image_points(found: Detection) -> ImagePoints:
     """Return the points of a detection that the tracker uses."""
     pixels, scores = found.points_px[_USED], found.scores[_USED]
-    return ImagePoints(pixels, scores, spatial_m=found.spatial_m[_USED])
+    spatial_m = None if found.spatial_m is None else found.spatial_m[_USED]
+    return ImagePoints(pixels, scores, spatial_m=spatial_m)

@@ -72,13 +72,14 @@ class Detection(NamedTuple):
         scores: (33,), chance that the point is in the image and visible, 0 to 1.
         mask: (H, W) uint8, 255 times the chance that a pixel shows the person.
         spatial_m: the points in space relative to the hips, (33, 3), metres for an average person:
-            x right, y down, z away from the camera. The network takes the camera for level.
+            x right, y down, z away from the camera; None if it is unknown. The network takes the
+            camera for level.
     """
 
     points_px: FloatArray
     scores: FloatArray
     mask: NDArray[np.uint8]
-    spatial_m: FloatArray
+    spatial_m: FloatArray | None = None
 
     def silhouette(self) -> NDArray[np.uint8]:
         """Return the silhouette (H, W), 255 where a pixel more likely shows the person, else 0."""

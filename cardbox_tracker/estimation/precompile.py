@@ -30,10 +30,10 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
     background.warm_up()
     person_region.warm_up()
     body = BodyModel()
-    camera = Camera(32, 24, 33.0, 33.0, 15.5, 11.5)
+    camera = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
-    points = ImagePoints(np.full((len(POINT_NAMES), 2), 12.0), np.ones(len(POINT_NAMES)))
+    points = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.
         for shape in (silhouette.shape, (*silhouette.shape, 3)):
@@ -46,8 +46,9 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
             for others in ((), (beside,)) if config.has_several_views else ((),):
                 person = body.with_values(appearance=looks)
                 tracker = Tracker(person, camera, config, others=others)
-                for _ in range(2):
-                    one = Observation(silhouette, image, points=points)
+                # With points, the learned correction may not run.
+                for found in (None, None, points, points):
+                    one = Observation(silhouette, image, points=found)
                     tracker.track([one] * (1 + len(others)))
 
 

@@ -8,10 +8,9 @@ camera for level, so these directions are compared along the horizontal line of 
 The directions are used for people who were not measured; for measured people the learned
 correction, which is trained on such, estimates the depth.
 
-Points may be older than the frame. Without new ones, the last ones count for up to a second, less
-and less, because joints may have moved. Points that fit the last posture only with left and
-right exchanged are exchanged; points that are far from the last posture belong to somebody else and
-are not used, unless this lasts.
+Without new points, the last ones count for up to a second, less and less, because joints may have
+moved. Points that fit the last posture only with left and right exchanged are exchanged; points far
+from the last posture belong to somebody else and are not used, unless this lasts.
 """
 
 from __future__ import annotations
@@ -84,8 +83,7 @@ class JointPoints(Settings):
 
     weight: float = setting(
         0.012,
-        "weight of a squared distance in units of its deviation, as a fraction of the silhouette's "
-        "pixels",
+        "weight of a squared distance in units of its deviation, as a share of the foreground",
         limits=(0.0, 1.0),
     )
 

@@ -118,6 +118,7 @@ def with_upright(
     reference: FloatArray,
     bearing: float,
     is_new: bool,
+    seeks_distance: bool,
 ) -> FloatArray:
     """Return ``survivors`` (N, 14) with upright states at the silhouette's place.
 
@@ -128,13 +129,16 @@ def with_upright(
         reference: state (14,) of the front reference posture.
         bearing: lateral coordinate over depth of the silhouette.
         is_new: whether the person is new, so that the survivors mean nothing.
+        seeks_distance: whether other distances than the expected one are tried.
     """
     upright, kept = reference.copy(), survivors.copy()
     upright[TORSO_Y] = bearing * cost.place[0]
     upright = np.clip(upright, *cost.limits.T)
     if is_new:
         kept[0] = upright
-    found = placed_upright(cost, [frame.silhouette for frame in frames], kept[0], upright)
+    found = None
+    if seeks_distance:
+        found = placed_upright(cost, [frame.silhouette for frame in frames], kept[0], upright)
     kept[-1] = upright
     if found is not None:
         kept = np.roll(kept, 1, axis=0)

@@ -71,6 +71,7 @@ class WholeBodyFilter:
         states: rated states of the last frame, (N, 14).
         ratings: ratings of the states, (N,); lower is better.
         refine: fits the result to the outlines, corrects it, and estimates its deviations.
+        seeks_distance: whether the person may leave the distance of the body model.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class WholeBodyFilter:
         views: Sequence[View] = (),
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._views = tuple(views)
+        self._views, self.seeks_distance = tuple(views), True
         self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
         self._config = c = plan.config
         self._rng, self._lost_iou = rng, config.lost_iou
@@ -147,8 +148,9 @@ class WholeBodyFilter:
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
-            self._survivors = with_upright(self._cost, frames, *given)
-            self._approach.begin(float(self._survivors[0, TORSO_X]))
+            self._survivors = with_upright(self._cost, frames, *given, self.seeks_distance)
+            x_m = float(self._survivors[0, TORSO_X])
+            self._approach.begin(x_m if self.seeks_distance else 0.0)
         moved = self._survivors[0].copy()
         moved[TORSO_Y] += location.step_m
         if self._is_new or abs(location.step_m) > _STEP_M:
@@ -176,10 +178,10 @@ class WholeBodyFilter:
         config, cost = self._config, self._cost
         draws = Draws(self._rng, config, self._plan.candidates)
         before = self._survivors[0].copy()
-        approach = self._approach
-        approach.see(float(before[TORSO_X]))
-        z_m, yaw_rad = float(before[TORSO_Z]), self._locator.yaw_rad
-        cost.expect(approach.expected_m, z_m, approach.home_m, yaw_rad)
+        approach, x_m, z_m = self._approach, float(before[TORSO_X]), float(before[TORSO_Z])
+        if self.seeks_distance:
+            approach.see(x_m)
+        cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
         pool = self._torsos(before, location, draws)
         ratings = cost.bodies(pool)[0]
@@ -212,8 +214,9 @@ class WholeBodyFilter:
         pool = torso_proposals.pool_of(
             self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
-        # Upright torsos keep their hanging arms; they were rated with the arms of the last frame.
-        more = [torsos[len(torsos) - upright :], nearer_and_farther(before, cost)]
+        # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
+        more = [torsos[len(torsos) - upright :]]
+        more += [nearer_and_farther(before, cost)] if self.seeks_distance else []
         if self._points.is_given:
             more.append(self._points.torsos(self._survivors, before, self._reference))
         return np.concatenate([pool, *more])
@@ -279,21 +282,19 @@ class WholeBodyFilter:
         iou = iou_of(total, area_px, cost_px)
         self._result = result
         if self._plan.keeps_result:
-            # The fitted result replaces the worst survivor, which is the last one.
-            self._survivors[-1] = fitted
+            self._survivors[-1] = fitted  # in place of the worst one
         keypoints_m = cost.keypoints(result)
         found = frame, result, spread, keypoints_m, iou
         deviations = spread if is_by_points else self.refine.deviations(*found)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
-        is_uncertain = self._chance > config.uncertain_from or not is_trackable(cost, fitted)
-        is_uncertain = is_uncertain or self._points.is_doubtful(result)
+        is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
             keypoints_m=keypoints_m,
             cost_px=int(cost_px),
             iou=iou,
-            is_uncertain=is_uncertain,
+            is_uncertain=not is_sure or self._points.is_doubtful(result),
             is_poor=is_poor and not self._points.confirm(result),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],

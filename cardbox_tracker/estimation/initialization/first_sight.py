@@ -51,6 +51,8 @@ _ROUNDS, _BODIES, _POSTURES = 6, 60, 12
 # logarithmic breadths. The noise of a round is a fraction of them that shrinks.
 _DISTANCE_SD, _HEIGHT_SD_M, _BREADTH_SD = 0.25, 0.10, 0.20
 _NOISE, _SHRINK = 0.5, 0.75
+# Unit of the prior of a step along the line of sight, m.
+_X_STEP_M = 0.06
 # Cost of one standard deviation as a share of the silhouette's pixels.
 _PRIOR = 0.003
 
@@ -127,7 +129,9 @@ class _Search:
         config: TrackerConfig,
         rng: np.random.Generator,
     ) -> None:
-        self._prior, self._camera, self._seen, self._config = body, camera, seen, config
+        self._prior, self._camera, self._seen = body, camera, seen
+        # A broad person must not be taken for a near one.
+        self._config = config.changed({"whole_body": {"cost": {"x_step_m": _X_STEP_M}}})
         self._rng = rng
         unknown = body.unknown
         # Standard deviations of distance, hip height and breadths; 0 for known values.
@@ -205,6 +209,7 @@ class _Search:
         """Return the best states (n, 14) of a body, best first, and their costs (n,)."""
         silhouette = CompiledSilhouette(body, self._camera)
         search = WholeBodyFilter(self._config, silhouette, self._rng)
+        search.seeks_distance = False
         frames = [silhouette.frame(self._seen)]
         if search.look(frames) is not Presence.PERSON:
             return np.zeros((1, N_STATE)), np.array([np.inf])
