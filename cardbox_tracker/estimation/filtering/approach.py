@@ -34,7 +34,11 @@ class Approach:
     Attributes:
         home_m: usual ``torso_x``.
         expected_m: ``torso_x`` that is expected in the present frame.
+        is_fixed: whether the person stays at the distance of the body model, so that no other
+            distances are proposed.
     """
+
+    is_fixed = False
 
     def __init__(self, home_rate: float) -> None:
         """Begin at the measured place; ``home_rate`` is a frame's weight in the home."""
@@ -43,11 +47,14 @@ class Approach:
 
     def begin(self, x_m: float) -> None:
         """Expect a person who stands at this ``torso_x``."""
+        x_m = 0.0 if self.is_fixed else x_m
         self.home_m = self._home_m = self.expected_m = self._last_m = x_m
         self._speed_m = 0.0
 
     def see(self, x_m: float) -> None:
         """Update with ``torso_x`` of the last frame."""
+        if self.is_fixed:
+            return
         self._speed_m += _SPEED_RATE * (x_m - self._last_m - self._speed_m)
         self._last_m = x_m
         self._home_m += self._rate * (x_m - self._home_m)
@@ -55,6 +62,50 @@ class Approach:
         walking = min(max(abs(x_m - self._home_m) / _WALKING_M - 1.0, 0.0), 1.0)
         self.expected_m = x_m + walking * self._speed_m
         self.home_m = self._home_m + walking * (self.expected_m - self._home_m)
+
+    def nearer_and_farther(self, state: FloatArray, cost: MultiViewCost) -> FloatArray:
+        """Return a state (14,) a step nearer and farther, (N, 14), within the limits."""
+        body_m = cost.place[0]
+        scales = _SCALES[:0] if self.is_fixed else _SCALES
+        distances_m = scales * (body_m - float(state[TORSO_X]))
+        moved: FloatArray = np.clip(at_distances(state, distances_m, body_m), *cost.limits.T)
+        return moved
+
+    def with_upright(
+        self,
+        cost: MultiViewCost,
+        frames: Sequence[Frame],
+        survivors: FloatArray,
+        reference: FloatArray,
+        bearing: float,
+        is_new: bool,
+    ) -> FloatArray:
+        """Return ``survivors`` (N, 14) with upright states at the silhouette's place.
+
+        The person is expected at the place of the first one.
+
+        Args:
+            cost: rates the states.
+            frames: frames of all cameras.
+            survivors: states of the last frame, the best first; the last one is replaced.
+            reference: state (14,) of the front reference posture.
+            bearing: lateral coordinate over depth of the silhouette.
+            is_new: whether the person is new, so that the survivors mean nothing.
+        """
+        upright, kept = reference.copy(), survivors.copy()
+        upright[TORSO_Y] = bearing * cost.place[0]
+        upright = np.clip(upright, *cost.limits.T)
+        if is_new:
+            kept[0] = upright
+        found = None
+        if not self.is_fixed:
+            found = placed_upright(cost, [frame.silhouette for frame in frames], kept[0], upright)
+        kept[-1] = upright
+        if found is not None:
+            kept = np.roll(kept, 1, axis=0)
+            kept[0] = found
+        self.begin(float(kept[0, TORSO_X]))
+        return kept
 
 
 def at_distances(state: FloatArray, distances_m: FloatArray, body_m: float) -> FloatArray:
@@ -69,14 +120,6 @@ def at_distances(state: FloatArray, distances_m: FloatArray, body_m: float) -> F
     states[:, TORSO_X] = body_m - distances_m
     states[:, TORSO_Y] *= distances_m / max(body_m - float(state[TORSO_X]), 1e-3)
     return states
-
-
-def nearer_and_farther(state: FloatArray, cost: MultiViewCost) -> FloatArray:
-    """Return a state (14,) at distances a step nearer and farther, (6, 14), within the limits."""
-    body_m = cost.place[0]
-    distances_m = _SCALES * (body_m - float(state[TORSO_X]))
-    moved: FloatArray = np.clip(at_distances(state, distances_m, body_m), *cost.limits.T)
-    return moved
 
 
 def placed_upright(
@@ -109,38 +152,3 @@ def placed_upright(
     cost.see(silhouettes, candidates[best])
     cost.choose(seeing)
     return candidates[best] if best else None
-
-
-def with_upright(
-    cost: MultiViewCost,
-    frames: Sequence[Frame],
-    survivors: FloatArray,
-    reference: FloatArray,
-    bearing: float,
-    is_new: bool,
-    seeks_distance: bool,
-) -> FloatArray:
-    """Return ``survivors`` (N, 14) with upright states at the silhouette's place.
-
-    Args:
-        cost: rates the states.
-        frames: frames of all cameras.
-        survivors: states of the last frame, the best first; the last one is replaced.
-        reference: state (14,) of the front reference posture.
-        bearing: lateral coordinate over depth of the silhouette.
-        is_new: whether the person is new, so that the survivors mean nothing.
-        seeks_distance: whether other distances than the expected one are tried.
-    """
-    upright, kept = reference.copy(), survivors.copy()
-    upright[TORSO_Y] = bearing * cost.place[0]
-    upright = np.clip(upright, *cost.limits.T)
-    if is_new:
-        kept[0] = upright
-    found = None
-    if seeks_distance:
-        found = placed_upright(cost, [frame.silhouette for frame in frames], kept[0], upright)
-    kept[-1] = upright
-    if found is not None:
-        kept = np.roll(kept, 1, axis=0)
-        kept[0] = found
-    return kept

@@ -41,8 +41,13 @@ _LEAST_SCORE, _SHARE = 0.5, 0.5
 
 
 def shows_person(points: ImagePoints | None) -> bool:
-    """Return whether at least half of the points are certain."""
-    return points is not None and float(np.mean(points.scores >= _LEAST_SCORE)) >= _SHARE
+    """Return whether there are points, most of which are certain."""
+    return points is not None and are_certain(points.scores)
+
+
+def are_certain(scores: FloatArray) -> bool:
+    """Return whether at least half of the scores (N,) are those of certain points."""
+    return float(np.mean(scores >= _LEAST_SCORE)) >= _SHARE
 
 
 def distance_to_points(

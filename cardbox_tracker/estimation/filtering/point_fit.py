@@ -80,6 +80,7 @@ class PointFit:
         points, deviations, bones, away = zip(*(term.evidence for _, term in found), strict=True)
         self._numbers = numbers = [number for number, _ in found]
         self._observations = [term for _, term in found]
+        costs = [self._cost.costs[number] for number in numbers]
         self._fitted: FittedTuple = (
             np.array(points),
             np.array(deviations),
@@ -87,7 +88,7 @@ class PointFit:
             np.array(away),
             np.array([self._turned[number] for number in numbers]),
             np.array([self._moved[number] for number in numbers]),
-            np.array([(*term.body[3], *term.body[4]) for _, term in found]),
+            np.array([(*cost.place, *cost.view) for cost in costs]),
         )
 
     def leads(self, iou: float) -> bool:
@@ -148,8 +149,9 @@ class PointFit:
         """
         if not self.is_given:
             return False
-        certain = max(float(np.mean(one.evidence[0][:, 2] >= 0.5)) for one in self._observations)
-        return certain >= 0.5 and self._farthest_m(state) <= point_doubt.FAR_M
+        scores = (one.evidence[0][:, 2] for one in self._observations)
+        is_certain = any(point_doubt.are_certain(one) for one in scores)
+        return is_certain and self._farthest_m(state) <= point_doubt.FAR_M
 
     def _farthest_m(self, state: FloatArray) -> float:
         states = [self._cost.to_views[number](state) for number in self._numbers]
@@ -159,7 +161,7 @@ class PointFit:
         """Return whether a result, state (14,), is uncertain; see :mod:`.point_doubt`."""
         cost = self._cost
         if not self.is_given:
-            # Between seldom points, the depth of such a person in one camera is a guess.
+            # Without points for a while, the depth of such a person in one camera is a guess.
             return self.is_leading and len(cost.seeing) == 1
         farthest_m = self._farthest_m(state)
         if farthest_m > point_doubt.FAR_M:

@@ -36,11 +36,7 @@ from cardbox_tracker.estimation.filtering import (
     state_choice,
     torso_proposals,
 )
-from cardbox_tracker.estimation.filtering.approach import (
-    Approach,
-    nearer_and_farther,
-    with_upright,
-)
+from cardbox_tracker.estimation.filtering.approach import Approach
 from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
@@ -71,7 +67,7 @@ class WholeBodyFilter:
         states: rated states of the last frame, (N, 14).
         ratings: ratings of the states, (N,); lower is better.
         refine: fits the result to the outlines, corrects it, and estimates its deviations.
-        seeks_distance: whether the person may leave the distance of the body model.
+        approach: expects and proposes distances of the person.
     """
 
     def __init__(
@@ -82,7 +78,7 @@ class WholeBodyFilter:
         views: Sequence[View] = (),
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._views, self.seeks_distance = tuple(views), True
+        self._views = tuple(views)
         self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
         self._config = c = plan.config
         self._rng, self._lost_iou = rng, config.lost_iou
@@ -91,7 +87,7 @@ class WholeBodyFilter:
         self._torso_sigma = self._sigma.copy()
         self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
-        self._approach = Approach(c.home_rate)
+        self.approach = Approach(c.home_rate)
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
@@ -114,7 +110,7 @@ class WholeBodyFilter:
         self._is_new, self._is_lost = True, False
         self._age = 0
         self._presence.forget()
-        self._approach.begin(0.0)
+        self.approach.begin(0.0)
         self._locator.forget()
         self._output: FloatArray | None = None
         self.refine.forget()
@@ -148,9 +144,7 @@ class WholeBodyFilter:
         passes = self._config.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
-            self._survivors = with_upright(self._cost, frames, *given, self.seeks_distance)
-            x_m = float(self._survivors[0, TORSO_X])
-            self._approach.begin(x_m if self.seeks_distance else 0.0)
+            self._survivors = self.approach.with_upright(self._cost, frames, *given)
         moved = self._survivors[0].copy()
         moved[TORSO_Y] += location.step_m
         if self._is_new or abs(location.step_m) > _STEP_M:
@@ -178,9 +172,8 @@ class WholeBodyFilter:
         config, cost = self._config, self._cost
         draws = Draws(self._rng, config, self._plan.candidates)
         before = self._survivors[0].copy()
-        approach, x_m, z_m = self._approach, float(before[TORSO_X]), float(before[TORSO_Z])
-        if self.seeks_distance:
-            approach.see(x_m)
+        approach, z_m = self.approach, float(before[TORSO_Z])
+        approach.see(float(before[TORSO_X]))
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
         pool = self._torsos(before, location, draws)
@@ -215,8 +208,7 @@ class WholeBodyFilter:
             self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
-        more = [torsos[len(torsos) - upright :]]
-        more += [nearer_and_farther(before, cost)] if self.seeks_distance else []
+        more = [torsos[len(torsos) - upright :], self.approach.nearer_and_farther(before, cost)]
         if self._points.is_given:
             more.append(self._points.torsos(self._survivors, before, self._reference))
         return np.concatenate([pool, *more])
@@ -235,10 +227,11 @@ class WholeBodyFilter:
             states = np.concatenate([states, near])
             ratings = np.concatenate([ratings, cost.bodies(near)[0]])
         sigma = config.together_noise * self._sigma
+        sources = self._apart(states, ratings)
         for number in range(config.rounds):
-            most = min(config.survivors, len(states))
-            is_first, best = number == 0, state_choice.best_states
-            sources = self._apart(states, ratings) if is_first else best(states, ratings, most)
+            if number > 0:
+                most = min(config.survivors, len(states))
+                sources = state_choice.best_states(states, ratings, most)
             moved = joint_moves.move_all(
                 sources,
                 (sigma, cost.limits, self._lever_m),
@@ -266,14 +259,14 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
-        _, (differs_px,), (drawn_px,) = cost.bodies(mean[None])
-        drawn = differs_px, drawn_px
-        is_by_points = self._points.leads(iou_of(total, drawn_px, differs_px))
+        _, (mean_differs_px,), (mean_px,) = cost.bodies(mean[None])
+        is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
         _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
         fit_iou = iou_of(total, drawn_px, differs_px)
-        evidence = evidence_in(cost, rated, (mean, stddev), drawn, self._arm.spreads_m, self._age)
+        found = (mean, stddev), (mean_differs_px, mean_px), self._arm.spreads_m
+        evidence = evidence_in(cost, rated, *found, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         search = Search(*rated, config.spread, evidence, self._chance)
         seen = frame, fitted, spread, fit_iou, search
@@ -284,8 +277,8 @@ class WholeBodyFilter:
         if self._plan.keeps_result:
             self._survivors[-1] = fitted  # in place of the worst one
         keypoints_m = cost.keypoints(result)
-        found = frame, result, spread, keypoints_m, iou
-        deviations = spread if is_by_points else self.refine.deviations(*found)
+        last = frame, result, spread, keypoints_m, iou
+        deviations = spread if is_by_points else self.refine.deviations(*last)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
         is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
         return Fit(

@@ -209,7 +209,7 @@ class _Search:
         """Return the best states (n, 14) of a body, best first, and their costs (n,)."""
         silhouette = CompiledSilhouette(body, self._camera)
         search = WholeBodyFilter(self._config, silhouette, self._rng)
-        search.seeks_distance = False
+        search.approach.is_fixed = True
         frames = [silhouette.frame(self._seen)]
         if search.look(frames) is not Presence.PERSON:
             return np.zeros((1, N_STATE)), np.array([np.inf])
