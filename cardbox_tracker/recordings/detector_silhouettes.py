@@ -15,9 +15,6 @@ from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.empty_scene import brightness_of
 
-# Least value of the mask inside the person: a chance of one half.
-_PERSON = 128
-
 
 class DetectorSilhouetteSource(SilhouetteSource):
     """One camera of a recording whose silhouettes are the masks of a person detector."""
@@ -54,11 +51,11 @@ class DetectorSilhouetteSource(SilhouetteSource):
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
         for stamp_ns, time_s, image, person in self.detections(start_s, end_s):
-            silhouette, points = np.zeros(image.shape[:2], np.uint8), None
-            if person is not None:
-                silhouette[person.mask >= _PERSON] = 255
-                points = image_points(person) if self._has_own_points else None
-            points = points or self._points(stamp_ns, image)
+            nobody = np.zeros(image.shape[:2], np.uint8)
+            silhouette = nobody if person is None else person.silhouette()
+            points = self._points(stamp_ns, image)
+            if person is not None and self._has_own_points:
+                points = image_points(person)
             seen = brightness_of(image), silhouette, image
             yield RecordedFrame(stamp_ns, time_s, *seen, points=points)
 

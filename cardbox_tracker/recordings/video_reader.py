@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, EncodingError
+from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
-from cardbox_tracker.recordings.image_recording import RecordedImage, working_size
-from cardbox_tracker.vision.camera import Calibration
+from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.vision.encodings import MOST_PIXELS
 from cardbox_tracker.vision.image_headers import check_pixels
 
@@ -28,25 +28,17 @@ _USUAL_HZ, _MOST_HZ = 30.0, 1000.0
 _LACKING = 2
 
 
-class VideoReader:
+class VideoReader(Film):
     """Context of an open video; its times count from its first image.
 
     Images are turned as the file asks for, as those of a phone that was held upright. Methods
-    raise BagError if the video cannot be read.
-
-    Attributes:
-        path: the file.
-        working_size: see ``ImageRecording``.
-        duration_s: seconds from the first to the last image, as the file states.
+    raise BagError if the video cannot be read. The duration is the one that the file states.
     """
-
-    start_ns = 0
 
     def __init__(self, path: Path, camera: GivenCamera) -> None:
         """Store the path and the camera; the video is opened on entry."""
-        self.path, self._given = path, camera
-        self.working_size, self.duration_s = (0, 0), 0.0
-        self._size, self._count, self._last = (0, 0), 0, 0
+        super().__init__(path, camera)
+        self._count = self._last = 0
 
     def __enter__(self) -> VideoReader:
         """Open the video and read its first image."""
@@ -64,21 +56,11 @@ class VideoReader:
                     f"the video {self.path} has no image that can be decoded; expected {FORMATS}: "
                     "film again, or convert it with 'ffmpeg -i INPUT OUTPUT.mp4'"
                 )
-            self._size = image.shape[1], image.shape[0]
+            self._set_size(image.shape[1], image.shape[0])
             self._hz = self._given.fps or _rate(capture)
             self._count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
-        self.working_size = working_size(*self._size)
         self.duration_s = max(0, self._count - 1) / self._hz
         return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the video, which is only open while its images are read."""
-
-    def image_topic(self, camera: str | None = None) -> str:
-        """Return the name of the file; there is only one camera."""
-        if camera is not None:
-            raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
-        return self.path.name
 
     def images(self, topic: str | None = None) -> Iterator[RecordedImage]:
         """Yield the images in order, with the time in the file or at the given rate."""
@@ -100,19 +82,10 @@ class VideoReader:
                 yield RecordedImage(stamp_ns, "", stamp_ns, partial(np.asarray, decoded))
         self._last = number
 
-    def calibration(self, camera: str | None = None) -> Calibration:
-        """Return the given calibration.
-
-        Raises:
-            CameraError: none is given, or it does not fit the images.
-        """
-        self.image_topic(camera)
-        return self._given.calibrated(self.path, *self._size)
-
     @property
     def remarks(self) -> list[str]:
         """Warnings about the field of view, and about a video that ends early."""
-        found = self._given.remarks(*self._size)
+        found = super().remarks
         if 0 < self._last < self._count - _LACKING:
             found.append(
                 f"{self.path} ends after {self._last} of {self._count} images; it is damaged or "

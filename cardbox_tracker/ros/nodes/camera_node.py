@@ -213,13 +213,9 @@ class CameraNode(CardboxNode):
 
 def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> Calibration:
     """Return an ideal lens of a field of view; if that is 0, an uncalibrated camera (K zero)."""
-    k = np.zeros((3, 3))
     if horizontal_fov_deg > 0:
-        focal_px = width / 2 / np.tan(np.radians(horizontal_fov_deg) / 2)
-        k = np.array(
-            [(focal_px, 0.0, (width - 1) / 2), (0.0, focal_px, (height - 1) / 2), (0.0, 0.0, 1.0)]
-        )
-    return Calibration(width, height, k, np.zeros(5))
+        return Calibration.of_fov(width, height, horizontal_fov_deg)
+    return Calibration(width, height, np.zeros((3, 3)), np.zeros(5))
 
 
 def main(args: list[str] | None = None) -> int:

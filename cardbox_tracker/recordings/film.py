@@ -1,0 +1,60 @@
+"""Base of the recordings of one camera that do not describe it: videos and folders of images."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cardbox_tracker.errors import BagError
+from cardbox_tracker.recordings.given_camera import GivenCamera
+from cardbox_tracker.recordings.image_recording import working_size
+from cardbox_tracker.vision.camera import Calibration
+
+
+class Film:
+    """Images of one camera that the user describes; their times count from the first one.
+
+    Attributes:
+        path: the file or folder.
+        working_size: see ``ImageRecording``.
+        duration_s: seconds from the first to the last image.
+    """
+
+    start_ns = 0
+
+    def __init__(self, path: Path, camera: GivenCamera) -> None:
+        """Store the path and the camera; the recording is read on entry."""
+        self.path, self._given = path, camera
+        self.working_size, self.duration_s = (0, 0), 0.0
+        self._size = (0, 0)
+
+    def _set_size(self, width: int, height: int) -> None:
+        """Store the size of the images, px, and the working size that follows from it."""
+        self._size, self.working_size = (width, height), working_size(width, height)
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: files are only open while they are read."""
+
+    def image_topic(self, camera: str | None = None) -> str:
+        """Return the name of the file or folder; there is only one camera.
+
+        Raises:
+            BagError: a camera is named.
+        """
+        if camera is not None:
+            raise BagError(f"{self.path} is of one camera, and {camera!r} is none; omit --cameras")
+        return self.path.name
+
+    def calibration(self, camera: str | None = None) -> Calibration:
+        """Return the given calibration.
+
+        Raises:
+            BagError: a camera is named.
+            CameraError: no calibration is given, or it does not fit the images.
+        """
+        self.image_topic(camera)
+        return self._given.calibrated(self.path, *self._size)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about the field of view."""
+        return self._given.remarks(*self._size)
