@@ -3,7 +3,11 @@
 A hand or elbow far from its point is wrong, with any number of cameras. In one camera, the depth of
 a person who was not measured is estimated from the lengths of the bones. The chance that a joint is
 wrong by more than 20 cm is then a logistic regression of four features, fitted to recordings of
-people of whom only the stature was given (``tools/make_point_doubt.py``).
+people of whom only the stature was given.
+
+The coefficients come from an earlier fit to 3,600 images, which no command of the repository
+repeats. ``tools/make_point_doubt.py`` makes such a fit; its own coefficients for 1,861 images
+differ, and separate these images about as well (``docs/research/points.md``).
 """
 
 from __future__ import annotations
