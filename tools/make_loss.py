@@ -27,10 +27,7 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import log_loss, roc_auc_score
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 from sklearn.utils.class_weight import compute_sample_weight
 
 from cardbox_tracker.estimation.config import PRESETS
@@ -40,6 +37,8 @@ from cardbox_tracker.estimation.filtering.loss import COEFFICIENTS, INTERCEPT, E
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.recorded.figures import FAR_CM
 from cardbox_tracker.evaluation.recorded.session import load_session
+from tools import logistic
+from tools.logistic import chances
 from tools.tracked_ways import track
 
 FloatArray = NDArray[np.float64]
@@ -96,19 +95,7 @@ def fitted(frames: Frames, inverse_penalty: float = INVERSE_PENALTY) -> FloatArr
     Raises:
         ValueError: all frames are right, or all wrong.
     """
-    model = make_pipeline(
-        StandardScaler(),
-        LogisticRegression(C=inverse_penalty, class_weight="balanced", max_iter=1000),
-    ).fit(*frames)
-    scaler, regression = model[0], model[1]
-    coefficients = regression.coef_[0] / scaler.scale_
-    return np.array([regression.intercept_[0] - coefficients @ scaler.mean_, *coefficients])
-
-
-def chances(coefficients: FloatArray, features: FloatArray) -> FloatArray:
-    """Return the chance (n,) that intercept and coefficients (1 + F,) give to features (n, F)."""
-    logits = coefficients[0] + features @ coefficients[1:]
-    return np.asarray(1.0 / (1.0 + np.exp(-logits)))
+    return logistic.fitted(*frames, np.ones(len(frames.is_wrong)), inverse_penalty)
 
 
 def left_out_chances(sessions: Sequence[Frames], inverse_penalty: float) -> FloatArray:

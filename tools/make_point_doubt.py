@@ -30,17 +30,16 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from cardbox_tracker.body.proportions import STATURE_M, body_from_proportions
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.filtering import point_doubt
 from cardbox_tracker.estimation.tracker import Tracker
+from tools import logistic
 from tools.detected_sessions import first_camera_of, motions, opened, source_of, source_weights
+from tools.logistic import chances
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -134,23 +133,7 @@ def fitted(frames: Fit, inverse_penalty: float = INVERSE_PENALTY) -> FloatArray:
     Raises:
         ValueError: all frames are right, or all wrong.
     """
-    if not _has_both(frames):
-        raise ValueError("all frames are of one class")
-    shares = [float(frames.weights[frames.is_wrong == one].sum()) for one in (False, True)]
-    weights = frames.weights / np.array(shares)[frames.is_wrong.astype(int)]
-    weights *= len(weights) / weights.sum()
-    model = make_pipeline(
-        StandardScaler(), LogisticRegression(C=inverse_penalty, max_iter=1000)
-    ).fit(frames.features, frames.is_wrong, logisticregression__sample_weight=weights)
-    scaler, regression = model[0], model[1]
-    coefficients = regression.coef_[0] / scaler.scale_
-    return np.array([regression.intercept_[0] - coefficients @ scaler.mean_, *coefficients])
-
-
-def chances(coefficients: FloatArray, features: FloatArray) -> FloatArray:
-    """Return the chance (n,) that intercept and coefficients (5,) give to features (n, 4)."""
-    logits = coefficients[0] + features @ coefficients[1:]
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logits, -50.0, 50.0))))
+    return logistic.fitted(*frames, inverse_penalty)
 
 
 def kept(frames: Fit, found: FloatArray, threshold: float) -> tuple[float, float]:

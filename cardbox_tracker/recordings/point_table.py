@@ -39,7 +39,8 @@ class PointTable(NamedTuple):
         """
         found: dict[int, dict[str, tuple[float, float, float]]] = {}
         try:
-            with self.path.open(newline="", encoding="utf-8") as file:
+            # Spreadsheets begin a file with a byte order mark.
+            with self.path.open(newline="", encoding="utf-8-sig") as file:
                 rows = csv.DictReader(file)
                 self._check(rows.fieldnames or (), camera)
                 for row in rows:
@@ -50,10 +51,16 @@ class PointTable(NamedTuple):
                         joints[row["joint"]] = float(row["u"]), float(row["v"]), float(row["score"])
         except OSError as error:
             raise CardboxError(f"cannot read {self.path}: {error.strerror}") from None
-        except (ValueError, TypeError, csv.Error) as error:
+        except (UnicodeDecodeError, csv.Error) as error:
             raise CardboxError(
-                f"{self.path} has a value that is no number ({quoted(str(error))}); expected whole "
-                "numbers in stamp_ns, and numbers in u, v and score"
+                f"{self.path} is not a table in UTF-8 ({quoted(str(error))}); give a CSV file with "
+                f"the columns {', '.join(COLUMNS)}"
+            ) from None
+        except (ValueError, TypeError) as error:
+            raise CardboxError(
+                f"{self.path}, line {rows.line_num}, has a value that is no number "
+                f"({quoted(str(error))}); expected whole numbers in stamp_ns, and numbers in u, v "
+                "and score"
             ) from None
         placed: dict[int, ImagePoints] = {}
         for stamp_ns, joints in found.items():
@@ -67,5 +74,5 @@ class PointTable(NamedTuple):
         if missing:
             raise CardboxError(
                 f"{self.path} has no column {', '.join(missing)}; a table of points has the "
-                f"columns {', '.join(expected)}"
+                f"columns {', '.join(expected)}, separated by commas"
             )

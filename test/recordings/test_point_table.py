@@ -97,13 +97,22 @@ def test_each_camera_has_its_own_rows(tmp_path: Path) -> None:
     assert given.read("top", PLAIN, (640, 480))(5, NONE) is None
 
 
+def test_a_table_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    points = table(tmp_path, "5,nose,10,20,0.9", header=f"\ufeff{HEADER}").read(
+        None, PLAIN, (640, 480)
+    )(5, NONE)
+    assert points is not None
+    assert points.px[POINT_INDEX["nose"], 0] == pytest.approx(10.0)
+
+
 @pytest.mark.parametrize(
     ("header", "row", "camera", "words"),
     [
         ("stamp_ns,joint,u,v", "5,nose,1,2", None, "no column score"),
         ("", "", None, "no column stamp_ns, joint, u, v, score"),
         (HEADER, "5,nose,1,2,0.9", "left", "no column camera"),
-        (HEADER, "5,nose,one,2,0.9", None, "no number .*one"),
+        (HEADER.replace(",", ";"), "5;nose;1;2;0.9", None, "separated by commas"),
+        (HEADER, "5,nose,one,2,0.9", None, "line 2, has a value that is no number .*one"),
         (HEADER, "5.5,nose,1,2,0.9", None, r"no number .*5\.5.*whole numbers in stamp_ns"),
         (HEADER, "5,nose,1", None, "no number"),
     ],
@@ -120,5 +129,5 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         PointTable(tmp_path / "missing.csv").read(None, PLAIN, (640, 480))
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00stamp_ns")
-    with pytest.raises(CardboxError, match=r"binary\.csv"):
+    with pytest.raises(CardboxError, match=r"binary\.csv is not a table in UTF-8"):
         PointTable(binary).read(None, PLAIN, (640, 480))

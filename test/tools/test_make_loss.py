@@ -11,7 +11,8 @@ from cardbox_tracker.estimation.filtering.loss import (
     chance_of_loss,
     features_of_loss,
 )
-from tools.make_loss import SHIPPED, Frames, chances, fitted, quality, report, together
+from tools.logistic import chances
+from tools.make_loss import SHIPPED, Frames, fitted, quality, report, together
 
 TRUE = np.array([-1.0, *np.linspace(-2.0, 2.0, len(COEFFICIENTS))])
 
