@@ -1,0 +1,1 @@
+"""Motions of people: motion capture of several sources and scripted movements."""
