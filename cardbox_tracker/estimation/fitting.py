@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.body.appearance import TORSO
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import InitializationError
@@ -82,8 +81,7 @@ class Fitting:
         self._last = (self._fitted, self._usual) if self._fitted and self._ious else None
         self._fitted = fit.body
         self._is_due, self._worse, self._ious = False, 0, []
-        worn = fit.body.appearance
-        self._clothes = None if worn is None else worn.histograms[TORSO]
+        self._clothes = fit.clothes
         self._frames = self._other = 0
         return fit.body
 

@@ -139,7 +139,7 @@ def test_a_fit_for_the_worse_is_taken_back(
 ) -> None:
     """Who bows fits worse, and so does what is fitted to them then once they stand again."""
     bodies = [person(1.75, -0.62), person(1.5, -0.5)]
-    fits = (SimpleNamespace(body=body) for body in bodies)
+    fits = (SimpleNamespace(body=body, clothes=None) for body in bodies)
     monkeypatch.setattr(fitting, "fit_first_sight", lambda *_: next(fits))
     guess = body_from_proportions(1.75)
     decides = fitting.Fitting(guess, CAMERA, default_preset(), np.random.default_rng(0))

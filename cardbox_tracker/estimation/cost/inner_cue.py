@@ -1,7 +1,7 @@
 """The cue inside the outline: hands and forearms by their colours.
 
 An outline does not show an arm in front of the torso. The initialization learns the colours of the
-person's parts (``BodyModel.appearance``), and the term uses them in four steps:
+person's parts (``BodyModel.appearance``), and the term uses them in five steps:
 
 1. A low-pass filter estimates the brightness of the torso, so that the colours stay comparable.
 2. Each pixel in the silhouette's bounding box gets two log-likelihood ratios, of the hand and of
@@ -10,6 +10,8 @@ person's parts (``BodyModel.appearance``), and the term uses them in four steps:
    forearm. The areas are those at the expected place of the person, so that neither short nor near
    limbs are preferred.
 4. A hand gains less where the other forearm covers it, and nothing behind the torso.
+5. Whether the forearms of a person without reference postures are bare is learned while tracking
+   (:mod:`.inner_cue_sleeves`).
 
 The gain is subtracted from the cost. The term is zero without an image, without a previous posture,
 and for a person with unknown colours.
@@ -17,7 +19,7 @@ and for a person with unknown colours.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -33,11 +35,12 @@ from cardbox_tracker.body.appearance import (
     TORSO,
     steps_of_levels,
 )
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.inner_cue_arms import N_TORSO, ArmView, torsos_of
 from cardbox_tracker.estimation.cost.inner_cue_kernels import ratio_maps
+from cardbox_tracker.estimation.cost.inner_cue_sleeves import Sleeves
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
     ArmCosts,
@@ -107,12 +110,22 @@ class InnerCueTerm:
             raise ValueError("the body has no appearance; learn it, or track without this term")
         self.config = config
         self._appearance = body.appearance
-        self._ratios = ratios_of(body.appearance.histograms)
         self._brightness = body.appearance.brightness.copy()
         self._arms = ArmView.of(
             body, camera, np.array([config.hand, config.forearm]), config.lifts_shoulders
         )
+        self._sleeves: Sleeves | None = None
+        self._ratios = ratios_of(body.appearance.histograms)
         self._warm_up(camera)
+        if body.source != MEASURED:
+            self._sleeves = Sleeves(body.appearance.histograms, self._arms)
+            self._use(self._sleeves)
+
+    def _use(self, sleeves: Sleeves) -> None:
+        """Rate arms as their sleeves probably are."""
+        self._ratios = ratios_of(sleeves.histograms)
+        weights = np.array([self.config.hand * sleeves.hand_weight, self.config.forearm])
+        self._arms = replace(self._arms, weights=weights)
 
     def _warm_up(self, camera: Camera) -> None:
         """Run every kernel once, so that no live image waits for the compiler."""
@@ -137,6 +150,8 @@ class InnerCueTerm:
         self._follow_light(image, frame.silhouette, zones)
         u0, v0, width, height = cv2.boundingRect(frame.silhouette)
         maps = self._maps(image, frame.silhouette, zones, (u0, v0, width, height))
+        if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), frame.posture):
+            self._use(self._sleeves)
         before = frame.posture[None]
         others = {
             side: self._arms.project(torsos_of(before), before[:, joints], side)[0]

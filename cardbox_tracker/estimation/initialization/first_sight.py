@@ -30,7 +30,10 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.filtering.pose_filter import Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.initialization.outline import filled
-from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
+from cardbox_tracker.estimation.initialization.part_colors import (
+    seen_appearance,
+    torso_colors,
+)
 from cardbox_tracker.estimation.initialization.references import (
     MAX_PERSON_FRACTION,
     MIN_PERSON_FRACTION,
@@ -77,10 +80,12 @@ class FirstSight:
     Attributes:
         body: fitted body without unknown values.
         iou: IoU of the fitted body and the silhouette.
+        clothes: histogram of the torso in the image, (bins,); None if it is unknown.
     """
 
     body: BodyModel
     iou: float
+    clothes: FloatArray | None = None
 
 
 def fit_first_sight(
@@ -111,11 +116,13 @@ def fit_first_sight(
             f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
             f"{MIN_IOU:.2f} or more)"
         )
-    if image is not None and found.appearance is None:
-        found = found.with_values(
-            appearance=seen_appearance(image, silhouette, found, camera, posture)
-        )
-    return FirstSight(found.with_values(unknown=()), iou)
+    clothes = None
+    if image is not None:
+        seen = image, silhouette, found, camera, posture
+        clothes = torso_colors(*seen)
+        if found.appearance is None:
+            found = found.with_values(appearance=seen_appearance(*seen))
+    return FirstSight(found.with_values(unknown=()), iou, clothes)
 
 
 class _Search:

@@ -9,6 +9,9 @@
 4. Half of the hand's histogram is the face's, because hands are often missing in the outline.
 5. A part with too few pixels gets the colours of a similar part: legs and forearms (sleeves) those
    of the torso, hands those of the face.
+
+Without references, one image of any posture teaches the colours of head, torso and legs. Forearms
+are then half bare and half in sleeves, until tracking tells (:mod:`..cost.inner_cue_sleeves`).
 """
 
 from __future__ import annotations
@@ -59,6 +62,9 @@ _FACE_SHARE = 0.5
 _NEAREST_M = 0.1
 # Least number of pixels from which a part is learned.
 _MIN_PX = 40
+# Factors on the light in which one image of a part is counted, because limbs that move are lit
+# otherwise than in that image, and the forearm otherwise than the face.
+_LIGHTS = (0.7, 0.85, 1.0, 1.2, 1.4)
 # Search of the posture: rounds, postures in a round, factor of the noise, and initial noise.
 _ROUNDS, _POSTURES, _SHRINK = 8, 300, 0.7
 _PLACE_M, _ROLL_RAD, _ABDUCTION_RAD = 0.03, np.radians(4.0), np.radians(10.0)
@@ -126,7 +132,10 @@ def learn_histograms(
 def seen_appearance(
     image: Image, silhouette: Silhouette, body: BodyModel, camera: Camera, posture: FloatArray
 ) -> Appearance | None:
-    """Learn colours from one image of any posture; the hands get the colours of the face.
+    """Learn colours from one image of any posture.
+
+    Each part of a colour image is counted as it looks in less and in more light. The hands get the
+    colours of the face, and the forearms those of face and torso in equal parts.
 
     Args:
         image: (H, W, 3) bgr or (H, W).
@@ -144,13 +153,19 @@ def seen_appearance(
     if len(torso) < _MIN_PX or np.count_nonzero(labels == _FACE) < _MIN_PX:
         return None
     brightness = np.median(torso, axis=0)
-    bins = _bins(image, steps_of_levels(brightness, brightness))
     counts = np.zeros((len(PARTS) + 1, bins_of(channels)))
-    for part in range(len(counts)):
-        # The arms' posture is not reliable yet, so a presumed forearm may be the torso.
-        if part not in (HAND, FOREARM):
-            counts[part] = np.bincount(bins[labels == part], minlength=len(counts.T))
-    return Appearance.of(_histograms(counts, channels), brightness)
+    # Grey parts differ by their brightness alone, which this would blur.
+    lights = _LIGHTS if channels == 3 else (1.0,)
+    for light in lights:
+        bins = _bins(image, steps_of_levels(brightness / light, brightness))
+        for part in range(len(counts)):
+            # The arms' posture is not reliable yet, so a presumed forearm may be the torso.
+            if part not in (HAND, FOREARM):
+                seen = np.bincount(bins[labels == part], minlength=len(counts.T))
+                counts[part] += seen / len(lights)
+    histograms = _histograms(counts, channels)
+    histograms[FOREARM] = (histograms[HAND] + histograms[TORSO]) / 2
+    return Appearance.of(histograms, brightness)
 
 
 def torso_colors(

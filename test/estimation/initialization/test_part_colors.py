@@ -16,6 +16,7 @@ from cardbox_tracker.estimation.initialization.part_colors import (
     fit_posture,
     learn_appearance,
     part_labels,
+    seen_appearance,
 )
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -61,6 +62,20 @@ def test_each_part_has_its_colour() -> None:
     shares = [hand[color_bin(color, appearance.brightness)] for color in (SKIN, SLEEVE)]
     assert shares[0] == pytest.approx(shares[1], rel=0.05)
     assert learn_appearance(images, silhouettes, BODY, CAMERA) == appearance
+
+
+def test_one_image_of_any_posture_teaches_colours_in_more_light_and_in_less() -> None:
+    image, silhouette = drawn("arms")
+    appearance = seen_appearance(image, silhouette, BODY, CAMERA, reference_posture("arms"))
+    assert appearance is not None
+    hand = appearance.histograms[HAND]
+    in_light = [tuple(int(gain * c) for c in SKIN) for gain in (0.7, 0.85, 1.0, 1.2)]
+    unseen = hand[color_bin((200, 30, 30), appearance.brightness)]
+    for color in in_light:
+        assert hand[color_bin(color, appearance.brightness)] > 100 * unseen
+    # Whether forearms are bare is not known from the first image.
+    mixture = (hand + appearance.histograms[TORSO]) / 2
+    np.testing.assert_allclose(appearance.histograms[FOREARM], mixture, rtol=0.05)
 
 
 def test_the_posture_really_held_is_found() -> None:
