@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, reference_posture
-from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE
+from cardbox_tracker.estimation.initialization.shoulders import GIRDLE_RISE
 from cardbox_tracker.simulation.person import (
     FINGER_REACH,
     girdle_lift_m,

@@ -61,7 +61,8 @@ from cardbox_tracker.estimation.initialization.references import (
     check_references,
     lateral_m,
 )
-from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE, measure_skeleton
+from cardbox_tracker.estimation.initialization.shoulders import GIRDLE_RISE
+from cardbox_tracker.estimation.initialization.skeleton import measure_skeleton
 from cardbox_tracker.estimation.initialization.stature import SHOULDER_TO_HIP, stature_m
 from cardbox_tracker.vision.camera import Camera
 
@@ -138,7 +139,7 @@ class _Search:
         self._config = config
         self._references = references
         self._rng = np.random.default_rng(config.seed)
-        skeleton = measure_skeleton(references, camera, config.distance_m)
+        skeleton = measure_skeleton(references, camera, config.distance_m, config.side_turn)
         if skeleton is None:
             raise InitializationError(
                 f"reference 'arms': no arms are seen; capture it again: {POSTURE_TEXT['arms']}"

@@ -31,6 +31,8 @@ _TRUNK = 2.2
 """Height of a column, in arm thicknesses, at which the trunk begins."""
 _HAND, _ARMPIT = 0.30, 0.97
 """Range of the arm without hand, in fractions of the distance from fingertips to armpit."""
+_HANGING_WIDTH = 1.06
+"""Width of an arm that hangs 20 degrees away from the body, in thicknesses."""
 _HANGING = (0.02, 0.27)
 """Range between armpit and wrist of hanging arms, in spans below the axis of the level arms."""
 
@@ -139,7 +141,8 @@ def level_arm(
     typical = float(np.median(thickness[n // 5 : 3 * n // 5]))
     trunk = np.nonzero(thickness[n // 3 :] > _TRUNK * typical)[0]
     armpit = n // 3 + int(trunk[0]) if len(trunk) else int(0.75 * n)
-    middle = (top + end - 1) / 2.0
+    # The upper edge of a sleeve lies on the arm, and the lower edge hangs.
+    middle = top + (np.minimum(thickness, typical) - 1.0) / 2.0
     points = plane_points_m(camera, order[:armpit], middle[:armpit], distance_m)
     hand = int(_HAND * armpit)
     arm = points[hand : max(int(_ARMPIT * armpit), hand + 5)]
@@ -216,19 +219,6 @@ def width_m(front: Silhouette, camera: Camera, distance_m: float, height_m: floa
     return float(points[1, 0] - points[0, 0])
 
 
-def trunk_width_m(
-    silhouette: Silhouette, camera: Camera, distance_m: float, height_m: float, centre_m: float
-) -> float:
-    """Return the width of the run that contains ``centre_m`` at a height; NaN without a run."""
-    row = int(np.argmin(np.abs(row_heights_m(silhouette, camera, distance_m) - height_m)))
-    starts, stops = _runs(silhouette[row])
-    rows = np.full(len(starts), float(row))
-    left = plane_points_m(camera, starts - 0.5, rows, distance_m)[:, 0]
-    right = plane_points_m(camera, stops - 0.5, rows, distance_m)[:, 0]
-    middle = (left <= centre_m) & (centre_m <= right)
-    return float((right - left)[middle][0]) if middle.any() else float("nan")
-
-
 def axes_distance_m(
     front: Silhouette,
     camera: Camera,
@@ -265,7 +255,9 @@ def axes_distance_m(
             if len(starts) < 2:
                 continue
             width = stops[side] - starts[side]
-            column = (starts[side] + stops[side] - 1) / 2.0
+            # A sleeve hangs from the outer side of the arm.
+            bare = min(float(width), _HANGING_WIDTH * thickness_px)
+            column = stops[-1] - (bare + 1) / 2.0 if side else starts[0] + (bare - 1) / 2.0
             if not 0.4 * thickness_px < width < 1.8 * thickness_px:
                 continue
             if last is None or abs(column - last) <= 4:

@@ -1,25 +1,29 @@
-"""Shoulder joints and arm lengths from the outlines of ``front`` and ``arms``.
+"""Shoulder joints and arm lengths from the outlines of the reference postures.
 
 A fit of all 18 sizes at once is biased: the girdle lifts the shoulders in ``arms``, open fingers
 reach beyond the fist, and the outline of a straight arm does not show the elbow. So the bones of
 the arms are measured before the fit, with the proportions of people:
 
-1. Each arm of ``arms`` is traced from the fingertips to the armpit; a line through its middle is
-   the arm's axis. The span is the distance between the fingertips.
-2. The shoulder joints lie near the axes, and lower by the lift of the girdle if the arms hang.
+1. Each arm of ``arms`` is traced from the fingertips to the armpit; a line through its middle,
+   without what hangs of a sleeve, is the arm's axis. The span is the distance between the
+   fingertips.
+2. The height of the shoulder joints and their depth against the hips are those of
+   :mod:`.shoulders`. Arms and shoulders are nearer than the hips by that depth.
 3. The breadth has three readings: the distance of the axes of the hanging arms in ``front`` at the
    joints' height, the width of the shoulders there, and the span. They are averaged by their
    precision, with less weight for outliers.
 4. The span minus the breadth is the reach of the arms, which is divided into upper arm, forearm
    and fingers by mean proportions.
 
-Constants without a source were chosen on rendered bodies with known joint centres.
+Proportions are from anthropometry where it has them. Where rendered bodies differ from it, whose
+joints are known exactly but were placed by artists, the mean of three sources is taken: the
+literature, MakeHuman and Microsoft Rocketbox. docs/research/sizes.md has the figures.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,55 +32,44 @@ from cardbox_tracker.estimation.initialization.outline import (
     axes_distance_m,
     level_arm,
     span_m,
-    trunk_width_m,
     width_m,
+)
+from cardbox_tracker.estimation.initialization.references import lateral_m
+from cardbox_tracker.estimation.initialization.shoulders import (
+    robust_mean,
+    shoulder_height_m,
+    shoulders_forward_m,
 )
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]
 
-GIRDLE_RISE = 0.068
-"""Lift of the shoulder joints from ``front`` to ``arms`` in shoulder breadths.
-
-The clavicle has a length of about 0.43 breadths and rises by about 9 degrees until the arm is at 80
-degrees (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder Joint", 1944).
-"""
-
-KNUCKLES_SHARE = 0.874
+KNUCKLES_SHARE = 0.876
 """Distance from shoulder to knuckles, divided by the distance from shoulder to fingertips.
 
-Mean of rendered bodies; 0.862 for men and 0.868 for women by de Leva, "Adjustments to
-Zatsiorsky-Seluyanov's Segment Inertia Parameters", 1996.
+0.862 for men and 0.868 for women by de Leva, "Adjustments to Zatsiorsky-Seluyanov's Segment Inertia
+Parameters", 1996, with straight fingers; 0.882 in rendered bodies of either family.
 """
 
-UPPER_ARM_SHARE = 0.420
-"""Length of the upper arm, divided by the distance from shoulder to knuckles, at the mean ratio of
-hip width to shoulder breadth.
+UPPER_ARM_SHARE = 0.432
+"""Length of the upper arm, divided by the distance from shoulder to knuckles.
 
-Mean of rendered bodies; 0.442 for men and 0.446 for women by de Leva, with other joint centres.
+0.442 for men and 0.446 for women by de Leva; 0.436 (Rocketbox) and 0.422 (MakeHuman) in rendered
+bodies. No outline shows the elbow, and the share depends little on sex or build.
 """
 
-BREADTH_OF_SPAN = 0.204
-"""Distance of the shoulder joints in spans (rendered bodies)."""
+BREADTH_OF_SPAN = 0.207
+"""Distance of the shoulder joints in spans: 0.209 in MakeHuman, 0.218 in Rocketbox, and 0.193 for a
+biacromial breadth less 3 cm on either side (ANSUR II)."""
 
-# Mean ratio of hip width to shoulder breadth; the upper arm's share grows with a power of that
-# ratio, by a limited factor because clothes widen the hips.
-_HIP_RATIO, _HIP_EXPONENT, _HIP_EFFECT = 1.042, 0.15, 0.03
-# Height of the shoulder joint above the axis of a level arm in spans.
-_AXIS_BELOW_JOINT = 0.0034
 # Row of the shoulders' width below the arms' axes in spans.
 _SHOULDERS_BELOW = 0.02
-# Row of the widest hips below the shoulder joints in spans.
-_HIPS_BELOW = 0.28
 # Correction of the span for fingertips that bend down and are nearer to the camera than the body.
-_SPAN_IN_PLANE = 0.980
+_SPAN_IN_PLANE = 0.99
 # Factors from axes distance and width to breadth; relative deviations by span, axes and width.
-_BREADTH_OF_AXES, _BREADTH_OF_WIDTH = 1.044, 0.733
+_BREADTH_OF_AXES, _BREADTH_OF_WIDTH = 1.010, 0.737
 _BREADTH_SD = np.array([0.05, 0.031, 0.046])
-# Distance from the mean, in standard deviations, at which a reading has half of its weight.
-_OUTLIER_SD = 1.5
-_AVERAGING_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -89,6 +82,7 @@ class Skeleton:
         upper_arm_m: distance from shoulder joint to elbow joint.
         forearm_m: distance from elbow joint to knuckles.
         span_m: distance from fingertip to fingertip in ``arms``.
+        forward_m: how far the shoulder joints are before the hips.
     """
 
     shoulder_breadth_m: float
@@ -96,69 +90,72 @@ class Skeleton:
     upper_arm_m: float
     forearm_m: float
     span_m: float
+    forward_m: float = 0.0
 
 
 def measure_skeleton(
-    references: Mapping[str, Silhouette], camera: Camera, distance_m: float
+    references: Mapping[str, Silhouette],
+    camera: Camera,
+    distance_m: float,
+    side_turn: str = "left",
 ) -> Skeleton | None:
     """Measure the bones of the arms.
 
     Args:
-        references: silhouettes (H, W) of ``front`` and ``arms``, as ``outline.filled`` returns
-            them.
+        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, as ``outline.filled``
+            returns them.
         camera: working camera including the pitch.
-        distance_m: level distance to the person.
+        distance_m: level distance to the person's hips.
+        side_turn: ``left`` or ``right``, the side to which the person turned for ``side``.
 
     Returns:
         None if ``arms`` shows no arms.
     """
+    first = _measured_in_plane(references, camera, distance_m)
+    if first is None:
+        return None
+    forward = shoulders_forward_m(
+        references["side"], camera, distance_m, first.shoulder_height_m, first.span_m, side_turn
+    )
+    found = _measured_in_plane(references, camera, distance_m - forward)
+    return None if found is None else replace(found, forward_m=forward)
+
+
+def _measured_in_plane(
+    references: Mapping[str, Silhouette], camera: Camera, distance_m: float
+) -> Skeleton | None:
+    """Measure the bones of arms in the upright plane at a level distance."""
     front, arms = references["front"], references["arms"]
     right, left = (level_arm(arms, camera, distance_m, side) for side in (-1, 1))
     if left is None or right is None:
         return None
     span = span_m(arms, camera, distance_m, left, right)
     centre = (left.tip_m + right.tip_m) / 2.0
-    half = BREADTH_OF_SPAN * span / 2.0
+    breadth = BREADTH_OF_SPAN * span
+    half = breadth / 2.0
     axis = float(np.mean([left.axis_m(centre + half), right.axis_m(centre - half)]))
-    raised = axis + _AXIS_BELOW_JOINT * span
+    middle = lateral_m(front, camera, distance_m)
     # Height and breadth depend on each other; the first height uses the breadth from the span.
-    height = raised - GIRDLE_RISE * 2.0 * half
-    readings = [
-        BREADTH_OF_SPAN * span,
-        _BREADTH_OF_AXES * axes_distance_m(front, camera, distance_m, axis, height, span, left),
-        _BREADTH_OF_WIDTH * width_m(front, camera, distance_m, axis - _SHOULDERS_BELOW * span),
-    ]
-    breadth = combined(np.array(readings), _BREADTH_SD)
-    height = raised - GIRDLE_RISE * breadth
+    for _ in range(2):
+        height = shoulder_height_m(front, camera, distance_m, axis, middle, breadth, span)
+        readings = [
+            BREADTH_OF_SPAN * span,
+            _BREADTH_OF_AXES * axes_distance_m(front, camera, distance_m, axis, height, span, left),
+            _BREADTH_OF_WIDTH * width_m(front, camera, distance_m, axis - _SHOULDERS_BELOW * span),
+        ]
+        breadth = combined(np.array(readings), _BREADTH_SD)
     drop = np.arctan((abs(left.slope) + abs(right.slope)) / 2.0)
     reach = KNUCKLES_SHARE * (_SPAN_IN_PLANE * span - breadth) / 2.0 / float(np.cos(drop))
-    hips = trunk_width_m(arms, camera, distance_m, height - _HIPS_BELOW * span, centre)
-    upper_arm = reach * UPPER_ARM_SHARE * effect_of_hips(hips / breadth)
+    upper_arm = reach * UPPER_ARM_SHARE
     return Skeleton(breadth, height, upper_arm, reach - upper_arm, span)
 
 
 def combined(readings: FloatArray, sd: FloatArray) -> float:
-    """Return the mean of readings, weighted by precision and by Cauchy weights.
+    """Return the robust mean of lengths.
 
     Args:
         readings: shape (n,), above 0; NaN if missing. The first reading must not be missing.
         sd: relative standard deviations (n,).
     """
-    known = np.isfinite(readings) & (readings > 0)
-    logs, weights = np.log(readings[known]), sd[known] ** -2.0
-    mean = logs[0]
-    for _ in range(_AVERAGING_STEPS):
-        used = weights / (1.0 + ((logs - mean) / sd[known] / _OUTLIER_SD) ** 2)  # Cauchy weights
-        mean = np.sum(used * logs) / np.sum(used)
-    return float(np.exp(mean))
-
-
-def effect_of_hips(ratio: float) -> float:
-    """Return the factor of the upper arm's share for a ratio of hip width to shoulder breadth.
-
-    The factor is 1 if the ratio is NaN.
-    """
-    if not np.isfinite(ratio):
-        return 1.0
-    log = _HIP_EXPONENT * np.log(ratio / _HIP_RATIO)
-    return float(np.exp(np.clip(log, -_HIP_EFFECT, _HIP_EFFECT)))
+    logs = np.log(np.where(readings > 0, readings, np.nan))
+    return float(np.exp(robust_mean(logs, sd)))

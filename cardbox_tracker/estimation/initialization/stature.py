@@ -18,13 +18,16 @@ SHOULDER_TO_HIP = 0.275
 """Height of the shoulder joints above the hip joints in statures, chosen on rendered bodies with
 known joint centres; 0.288 in the source."""
 
-SPAN = 0.99
-"""Distance of the fingertips in statures, with arms 10 degrees below the horizontal (rendered
-bodies)."""
+SPAN = 1.005
+"""Distance of the fingertips in statures, with arms 10 degrees below the horizontal.
 
-CROWN_TO_SHOULDER = 0.215
-"""Height of the crown with hair above the shoulder joints in statures (rendered bodies); 0.182
-without hair in the source."""
+About 1.03 for men and 1.02 for women with level arms (ANSUR II), which the slope makes 1.2 %
+shorter; 0.97 to 1.01 in rendered bodies of two families.
+"""
+
+CROWN_TO_SHOULDER = 0.218
+"""Height of the crown with hair above the shoulder joints in statures (rendered bodies of two
+families); 0.182 above the acromion, without hair, in the source."""
 
 _RANGE_M = (1.1, 2.2)
 """Range of statures, from a child of six years to a very tall adult."""

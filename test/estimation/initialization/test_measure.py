@@ -20,7 +20,7 @@ from cardbox_tracker.estimation.initialization.config import (
     fit_text,
 )
 from cardbox_tracker.estimation.initialization.measure import initialize_body
-from cardbox_tracker.estimation.initialization.skeleton import GIRDLE_RISE
+from cardbox_tracker.estimation.initialization.shoulders import GIRDLE_RISE
 from cardbox_tracker.simulation.person import FINGER_REACH, random_body
 from cardbox_tracker.simulation.renderer import Renderer, Scene
 from cardbox_tracker.simulation.session import session_camera

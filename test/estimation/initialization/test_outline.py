@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.estimation.initialization.outline import (
+    axes_distance_m,
     filled,
     level_arm,
     plane_points_m,
@@ -82,6 +83,31 @@ def test_a_level_arm_by_hand(drop: float, outstretched: Callable[..., np.ndarray
     assert left.armpit_m == pytest.approx(0.205, abs=0.006)
     assert left.thickness_m == pytest.approx(0.08)
     assert left.reach_m == pytest.approx(0.595, abs=0.006)
+
+
+def test_a_hanging_sleeve_does_not_lower_the_axis(outstretched: Callable[..., np.ndarray]) -> None:
+    bare = outstretched()
+    sleeved = bare.copy()
+    # The upper arm's sleeve hangs 6 px below the arm, 40 px to 20 px from the middle.
+    sleeved[104:110, 180:200] = 255
+    seen = [level_arm(image, CAMERA, DISTANCE_M, 1) for image in (bare, sleeved)]
+    assert seen[0] is not None
+    assert seen[1] is not None
+    assert seen[1].axis_m(0.2) == pytest.approx(seen[0].axis_m(0.2), abs=1e-6)
+    assert seen[1].thickness_m == pytest.approx(0.08)
+
+
+def test_a_hanging_sleeve_does_not_narrow_the_shoulders(
+    block: Callable[..., np.ndarray], outstretched: Callable[..., np.ndarray]
+) -> None:
+    arm = level_arm(outstretched(), CAMERA, DISTANCE_M, 1)
+    assert arm is not None
+    trunk = block(95, 220, 150, 170)
+    bare = trunk | block(104, 140, 130, 138) | block(104, 140, 182, 190)
+    sleeved = bare | block(104, 140, 138, 142) | block(104, 140, 178, 182)
+    found = [axes_distance_m(f, CAMERA, DISTANCE_M, 0.2, 0.1, 1.6, arm) for f in (bare, sleeved)]
+    # The arms' middles are 52 px apart; an arm's outline is 1.06 thicknesses wide when it hangs.
+    assert found == pytest.approx([0.52, 0.52], abs=0.006)
 
 
 def test_what_hangs_below_an_arm_is_not_the_arm(
