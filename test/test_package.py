@@ -46,7 +46,7 @@ ROS = ("rclpy", "rosbags", "launch", "launch_ros", "ament_index_python", *MESSAG
 MAX_LINES = 310
 LONGER: tuple[str, ...] = ()
 # Folders of a checkout that are not installed.
-CHECKOUT = ("experiments", "benchmarks", "tools")
+CHECKOUT = ("experiments", "benchmarks", "learning", "tools")
 
 
 @cache

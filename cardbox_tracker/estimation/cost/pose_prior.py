@@ -3,7 +3,7 @@
 The outline hardly shows whether an arm points to the camera or away from it. The prior is a mixture
 of Gaussians over six numbers, the unit vectors of upper arm and forearm in the torso's frame: x
 forwards, y outwards (to the left for the left arm, to the right for the right one), z up.
-``tools/make_pose_prior.py`` learns it from motion capture; the data file names the source. Its unit
+``learning/pose_prior.py`` learns it from motion capture; the data file names the source. Its unit
 is the nat: -log p, about 0 at the likeliest posture, never above ``FLOOR_NATS``.
 
 Both arms share it, because a positive abduction raises either arm outwards.

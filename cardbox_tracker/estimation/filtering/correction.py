@@ -2,10 +2,13 @@
 
 An outline is nearly the same for many depths, and the filter's result is one of them. Its mean
 error depends on the posture, on other postures that fit, on the poses of the cameras, and on
-previous frames. The recurrent network is trained on rendered recordings with ground truth
-(``tools/make_correction.py``; the data file names them); a second network is trained on recordings
-of several cameras. The hidden state also separates motion from noise, so that the result is
-steadier without the delay of a low-pass filter.
+previous frames. The network is trained on simulated recordings (``learning/correction.py``,
+docs/research/learning.md). Where its copies, trained with other seeds, disagree, it does less. Its
+hidden state also separates motion from noise, so that the result is steadier without the delay of a
+low-pass filter.
+
+Cameras that look from different directions see the depth, and a network did harm to films of real
+people. So it corrects results of one camera, or of several that look in nearly the same direction.
 
 Both arms share the network, whose input is a left arm or a mirrored right arm. Its outputs for each
 arm are the displacement of the middle of the shoulders from the result, and the displacements of
@@ -22,7 +25,9 @@ import numpy as np
 from cardbox_tracker.body.posture import N_JOINTS, ROLL
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.keypoint_fit_kernels import pose_at_keypoints
+from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.filtering.corrector import Result
 from cardbox_tracker.estimation.filtering.depth_features import DEPTH_FEATURES, features_of_depth
 from cardbox_tracker.estimation.filtering.deviations import DATA as DATA_OF_DEVIATIONS
@@ -32,17 +37,32 @@ from cardbox_tracker.estimation.filtering.networks import (
     load_network,
     load_recurrent_network,
 )
+from cardbox_tracker.estimation.filtering.point_features import POINT_FEATURES, features_of_points
 from cardbox_tracker.estimation.filtering.result_features import FEATURES, features_of
 from cardbox_tracker.estimation.filtering.search_features import SEARCH_FEATURES, features_of_search
 from cardbox_tracker.vision.camera import Camera
 
-DATA, DATA_OF_SEVERAL = "correction.npz", "correction_views.npz"
-"""Data files of the networks for one camera (with or without depth) and for several cameras."""
+DATA = "correction.npz"
+"""Data file of the network."""
 _ANGLES = slice(ROLL, N_JOINTS)
-_LEAST_BONE_M = 1e-6
+_LEAST_BONE_M, _LEAST_M2 = 1e-6, 1e-12
+_LEAST_S = 0.005
+# Shares of a correction that are tried in turn, until little of the silhouette is lost.
+_SHARES = (1.0, 0.5, 0.25)
+MOST_IOU_LOSS = 0.05
+"""Largest loss of intersection over union that a correction may cause."""
+MIDDLE_Z = 2
+"""Answer for the depth of the middle of the shoulders, which is not used for measured people: on
+sources that were left out, it makes their distance worse."""
+DOUBT = 1.0
+"""Weight of the networks' disagreement, which shortens the correction."""
 _NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
-N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES
-"""Inputs of the network: features of the result, of the search, and of the depth image."""
+N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES + POINT_FEATURES + 1
+"""Inputs of the network: features of the result, of the search, of the depth image and of the
+points, and the binary logarithm of the interval between frames."""
+OF_POINTS = slice(N_FEATURES - 1 - POINT_FEATURES, N_FEATURES - 1)
+OF_DEPTH = slice(OF_POINTS.start - DEPTH_FEATURES, OF_POINTS.start)
+"""Columns of the inputs that most frames lack."""
 N_ANSWERS = 9
 """Outputs of the network: x, y, z of the middle of the shoulders, elbow and hand."""
 
@@ -61,6 +81,25 @@ def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
     result = np.empty((6, 3))
     _move(keypoints_m, answers_m, result)
     return result
+
+
+def limited(answers_m: FloatArray, spread_m: FloatArray, doubt: float = DOUBT) -> FloatArray:
+    """Return the answers (2, 9), each joint's displacement shortened where the networks differ.
+
+    A displacement a with the spread s is multiplied by a^2 / (a^2 + doubt s^2): displacements that
+    all networks agree on remain, others vanish.
+
+    Args:
+        answers_m: mean of the networks' answers, (2, 9).
+        spread_m: their standard deviation, (2, 9).
+        doubt: weight of the spread; 0 for the answers as they are.
+    """
+    each, spread = answers_m.reshape(2, 3, 3), spread_m.reshape(2, 3, 3)
+    squares = np.sum(each * each, axis=2, keepdims=True)
+    doubts = doubt * np.sum(spread * spread, axis=2, keepdims=True)
+    gains = squares / (squares + doubts + _LEAST_M2)
+    shortened: FloatArray = (gains * each).reshape(2, 9)
+    return shortened
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -104,45 +143,71 @@ class NetworkCorrector:
         self._hidden = network.initial_hidden(2)
         self._deviations = load_network(DATA_OF_DEVIATIONS)
         self.features = self.result_features = np.empty((2, 0))
+        self._is_used = False
 
     def __call__(self, found: Result) -> FloatArray:
         """See :class:`~.corrector.Corrector`."""
-        self.features = np.concatenate(
-            [
-                _features_of(found),
-                features_of_search(found.search, self._cost, found.keypoints_m),
-                features_of_depth(found.frame, self._camera, found.keypoints_m)
-                if found.viewpoints.has_depth
-                else _NO_DEPTH,
-            ],
-            axis=1,
-        )
-        answers_m, self._hidden = self._network(self.features, self._hidden)
-        return moved(found.keypoints_m, answers_m)
+        self._is_used = not found.viewpoints.see_depth
+        if not self._is_used:
+            return found.keypoints_m
+        self.features = inputs_of(found, self._cost, self._camera)
+        answers_m, spread_m, self._hidden = self._network(self.features, self._hidden)
+        answers_m = limited(answers_m, spread_m)
+        if found.viewpoints.is_measured:
+            answers_m[:, MIDDLE_Z] = 0.0
+        return self._inside_outline(found, answers_m)
 
-    def deviations(self, corrected: Result) -> FloatArray:
+    def _inside_outline(self, found: Result, answers_m: FloatArray) -> FloatArray:
+        """Return the corrected keypoints, moved less if they would leave the silhouette."""
+        for share in _SHARES:
+            wanted_m = moved(found.keypoints_m, share * answers_m)
+            state = found.state.copy()
+            pose_at_keypoints(state, self._cost.body, wanted_m, self._cost.limits)
+            _, (differing_px,), (model_px,) = self._cost.bodies(state[None])
+            iou = iou_of(self._cost.silhouette_px, model_px, differing_px)
+            if iou >= found.iou - MOST_IOU_LOSS:
+                return wanted_m
+        return found.keypoints_m
+
+    def deviations(self, corrected: Result) -> FloatArray | None:
         """See :class:`~.corrector.Corrector`; the deviations of the angles are learned."""
-        self.result_features = _features_of(corrected)
+        if not self._is_used:
+            return None
+        self.result_features = features_of_result(corrected)
         stddev = corrected.stddev.copy()
         stddev[_ANGLES] = deviations_of(self._deviations, self.result_features[None])[0]
         return stddev
 
 
-def _features_of(result: Result) -> FloatArray:
-    """Return the features (2, F) of one result."""
+def inputs_of(found: Result, cost: WholeBodyCost, camera: Camera) -> FloatArray:
+    """Return the inputs of the network (2, F) for the left arm and the mirrored right arm."""
+    frame, keypoints_m = found.frame, found.keypoints_m
+    interval = np.full((2, 1), np.log2(max(frame.interval_s, _LEAST_S) / USUAL_INTERVAL_S))
+    return np.concatenate(
+        [
+            features_of_result(found),
+            features_of_search(found.search, cost, keypoints_m),
+            features_of_depth(frame, camera, keypoints_m)
+            if found.viewpoints.has_depth
+            else _NO_DEPTH,
+            features_of_points(frame.points, camera, keypoints_m),
+            interval,
+        ],
+        axis=1,
+    )
+
+
+def features_of_result(result: Result) -> FloatArray:
+    """Return the features (2, F) of one result, see :func:`~.result_features.features_of`."""
     state, stddev, keypoints_m = (
         one[None] for one in (result.state, result.stddev, result.keypoints_m)
     )
-    iou = np.array([result.iou])
-    both: FloatArray = features_of(state, stddev, keypoints_m, iou, result.viewpoints)[0]
+    iou, viewpoints = np.array([result.iou]), result.viewpoints.as_one()
+    both: FloatArray = features_of(state, stddev, keypoints_m, iou, viewpoints)[0]
     return both
 
 
 def learned(cost: WholeBodyCost, camera: Camera, cameras: int) -> NetworkCorrector:
-    """Return the package's corrector for a number of cameras."""
-    return NetworkCorrector(cost, camera, network_for(cameras))
-
-
-def network_for(cameras: int) -> RecurrentNetwork:
-    """Return the package's network for results of this number of cameras."""
-    return load_recurrent_network(DATA if cameras == 1 else DATA_OF_SEVERAL)
+    """Return the package's corrector; see :data:`~.corrector.MakeCorrector`."""
+    del cameras
+    return NetworkCorrector(cost, camera, load_recurrent_network(DATA))

@@ -22,7 +22,7 @@ def load_corrector(name: str) -> MakeCorrector | None:
     """Return the factory of the named corrector; None for ``none``.
 
     Args:
-        name: ``learned``, ``none``, the path of a network as ``tools/make_correction.py`` writes
+        name: ``learned``, ``none``, the path of a network as ``learning/correction.py`` writes
             it, or ``MODULE:FUNCTION``: a :data:`~.corrector.MakeCorrector` function in a Python
             module on the import path. The code of the module is executed, so it must be trusted.
 
@@ -39,7 +39,7 @@ def load_corrector(name: str) -> MakeCorrector | None:
         if sizes != (N_FEATURES, N_ANSWERS):
             raise CardboxError(
                 f"{name} is a network of {sizes[0]} features and {sizes[1]} answers; expected "
-                f"{N_FEATURES} and {N_ANSWERS}: one that tools/make_correction.py of this version "
+                f"{N_FEATURES} and {N_ANSWERS}: one that learning/correction.py of this version "
                 "has written"
             )
         return lambda cost, camera, _: NetworkCorrector(cost, camera, network)

@@ -2,7 +2,7 @@
 
 The spread of the particles measures the fit of other postures, not the errors of model, silhouette
 and correction. A small neural network, trained on rendered recordings with ground truth, predicts
-the size of the angles' errors from posture, spread and fit (``tools/make_deviations.py``; the data
+the size of the angles' errors from posture, spread and fit (``learning/deviations.py``; the data
 file names the recordings). Its outputs are logarithms of deviations, scaled so that 95 % of the
 errors of the recordings are below two deviations.
 """

@@ -6,12 +6,23 @@ from math import exp
 
 from cardbox_tracker.body.sizes import FloatArray
 
+_MOST_KEPT = 0.5
+"""Share of the last output that delays a ramp by one interval."""
+
+
+def kept_share(interval_s: float, time_constant_s: float) -> float:
+    """Return the share a of the last output, exp(-dt / time constant), at most a half."""
+    if time_constant_s == 0.0:
+        return 0.0
+    return min(exp(-max(interval_s, 0.0) / time_constant_s), _MOST_KEPT)
+
 
 class LowPass:
     """First-order low-pass filter (exponential smoothing) over time.
 
-    The output is y = a y_before + (1 - a) x with a = exp(-dt / time constant) for inputs x at
-    intervals dt. A ramp is delayed by dt a / (1 - a), slightly less than the time constant.
+    The output is y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2, for
+    inputs x at intervals dt. A ramp is delayed by dt a / (1 - a): slightly less than the time
+    constant, and never more than one interval.
     """
 
     def __init__(self, time_constant_s: float) -> None:
@@ -28,7 +39,7 @@ class LowPass:
         if self._time_constant_s == 0.0:
             return values
         if self._last is not None:
-            kept = exp(-max(interval_s, 0.0) / self._time_constant_s)
+            kept = kept_share(interval_s, self._time_constant_s)
             values = kept * self._last + (1.0 - kept) * values
         self._last = values
         return values

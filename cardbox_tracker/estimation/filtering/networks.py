@@ -22,7 +22,7 @@ Read = TypeVar("Read")
 
 # Limit of a file's size; the package's networks have 1 MB.
 _MOST_BYTES = 64 * 2**20
-_MADE_BY = "as tools/make_correction.py writes them"
+_MADE_BY = "as learning/correction.py writes them"
 
 
 class Network(NamedTuple):
@@ -91,8 +91,15 @@ class RecurrentNetwork(NamedTuple):
         weights = self.gru_hidden[0]
         return np.zeros((len(weights), rows, weights.shape[1]), weights.dtype)
 
-    def __call__(self, features: FloatArray, hidden: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the answers, (rows, A), to features (rows, F), and the next hidden state."""
+    def __call__(
+        self, features: FloatArray, hidden: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the answers to features (rows, F), and the next hidden state.
+
+        Returns:
+            Mean of the networks' answers, (rows, A); their standard deviation, (rows, A), which is
+            large for features unlike those of the training; the hidden state.
+        """
         nodes = hidden.shape[2]
         scaled = scaled_features(features, self.mean, self.scale, self.most)
         inputs = np.maximum(_linear(scaled.astype(hidden.dtype), self.input_layer), 0.0)
@@ -103,8 +110,8 @@ class RecurrentNetwork(NamedTuple):
         hidden = candidate + update * (hidden - candidate)
         first, last = self.output_layers
         both = np.concatenate([hidden, inputs], axis=2)
-        answers = _linear(np.maximum(_linear(both, first), 0.0), last)
-        return np.asarray(answers.mean(axis=0), np.float64) * self.unit, hidden
+        answers = np.asarray(_linear(np.maximum(_linear(both, first), 0.0), last), np.float64)
+        return answers.mean(axis=0) * self.unit, answers.std(axis=0) * self.unit, hidden
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -170,7 +177,7 @@ def _packaged(name: str, read: Callable[[Path], Read]) -> Read:
 
 
 def read_network(path: Path) -> Network:
-    """Return the network in a file written by ``tools/networks.py``."""
+    """Return the network in a file written by ``learning/networks.py``."""
     data = _arrays(path, np.float64)
     layers = sum(name.startswith("weights") for name in data)
     return Network(
@@ -184,7 +191,7 @@ def read_network(path: Path) -> Network:
 
 
 def read_recurrent_network(path: Path) -> RecurrentNetwork:
-    """Return the recurrent network in a file written by ``tools/networks.py``.
+    """Return the recurrent network in a file written by ``learning/networks.py``.
 
     Raises:
         CardboxError: the file cannot be read or is no such network; the text names the wrong array.

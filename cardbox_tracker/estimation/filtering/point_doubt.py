@@ -6,7 +6,7 @@ wrong by more than 20 cm is then a logistic regression of four features, fitted 
 people of whom only the stature was given.
 
 The coefficients come from an earlier fit to 3,600 images, which no command of the repository
-repeats. ``tools/make_point_doubt.py`` makes such a fit; its own coefficients for 1,861 images
+repeats. ``learning/point_doubt.py`` makes such a fit; its own coefficients for 1,861 images
 differ, and separate these images about as well (``docs/research/points.md``).
 """
 

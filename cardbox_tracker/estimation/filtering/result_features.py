@@ -24,6 +24,8 @@ STATE, STDDEV = 31, 31 + N_STATE
 IOU = STDDEV + N_STATE
 YAW_SIZE, PITCH, ASIDE, AHEAD, SLANTING, IS_MEASURED, HAS_DEPTH = range(IOU + 1, IOU + 8)
 FEATURES = HAS_DEPTH + 1
+# Largest mean squared sine of angles between directions that count as the same: 18 degrees of two.
+_SAME_DIRECTION = 0.05
 OF_CAMERAS = slice(ASIDE, FEATURES)
 """Columns that hardly change over time: directions of the cameras, and quality of the body."""
 
@@ -61,6 +63,15 @@ class Viewpoints(NamedTuple):
             sum(c * s for c, s in lines),
             is_measured,
         )
+
+    @property
+    def see_depth(self) -> bool:
+        """Whether the cameras look from so different directions that outlines show the depth."""
+        return self.ahead > _SAME_DIRECTION * (self.aside + self.ahead)
+
+    def as_one(self) -> Viewpoints:
+        """Return the viewpoint of the first camera alone."""
+        return self._replace(aside=1.0, ahead=0.0, slanting=0.0)
 
 
 def features_of(

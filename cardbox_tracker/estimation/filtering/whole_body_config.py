@@ -162,7 +162,7 @@ class WholeBodyConfig(Settings):
         "of the particles",
     )
     output_smoothing_s: float = restarting(
-        0.08,
+        0.04,
         "time constant of the low-pass filter on corrected results, and about their delay; 0: no "
         "filter",
         unit="s",

@@ -9,17 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.cost.terms import Frame
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.correction import (
     DATA,
-    DATA_OF_SEVERAL,
+    MIDDLE_Z,
+    NetworkCorrector,
     learned,
+    limited,
     moved,
-    network_for,
 )
 from cardbox_tracker.estimation.filtering.corrector import Result
 from cardbox_tracker.estimation.filtering.loss import Evidence
@@ -28,6 +30,7 @@ from cardbox_tracker.estimation.filtering.posing import SmoothedPosing
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.rasterisation import render
 
 STATE_LIMITS = state_limits(2.3)
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -39,8 +42,9 @@ ARMS = [1, 2, 4, 5]
 PARENTS = [0, 1, 3, 4]
 OTHER_ARM = [0, 1, 2, 3, 8, 9, 10, 11, 4, 5, 6, 7, 12, 13]
 MIRROR = np.array([-1, -1, 1, -1, *[1] * 10])
-VIEWPOINTS = Viewpoints.of(0.0, [0.0, 1.0], is_measured=True)
-MIRRORED = VIEWPOINTS._replace(slanting=-VIEWPOINTS.slanting)
+VIEWPOINTS = Viewpoints.of(0.0, [0.0], is_measured=True)
+# Nobody is in the silhouette of COST, so only results without overlap may be moved at will.
+NO_IOU = 0.0
 STATES = st.lists(st.floats(0.0, 1.0), min_size=14, max_size=14).map(
     lambda shares: STATE_LIMITS[:, 0] + np.array(shares) * np.ptp(STATE_LIMITS, axis=1)
 )
@@ -75,14 +79,14 @@ class Correction:
 
 
 def test_joints_and_turns_are_steadied(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(_: object, features: np.ndarray, hidden: object) -> tuple[np.ndarray, object]:
-        return np.zeros((2, 9)), hidden
+    def nothing(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
+        return np.zeros((2, 9)), np.zeros((2, 9)), hidden
 
     monkeypatch.setattr(RecurrentNetwork, "__call__", nothing)
     later = FRONT.copy()
     later[[0, 1, 4]] += 0.2, 0.1, 0.3
     frame = replace(NOBODY, interval_s=0.05)
-    for smoothing_s, kept in ((0.0, 0.0), (0.1, np.exp(-0.5))):
+    for smoothing_s, kept in ((0.0, 0.0), (0.05, np.exp(-1.0)), (0.1, 0.5)):
         correction = Correction(smoothing_s)
         for state in (FRONT, later):
             found = correction(frame, state, STDDEV, 0.9, search(state), VIEWPOINTS)
@@ -134,8 +138,8 @@ def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
         state = FRONT + 0.1 * rng.standard_normal(14)
         other = MIRROR * state[OTHER_ARM]
         mirrored = search(state)._replace(states=MIRROR * search(state).states[:, OTHER_ARM])
-        found = here(NOBODY, state, STDDEV, 0.8, search(state), VIEWPOINTS)
-        found_there = there(NOBODY, other, STDDEV, 0.8, mirrored, MIRRORED)
+        found = here(NOBODY, state, STDDEV, NO_IOU, search(state), VIEWPOINTS)
+        found_there = there(NOBODY, other, STDDEV, NO_IOU, mirrored, VIEWPOINTS)
         assert np.allclose(MIRROR * found[OTHER_ARM], found_there, atol=1e-4)
 
 
@@ -145,38 +149,72 @@ def test_results_come_near_what_the_network_says() -> None:
     # Where a joint is at its limit, such as a straight elbow, it cannot go on.
     state[[7, 11]] = 0.6
     correction = Correction()
-    found = COST.keypoints(correction(NOBODY, state, STDDEV, 0.9, search(state), VIEWPOINTS))
+    found = COST.keypoints(correction(NOBODY, state, STDDEV, NO_IOU, search(state), VIEWPOINTS))
     network = load_recurrent_network(DATA)
-    answers_m, _ = network(correction.corrector.features, network.initial_hidden(2))
+    answers_m, spread_m, _ = network(correction.corrector.features, network.initial_hidden(2))
     points = COST.keypoints(state)
+    answers_m = limited(answers_m, spread_m)
+    # The distance of a measured person is kept.
+    answers_m[:, MIDDLE_Z] = 0.0
     wanted = moved(points, answers_m)
     off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
     assert off < 0.5 * before
 
 
-def test_several_cameras_have_a_network_of_their_own() -> None:
-    assert network_for(1) is load_recurrent_network(DATA)
-    assert network_for(2) is network_for(4) is load_recurrent_network(DATA_OF_SEVERAL)
-    one, two = (
-        Correction(cameras=cameras)(*(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), VIEWPOINTS))
-        for cameras in (1, 2)
-    )
-    assert not np.allclose(one, two)
+def test_displacements_vanish_where_the_networks_differ() -> None:
+    answers = np.zeros((2, 9))
+    answers[0, :3] = 0.03, 0.0, 0.04
+    answers[1, 6:] = 0.1
+    assert np.allclose(limited(answers, np.zeros((2, 9))), answers)
+    spread = np.zeros((2, 9))
+    spread[0, 1] = 0.05
+    spread[1, 6:] = 1.0
+    found = limited(answers, spread)
+    # A spread as large as the displacement halves it.
+    assert found[0, :3] == pytest.approx([0.015, 0.0, 0.02])
+    assert np.abs(found[1, 6:]).max() < 0.1 / 90
+    assert np.allclose(limited(answers, spread, doubt=0.0), answers)
+
+
+def test_a_correction_that_leaves_the_silhouette_is_not_made() -> None:
+    body = BodyModel.of(distance_m=2.3)
+    cost = WholeBodyCost(body, CAMERA, WholeBodyCostConfig())
+    cost.see(render(cardbox_patches(body, FRONT[:12]), CAMERA), FRONT)
+    _, (differing,), (drawn,) = cost.bodies(FRONT[None])
+    iou = iou_of(cost.silhouette_px, drawn, differing)
+    assert iou > 0.8
+    network = load_recurrent_network(DATA)
+
+    def far(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
+        answers = np.zeros((2, 9))
+        answers[:, 0] = [0.8, -0.8]
+        return answers, np.zeros((2, 9)), hidden
+
+    points = cost.keypoints(FRONT)
+    found = Result(NOBODY, FRONT, STDDEV, points, iou, search(FRONT), VIEWPOINTS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RecurrentNetwork, "__call__", far)
+        corrector = NetworkCorrector(cost, CAMERA, network)
+        assert np.array_equal(corrector(found), points)
+        # Without a fit there is nothing to lose.
+        assert not np.allclose(corrector(found._replace(iou=0.0)), points)
+
+
+@pytest.mark.parametrize(("yaw_deg", "is_moved"), [(0.0, True), (10.0, True), (60.0, False)])
+def test_cameras_that_show_depth_are_not_corrected(yaw_deg: float, is_moved: bool) -> None:
+    viewpoints = Viewpoints.of(0.0, [0.0, np.radians(yaw_deg)], True)
+    points = COST.keypoints(FRONT)
+    found = Result(NOBODY, FRONT, STDDEV, points, NO_IOU, search(FRONT), viewpoints)
+    corrector = learned(COST, CAMERA, 2)
+    assert np.allclose(corrector(found), points) != is_moved
+    assert (corrector.deviations(found) is not None) == is_moved
 
 
 def test_what_was_before_counts() -> None:
     first, second = FRONT, np.append(reference_posture("arms"), [0.0, 0.0])
-    alone = Correction()(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS)
+    alone = Correction()(NOBODY, second, STDDEV, NO_IOU, search(second), VIEWPOINTS)
     correction = Correction()
-    correction(NOBODY, first, STDDEV, 0.5, search(first), VIEWPOINTS)
+    correction(NOBODY, first, STDDEV, NO_IOU, search(first), VIEWPOINTS)
     assert not np.allclose(
-        correction(NOBODY, second, STDDEV, 0.9, search(second), VIEWPOINTS), alone
+        correction(NOBODY, second, STDDEV, NO_IOU, search(second), VIEWPOINTS), alone
     )
-
-
-def test_cameras_that_show_depth_count() -> None:
-    several, one = (
-        Correction()(NOBODY, FRONT, STDDEV, 0.9, search(FRONT), Viewpoints.of(0.0, yaws, True))
-        for yaws in ([0.0, 1.2], [0.0])
-    )
-    assert not np.allclose(several, one)

@@ -14,7 +14,12 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation import filtering
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering.correction import DATA, NetworkCorrector, learned
+from cardbox_tracker.estimation.filtering.correction import (
+    DATA,
+    N_FEATURES,
+    NetworkCorrector,
+    learned,
+)
 from cardbox_tracker.estimation.filtering.corrector_loading import load_corrector
 from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
 from cardbox_tracker.vision.camera import Camera
@@ -50,8 +55,8 @@ def test_a_networks_file_is_used(tmp_path: Path) -> None:
     assert isinstance(corrector, NetworkCorrector)
     usual = load_recurrent_network(DATA)
     features = np.zeros((2, len(usual.mean)))
-    answers, _ = corrector._network(features, usual.initial_hidden(2))
-    expected, _ = usual(features, usual.initial_hidden(2))
+    answers, *_ = corrector._network(features, usual.initial_hidden(2))
+    expected, *_ = usual(features, usual.initial_hidden(2))
     np.testing.assert_allclose(answers, expected + usual.unit, rtol=1e-5)
 
 
@@ -67,12 +72,12 @@ def of_shape(name: str, shape: tuple[int, ...]) -> Change:
     ("change", "words"),
     [
         (without("weights3"), ["weights3"]),
-        (of_shape("weights3", (2, 352, 7)), ["weights4", "(2, 7, 9)"]),
-        (of_shape("weights2", (2, 100, 480)), ["weights1", "300"]),
+        (of_shape("weights3", (3, 288, 7)), ["weights4", "(3, 7, 9)"]),
+        (of_shape("weights2", (3, 100, 384)), ["weights1", "300"]),
         (of_shape("weights0", (111, 192)), ["three axes"]),
-        (of_shape("mean", (110,)), ["mean", "(111,)"]),
+        (of_shape("mean", (110,)), ["mean", f"({N_FEATURES},)"]),
         (of_shape("most", (3,)), ["network"]),
-        (of_shape("scale", (111,)), ["scale"]),
+        (of_shape("scale", (N_FEATURES,)), ["scale"]),
         (lambda stored: stored | {"unit": np.full(9, np.nan)}, ["unit", "finite"]),
         (lambda stored: stored | {"mean": np.array([None])}, ["no network"]),
         (lambda stored: {"huge": np.zeros(2**24)}, ["MB"]),
@@ -93,7 +98,9 @@ def test_a_network_of_other_features_is_refused(tmp_path: Path) -> None:
     stored |= {name: stored[name][:50] for name in ("mean", "scale")}
     stored["weights0"] = stored["weights0"][:, :50]
     np.savez(tmp_path / "network.npz", **stored)
-    with pytest.raises(CardboxError, match="50 features and 9 answers; expected 111 and 9"):
+    with pytest.raises(
+        CardboxError, match=f"50 features and 9 answers; expected {N_FEATURES} and 9"
+    ):
         load_corrector(f"{tmp_path / 'network.npz'}")
 
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.estimation.filtering.low_pass import LowPass
+from cardbox_tracker.estimation.filtering.low_pass import LowPass, kept_share
 
 
 def test_a_step() -> None:
     low_pass = LowPass(0.1)
-    assert low_pass(np.array([0.0, 2.0]), 0.05).tolist() == [0.0, 2.0]
-    kept = exp(-0.5)
-    assert low_pass(np.array([1.0, 2.0]), 0.05) == pytest.approx([1.0 - kept, 2.0])
+    assert low_pass(np.array([0.0, 2.0]), 0.08).tolist() == [0.0, 2.0]
+    kept = exp(-0.8)
+    assert low_pass(np.array([1.0, 2.0]), 0.08) == pytest.approx([1.0 - kept, 2.0])
     # As long after as the time constant is, 1/e of the difference is left.
     assert low_pass(np.array([1.0, 2.0]), 0.1) == pytest.approx([1.0 - kept * exp(-1.0), 2.0])
 
@@ -44,7 +44,38 @@ def test_an_even_change_comes_later_by_what_the_docstring_says(
     frames = 1 + round(30 * time_constant_s / interval_s)
     for i in range(frames):
         found = low_pass(np.array([pace * interval_s * i]), interval_s)
-    kept = exp(-interval_s / time_constant_s)
+    kept = min(exp(-interval_s / time_constant_s), 0.5)
     late_s = interval_s * kept / (1.0 - kept)
     assert found[0] == pytest.approx(pace * (interval_s * (frames - 1) - late_s), abs=1e-6)
-    assert late_s <= time_constant_s
+    assert late_s <= min(time_constant_s, interval_s) + 1e-12
+
+
+def test_a_half_is_kept_at_most() -> None:
+    low_pass = LowPass(0.1)
+    # exp(-0.5) would be 0.61.
+    found = [low_pass(np.array([value]), 0.05)[0] for value in (0.0, 1.0, 1.0, 1.0)]
+    assert found == [0.0, 0.5, 0.75, 0.875]
+
+
+@given(interval_s=st.floats(-0.1, 10.0), time_constant_s=st.floats(0.0, 10.0))
+def test_the_kept_share_is_never_more_than_a_half(
+    interval_s: float, time_constant_s: float
+) -> None:
+    share = kept_share(interval_s, time_constant_s)
+    assert 0.0 <= share <= 0.5
+    assert kept_share(interval_s + 0.01, time_constant_s) <= share
+
+
+@given(
+    rate=st.sampled_from([15.0, 30.0, 60.0]),
+    time_constant_s=st.floats(0.0, 1.0),
+    pace=st.floats(0.01, 3.0),
+)
+def test_a_ramp_is_at_most_one_interval_late(
+    rate: float, time_constant_s: float, pace: float
+) -> None:
+    low_pass = LowPass(time_constant_s)
+    ramp = pace * np.arange(60) / rate
+    found = np.array([low_pass(np.array([value]), 1.0 / rate)[0] for value in ramp])
+    late_s = (ramp - found) / pace
+    assert (late_s >= -1e-9).all() and (late_s <= 1.0 / rate + 1e-9).all()

@@ -61,10 +61,11 @@ def test_the_hidden_state_by_hand() -> None:
         (only_hidden, (ones, nothing)),
         np.array([10.0]),
     )
-    answers, hidden = network(np.array([[0.5]]), network.initial_hidden(1))
+    answers, spread, hidden = network(np.array([[0.5]]), network.initial_hidden(1))
+    assert spread == pytest.approx(0.0)
     first = 0.5 * np.tanh(0.5)
     assert hidden == pytest.approx(first) and answers == pytest.approx(10.0 * first)
-    answers, hidden = network(np.array([[0.5]]), hidden)
+    answers, _, hidden = network(np.array([[0.5]]), hidden)
     second = 0.5 * np.tanh(0.5 + 0.5 * first) + 0.5 * first
     assert hidden == pytest.approx(second) and answers == pytest.approx(10.0 * second)
 
@@ -76,8 +77,8 @@ def test_rows_and_networks_do_not_mix() -> None:
     hidden = network.initial_hidden(5)
     alone = network.initial_hidden(1)
     for row in features:
-        answers, hidden = network(row, hidden)
-        one, alone = network(row[2:3], alone)
+        answers, _, hidden = network(row, hidden)
+        one, _, alone = network(row[2:3], alone)
     assert np.allclose(answers[2], one[0])
     singles = []
     for i in (0, 1):
@@ -90,7 +91,7 @@ def test_rows_and_networks_do_not_mix() -> None:
         )
         hidden = single.initial_hidden(5)
         for row in features:
-            found, hidden = single(row, hidden)
+            found, _, hidden = single(row, hidden)
         singles.append(found)
     assert np.allclose(answers, np.mean(singles, axis=0))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from cardbox_tracker.estimation.filtering.result_features import FEATURES
-from tools import make_deviations as tool
-from tools import networks
+from learning import deviations as tool
+from learning import networks
 
 
 def session(seed: int, images: int = 2000) -> tool.Errors:
@@ -49,3 +51,22 @@ def test_particles_deviations_are_judged_beside_the_learned_ones() -> None:
     )
     # The particles' deviation of one of eleven angles is too small.
     assert tool.check(nothing, errors) == pytest.approx((1000 / 11, 0.0, 100.0, 100.0))
+
+
+def test_errors_are_those_of_the_angles_where_the_truth_is_known(make_samples: Any) -> None:
+    one = make_samples(5)
+    # The arms hang along the torso, so all angles are 0.
+    one.states[:, 1:12] = 0.0
+    one.states[3, 3] = 0.2
+    # The left forearm comes forward by a right angle, seen by a level camera.
+    one.true_m[4, 2] = one.true_m[4, 1] + (0.0, 0.0, -0.3)
+    one.true_m[0, 0, 0] = one.torso_rad[1, 0] = np.nan
+    one.stddevs[:] = np.arange(14)
+    level = type(one)(**{**vars(one), "pitch_rad": np.array(0.0)})
+    found = tool.errors_of(level)
+    np.testing.assert_array_equal(found.features, one.result_features[2:])
+    assert found.errors_rad[0] == pytest.approx(np.zeros(11), abs=1e-6)
+    # d4 is the yaw of the torso, so it is the third of the angles without d1.
+    assert found.errors_rad[1] == pytest.approx(np.eye(11)[2] * 0.2, abs=1e-6)
+    assert np.sort(found.errors_rad[2])[-1] == pytest.approx(np.pi / 2)
+    np.testing.assert_array_equal(found.stddevs_rad[0], np.arange(1.0, 12.0))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make the learned pose prior of the arms from free motion capture.
 
-    python tools/make_pose_prior.py FOLDER...
+    python learning/pose_prior.py FOLDER...
         --output cardbox_tracker/estimation/cost/pose_prior.json
         [--exclude NAME...] [--components 16] [--seed 0]
 
@@ -79,7 +79,7 @@ PLAIN_SAMPLES = 3000
 VARIANCE = 0.02
 SOURCE = (
     "CMU Graphics Lab Motion Capture Database, mocap.cs.cmu.edu, created with funding from NSF "
-    "EIA-0196217; BVH conversion by B. Hahne (cgspeed.com); see tools/make_pose_prior.py"
+    "EIA-0196217; BVH conversion by B. Hahne (cgspeed.com); see learning/pose_prior.py"
 )
 
 JOINTS = {

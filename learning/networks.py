@@ -5,14 +5,11 @@ This needs PyTorch: ``pip install '.[learn]'``.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,15 +35,11 @@ RATE, DECAY, BATCH = 1e-3, 1e-3, 256
 
 
 class Images(Protocol):
-    """The images of a session, as the tools keep them."""
+    """The images of a recording."""
 
     @property
     def features(self) -> FloatArray:
         """Inputs of the networks, (n, 2, F)."""
-
-
-OfSession = TypeVar("OfSession", bound=Images)
-AnyNetwork = TypeVar("AnyNetwork", Network, RecurrentNetwork)
 
 
 @dataclass(frozen=True)
@@ -123,6 +116,7 @@ def _learned(
     import torch
     from torch import nn
 
+    torch.set_num_threads(1)
     torch.manual_seed(seed)
     nodes = (features.shape[1], *shape.layers, answers.shape[1])
     linear = [nn.Linear(*pair) for pair in pairwise(nodes)]
@@ -169,66 +163,3 @@ def save(network: Network | RecurrentNetwork, path: Path, about: str) -> None:
     }
     with atomic_path(path) as temporary:
         np.savez_compressed(temporary, allow_pickle=False, **packed)
-
-
-def show(folders: Sequence[Path], rows: Sequence[Sequence[float]]) -> None:
-    """Print the figures of sessions, and their means."""
-    for folder, row in zip(folders, rows, strict=True):
-        print(folder.name, *(f"{value:.1f}" for value in row))
-    print("mean", *(f"{value:.2f}" for value in np.mean(rows, axis=0)))
-
-
-def run(
-    args: Sequence[str] | None,
-    description: str | None,
-    track: Callable[..., OfSession],
-    learn_from: Callable[..., AnyNetwork],
-    check: Callable[[AnyNetwork, OfSession], Sequence[float]],
-    adjust: Callable[[AnyNetwork, Sequence[OfSession]], AnyNetwork] | None = None,
-    read: Callable[[Path], AnyNetwork] | None = None,
-) -> int:
-    """Run one of the tools: track all sessions, train on some, check the others, write.
-
-    Args:
-        args: of the command line; None: those of the process.
-        description: of the tool.
-        track: takes a session's folder and ``seed`` and returns its images; it runs in worker
-            processes.
-        learn_from: takes sessions, the seed of the training and, with ``read``, the network to
-            begin with; returns the trained network.
-        check: returns the figures of a session outside the training data.
-        adjust: takes the trained network and the sessions after ``--fresh``; returns the network
-            to write.
-        read: reads the file after ``--go-on``.
-    """
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
-    parser.add_argument("--check", nargs="*", type=Path, default=[], metavar="SESSION")
-    if adjust is not None:
-        parser.add_argument("--fresh", nargs="+", type=Path, required=True, metavar="SESSION")
-    if read is not None:
-        parser.add_argument("--go-on", type=Path, metavar="FILE", help="networks to begin with")
-    parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--about", default="", help="origin of the sessions, stored in the file")
-    parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument("--seeds", type=int, default=1, help="runs of each session")
-    parser.add_argument("--jobs", type=int, default=1)
-    given = parser.parse_args(args)
-    with ProcessPoolExecutor(given.jobs) as pool:
-        learned: list[OfSession] = []
-        for seed in range(given.seeds):
-            learned += pool.map(partial(track, seed=seed), given.sessions)
-        fresh = list(pool.map(partial(track, seed=0), given.fresh)) if adjust else []
-        others = list(pool.map(partial(track, seed=0), given.check))
-    begin = [read(given.go_on)] if read is not None and given.go_on is not None else []
-    network = learn_from(learned, given.seed, *begin)
-    if adjust is not None:
-        network = adjust(network, fresh)
-    if others:
-        show(given.check, [check(network, one) for one in others])
-    images = sum(len(one.features) for one in learned)
-    what = f"{images} images of {len(given.sessions)} sessions, {given.seeds} seeds"
-    about = f"{given.about} {what}".strip()
-    save(network, given.output, about)
-    print(f"written: {given.output}")
-    return 0

@@ -15,9 +15,9 @@ from cardbox_tracker.body.model import PROPORTIONS
 from cardbox_tracker.estimation.filtering import point_doubt
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.truth import GroundTruth
-from tools import make_point_doubt as tool
-from tools.logistic import chances
-from tools.make_point_doubt import SHIPPED, Frames, fitted, kept, report, together
+from learning import point_doubt as tool
+from learning.logistic import chances
+from learning.point_doubt import SHIPPED, Frames, fitted, kept, report, together
 
 TRUE = np.array([-1.0, 4.0, -2.0, 20.0, 0.5])
 SCALE = np.array([0.3, 1.0, 0.1, 3.0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,8 @@ from cardbox_tracker.estimation.filtering.loss import (
     chance_of_loss,
     features_of_loss,
 )
-from tools.logistic import chances
-from tools.make_loss import SHIPPED, Frames, fitted, quality, report, together
+from learning.logistic import chances
+from learning.loss import SHIPPED, Frames, fitted, frames_of, quality, report, together
 
 TRUE = np.array([-1.0, *np.linspace(-2.0, 2.0, len(COEFFICIENTS))])
 
@@ -68,3 +70,17 @@ def test_without_wrong_frames_there_is_no_fit() -> None:
     right = together([frames(100, 5)])._replace(is_wrong=np.zeros(100, bool))
     with pytest.raises(ValueError, match="class"):
         report([right])
+
+
+def test_frames_without_truth_are_left_out_and_the_corrected_results_count(
+    make_samples: Any,
+) -> None:
+    one = make_samples(4)
+    one.true_m[0, 5] = np.nan
+    one.result_m[:] = one.true_m
+    # A mean of 31 cm is wrong, one of 29 cm is right.
+    one.result_m[2, :, 2] += 0.31
+    one.result_m[3, :, 2] += 0.29
+    found = frames_of(one)
+    assert found.is_wrong.tolist() == [False, True, False]
+    np.testing.assert_array_equal(found.features, one.evidence[1:])

@@ -1,6 +1,6 @@
 """Fit the coefficients of the doubt about a detector's points to sessions with ground truth.
 
-python -m tools.make_point_doubt SESSION... [--most N] [--jobs N] [--inverse-penalty C]
+python -m learning.point_doubt SESSION... [--most N] [--jobs N] [--inverse-penalty C]
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. Its first camera tracks with the
 preset ``default`` and the points of the installed detector (``cardbox detector --install``). The
@@ -37,9 +37,9 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.filtering import point_doubt
 from cardbox_tracker.estimation.tracker import Tracker
-from tools import logistic
+from learning import logistic
+from learning.logistic import chances
 from tools.detected_sessions import first_camera_of, motions, opened, source_of, source_weights
-from tools.logistic import chances
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
