@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -27,7 +28,14 @@ BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"
 RESULTS = Path("docs/evaluation")
 ACCURACY, SESSIONS_REPORT, PEOPLE = "accuracy.json", "sessions.md", "real-people.json"
+LEFT_OUT = "left-out.json"
 BENCHMARKS = Path("docs/benchmarks.json")
+# People and what was left out, by the source in left-out.json.
+_LEFT_OUT = {
+    "rocketbox": ("simulated, dressed avatars, all kinds of motion", "body"),
+    "makehuman": ("simulated, MakeHuman's bodies, all kinds of motion", "body"),
+    "cmu-1": ("simulated, motion capture of five subjects", "motion"),
+}
 
 
 def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[str, Any]]) -> str:
@@ -115,14 +123,40 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
     return "\n".join(lines)
 
 
+def left_out_rows(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows as ``accuracy.json`` has them, of ``left-out.json``."""
+    rows = []
+    for source, (people, left_out) in _LEFT_OUT.items():
+        (found,) = (
+            row for row in results if (row["left_out"], row["people"]) == (source, "measured")
+        )
+        rows.append(
+            {
+                "people": f"{people} ({found['recordings']} recordings)",
+                "cameras": "one",
+                "left_out": left_out,
+                "aligned": found["aligned"][1],
+                "mediapipe": None,
+                "absolute": found["absolute"][1],
+                "without_correction": [found["aligned"][0], found["absolute"][0]],
+                "source": "[left out](docs/evaluation/left-out.md)",
+            }
+        )
+    return rows
+
+
 def current(root: Path) -> str:
     """Return the text of the README in ``root`` with current figures."""
     folder = root / RESULTS
     section = readme_section(read_json(folder / "results.json"), recorded_results(folder))
     text = replaced((root / "README.md").read_text(encoding="utf-8"), section, BEGIN, END)
     more = read_json(folder / ACCURACY)
-    people = people_rows(read_json(folder / PEOPLE), more["mediapipe"])
-    sessions = sessions_section(read_json(folder / "sessions.json"), [*people, *more["rows"]])
+    rows = [
+        *people_rows(read_json(folder / PEOPLE), more["mediapipe"]),
+        *left_out_rows(json.loads((folder / LEFT_OUT).read_text(encoding="utf-8"))),
+        *more["rows"],
+    ]
+    sessions = sessions_section(read_json(folder / "sessions.json"), rows)
     text = replaced(text, sessions, SESSIONS_BEGIN, SESSIONS_END)
     speed = benchmark_report.readme_section(read_json(root / BENCHMARKS))
     return replaced(text, speed, benchmark_report.BEGIN, benchmark_report.END)
