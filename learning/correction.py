@@ -12,12 +12,10 @@ correction and with it. PyTorch is needed: ``pip install '.[learn]'``.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +38,7 @@ from cardbox_tracker.estimation.filtering.networks import (
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from learning import networks
-from learning.command_line import run
+from learning.command_line import run, training_arguments
 from learning.samples import Samples, grouped, load_all, split
 
 FloatArray = NDArray[np.float64]
@@ -301,13 +299,8 @@ def check(network: RecurrentNetwork, samples: Samples) -> tuple[float, ...]:
 
 def main(args: list[str] | None = None) -> int:
     """Train, check, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("samples", nargs="+", type=Path)
-    parser.add_argument("--check", nargs="*", type=Path, default=[])
-    parser.add_argument("--leave-out", metavar="SOURCE")
-    parser.add_argument("--output", type=Path, required=True)
+    parser = training_arguments(__doc__)
     parser.add_argument("--epochs", type=int, default=EPOCHS)
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
     samples, others = load_all(given.samples), load_all(given.check)

@@ -16,10 +16,8 @@ particles' deviations and with the learned ones. PyTorch is needed: ``pip instal
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +29,7 @@ from cardbox_tracker.estimation.filtering.networks import Network
 from cardbox_tracker.evaluation.metrics import angle_errors_deg
 from cardbox_tracker.evaluation.recorded.angles import joint_angles
 from learning import networks
-from learning.command_line import run
+from learning.command_line import run, training_arguments
 from learning.samples import Samples, grouped, load_all, split
 
 FloatArray = NDArray[np.float64]
@@ -101,12 +99,7 @@ def check(network: Network, errors: Errors) -> tuple[float, float, float, float]
 
 def main(args: list[str] | None = None) -> int:
     """Train, scale, check, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("samples", nargs="+", type=Path)
-    parser.add_argument("--check", nargs="*", type=Path, default=[])
-    parser.add_argument("--leave-out", metavar="SOURCE")
-    parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--seed", type=int, default=0)
+    parser = training_arguments(__doc__)
     given = parser.parse_args(args)
     samples, others = load_all(given.samples), load_all(given.check)
     if given.leave_out:

@@ -132,7 +132,6 @@ def load(path: Path) -> Samples:
         with open(path, "rb") as file, np.load(file) as stored:
             arrays = {name: stored[name] for name in stored.files}
         origin = Origin(**json.loads(str(arrays.pop("origin"))))
-        arrays.setdefault("result_m", arrays["found_m"])
         return Samples(origin, **arrays)
     except (OSError, EOFError, BadZipFile, ValueError, TypeError, KeyError) as error:
         raise CardboxError(
