@@ -140,8 +140,18 @@ def load(path: Path) -> Samples:
 
 
 def load_all(folders: Sequence[Path]) -> list[Samples]:
-    """Return the samples in all files of some folders, by name."""
-    return [load(path) for folder in folders for path in sorted(folder.glob("*.npz"))]
+    """Return the samples in all files of some folders, by name.
+
+    Raises:
+        CardboxError: a folder has no samples.
+    """
+    files = {folder: sorted(folder.glob("*.npz")) for folder in folders}
+    for folder, paths in files.items():
+        if not paths:
+            raise CardboxError(
+                f"{folder} has no samples (.npz); make some with python -m learning.simulate"
+            )
+    return [load(path) for paths in files.values() for path in paths]
 
 
 def split(samples: Iterable[Samples], left_out: str) -> tuple[list[Samples], list[Samples]]:

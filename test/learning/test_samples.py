@@ -120,3 +120,8 @@ def test_sources_without_samples_and_without_others(
     other = replace(one, origin=replace(one.origin, source="scripted"))
     with pytest.raises(CardboxError, match=counts):
         split([one, other], text)
+
+
+def test_a_folder_without_samples_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match=r"has no samples .* learning\.simulate"):
+        load_all([tmp_path])
