@@ -44,6 +44,13 @@ EXERCISES: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ..
     "high": ((-0.03, 0.10, 0.25), (0.06, 0.50, 0.66), (0.0, 1.0, -0.4)),
     "waving": ((-0.03, 0.20, 0.05), (0.10, 0.45, 0.45), (0.0, 0.8, -0.8)),
 }
+# Places of everyday gestures that the others lack.
+GESTURES: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
+    "apart": ((0.25, -0.10, -0.25), (0.50, 0.15, 0.00), (-0.3, 0.7, -0.8)),
+    "together": ((0.25, -0.24, -0.25), (0.50, -0.19, 0.00), (-0.3, 0.7, -0.8)),
+    "folded": ((0.10, -0.40, -0.36), (0.20, -0.25, -0.20), (-0.1, 0.6, -1.0)),
+    "swung": ((0.15, 0.02, -0.65), (0.40, 0.12, -0.45), (-1.0, 0.3, 0.0)),
+}
 SHARES = {"hanging": 2.0, "before the body": 3.0, "near the chest": 1.5, "forward": 1.5}
 POLE_SPREAD = 0.35
 # The trunk is an elliptic cylinder and the head a ball, both as seen from the left shoulder.
@@ -119,7 +126,7 @@ def is_way_free(start: Arm, end: Arm) -> bool:
 
 def drawn(kind: str, start: Arm, rng: np.random.Generator) -> Arm:
     """Return a random arm of a kind that ``start`` can reach; ``start`` itself if none is found."""
-    low, high, pole = (KINDS | EXERCISES)[kind]
+    low, high, pole = (KINDS | EXERCISES | GESTURES)[kind]
     for _ in range(TRIES):
         arm = reaching(rng.uniform(low, high), unit(pole) + POLE_SPREAD * rng.normal(size=3))
         if is_way_free(start, arm):

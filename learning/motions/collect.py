@@ -1,13 +1,13 @@
 """Collect motions from folders of motion capture into compact files, one per clip.
 
     python -m learning.motions.collect FOLDER... --output FOLDER [--scripted MINUTES]
-                                       [--exercises MINUTES] [--seed 0]
+                                       [--exercises MINUTES] [--gestures MINUTES] [--seed 0]
 
 The folders are searched for ``.bvh``, ``.amc`` (with its ``.asf``) and ``.txt`` files; see
 learning.motions.readers. Sources are named so that people can be left out: "cmu-13" is subject 13
-of the CMU database, "cmu_text-basketball" a kind of motion by people who are not named, "scripted"
-and "exercise" contain no capture. Clips that the recorded sessions contain, and copies of one clip,
-are left out.
+of the CMU database, "cmu_text-basketball" a kind of motion by people who are not named, "scripted",
+"exercise" and "gesture" contain no capture. Clips that the recorded sessions contain, and copies of
+one clip, are left out.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from __future__ import annotations
 import argparse
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from learning.motions.capture import to_motion
 from learning.motions.figure import hands_in_chest
+from learning.motions.gestures import gestures
 from learning.motions.motion import Motion
 from learning.motions.readers import read
 from learning.motions.scripted import scripted
@@ -140,6 +142,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--scripted", type=float, default=0.0, metavar="MINUTES")
     parser.add_argument("--exercises", type=float, default=0.0, metavar="MINUTES")
+    parser.add_argument("--gestures", type=float, default=0.0, metavar="MINUTES")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args(words)
     args.output.mkdir(parents=True, exist_ok=True)
@@ -152,10 +155,15 @@ def main(words: Sequence[str] | None = None) -> None:
 
     for motion in without_copies(captured(args.folders)):
         keep(with_wrists(motion, rng) if has_stiff_wrists(motion) else motion)
-    for minutes, is_exercise in ((args.scripted, False), (args.exercises, True)):
+    kinds: tuple[tuple[float, Callable[..., Motion]], ...] = (
+        (args.scripted, scripted),
+        (args.exercises, partial(scripted, is_exercise=True)),
+        (args.gestures, gestures),
+    )
+    for kind, (minutes, draw) in enumerate(kinds):
         for number in range(round(60 * minutes / CLIP_S)):
-            chance = np.random.default_rng((args.seed, number, int(is_exercise)))
-            keep(scripted(f"{number:04d}", CLIP_S, chance, is_exercise))
+            chance = np.random.default_rng((args.seed, number, kind))
+            keep(draw(f"{number:04d}", CLIP_S, chance))
     print(report(by_source))
 
 

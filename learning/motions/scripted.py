@@ -131,11 +131,16 @@ def scripted(
         postures += [following, following]
         arrival = times[-1] + rng.uniform(*MOVE_S)
         times += [arrival, arrival + rng.choice([0.0, 1.0]) * rng.uniform(*HOLD_S)]
+    motion = timed(name, postures, times, duration_s)
+    return replace(motion, source="exercise") if is_exercise else motion
+
+
+def timed(name: str, postures: list[Posture], times: list[float], duration_s: float) -> Motion:
+    """Return the motion that takes postures at times, s, with movements of least jerk between."""
     at = np.arange(round(duration_s * FPS)) / FPS
     low = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
     share = (at - np.take(times, low)) / np.maximum(np.diff(times)[low], 1e-9)
-    motion = performed(name, postures, low, eased(share))
-    return replace(motion, source="exercise") if is_exercise else motion
+    return performed(name, postures, low, eased(share))
 
 
 def eased(share: NDArray[np.float64]) -> FloatArray:

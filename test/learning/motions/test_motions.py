@@ -10,6 +10,7 @@ from learning.motions.acclaim import read_amc
 from learning.motions.capture import to_motion
 from learning.motions.collect import is_copy, main, named
 from learning.motions.figure import ends, figures, hands_in_chest
+from learning.motions.gestures import gestures
 from learning.motions.motion import Motion, load
 from learning.motions.rotations import about_axis, between, from_quaternions, to_quaternions
 from learning.motions.scripted import scripted
@@ -231,3 +232,16 @@ def test_arms_of_exercises_stay_in_the_frontal_plane() -> None:
     # Forward of the shoulders, in lengths of the leg; ways between postures may leave the plane.
     assert np.median(np.abs(hands[:, :, 0])) < 0.12
     assert np.abs(motion.headings_rad()).max() < np.radians(25)
+
+
+def test_a_person_who_gestures_faces_the_camera_and_uses_one_arm_or_both() -> None:
+    motions = [gestures(str(seed), 20.0, np.random.default_rng(seed)) for seed in range(20)]
+    assert {motion.source for motion in motions} == {"gesture"}
+    assert all(len(motion) == 600 for motion in motions)
+    hands = np.concatenate([hands_in_chest(motion) for motion in motions])
+    # Hands are before the shoulders most of the time, and often one alone is raised.
+    assert 0.6 < np.mean(hands[:, :, 0] > 0.0) < 0.98
+    is_raised = hands[:, :, 2] > -0.4
+    assert np.mean(is_raised[:, 0] != is_raised[:, 1]) > 0.1
+    turned = np.concatenate([np.abs(motion.headings_rad()) for motion in motions])
+    assert np.mean(turned < np.radians(20)) > 0.7
