@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.estimate import Estimate, KeypointState
 from cardbox_tracker.estimation.tracker import Tracker
 
 
@@ -47,7 +48,15 @@ class Text(NamedTuple):
     text: str
 
 
-Value = JointValues | Points | Markers | Text
+class KeypointStates(NamedTuple):
+    """States of the keypoints ``names``, and their probabilities of being off by over 30 cm."""
+
+    names: tuple[str, ...]
+    states: tuple[KeypointState, ...]
+    chances: FloatArray
+
+
+Value = JointValues | Points | Markers | Text | KeypointStates
 
 
 @dataclass(frozen=True)
@@ -95,6 +104,16 @@ class Metric:
         value = self.of(estimate)
         return "" if value is None else format(value, self.format)
 
+
+CHANCE_KEY = "chance of an error beyond 0.3 m"
+"""Key of the probability in the messages of ``keypoint_states``."""
+LEVELS = {
+    KeypointState.TRACKED: 0,
+    KeypointState.UNCERTAIN: 1,
+    KeypointState.LOST: 2,
+    KeypointState.HIDDEN: 3,
+}
+"""Levels of diagnostic_msgs/DiagnosticStatus: ok, warning, error, stale."""
 
 JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
 """Joints of ``joint_states``: those of the posture, the person's place, then the neck."""
@@ -181,6 +200,18 @@ def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
     return None if estimate.keypoints_m is None else Points(estimate.keypoints_m)
 
 
+def keypoint_states(estimate: Estimate) -> KeypointStates | None:
+    """Return the states of the keypoints of an estimate; None if the filter has none."""
+    if estimate.keypoint_states is None or estimate.keypoint_chances is None:
+        return None
+    return KeypointStates(KEYPOINT_NAMES, estimate.keypoint_states, estimate.keypoint_chances)
+
+
+def chance_text(chance: float) -> str:
+    """Return a probability as the messages have it."""
+    return f"{chance:.3f}"
+
+
 def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
@@ -195,10 +226,11 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
     With ``torso_place``, the joints include ``torso_x``, ``torso_z`` and those of the neck.
     """
     return (
-        # The state comes first, so that subscribers have it when the posture arrives.
+        # The states come first, so that subscribers have them when the posture arrives.
         Output(
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
+        Output("keypoint_states", KeypointStates, lambda found, _: keypoint_states(found)),
         Output("joint_states", JointValues, lambda found, _: joint_values(found, torso_place)),
         Output(
             "joint_states_stddev",

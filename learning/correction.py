@@ -4,7 +4,9 @@ python -m learning.correction SAMPLES... --output FILE [--check SAMPLES...] [--l
 
 SAMPLES are folders that ``learning.simulate`` has written, or, for ``--check``,
 ``learning.sessions``. The network learns the offsets of the true keypoints from those found
-(``cardbox_tracker/estimation/filtering/correction.py``), and steady output. With ``--leave-out``,
+(``cardbox_tracker/estimation/filtering/correction.py``), steady output, and the log-odds that a
+corrected keypoint is off by more than ``FAR_M``. One of ten recordings is not trained with; these
+calibrate the log-odds (``learning/odds.py``). With ``--leave-out``,
 such as ``family=rocketbox`` or ``source=cmu``, this source is not trained with; it is checked. The
 check prints absolute and aligned error, cm, and the error of the acceleration, m/s^2, without the
 correction and with it. PyTorch is needed: ``pip install '.[learn]'``.
@@ -23,8 +25,12 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.filtering.correction import (
+    DISPLACEMENTS,
     DOUBT,
+    FAR_M,
+    LOG_ODDS,
     MIDDLE_Z,
+    N_ANSWERS,
     OF_DEPTH,
     OF_POINTS,
     limited,
@@ -39,12 +45,15 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from learning import networks
 from learning.command_line import run, training_arguments
+from learning.odds import calibrated
 from learning.samples import Samples, grouped, load_all, split
 
 FloatArray = NDArray[np.float64]
 
-# Rough standard deviations of the answers, m: shoulders' middle, elbow, hand; x, y, z of each.
-UNIT_M = np.repeat([0.05, 0.05, 0.10], 3)
+# Rough standard deviations of the displacements, m: shoulders' middle, elbow, hand; x, y, z of
+# each. Log-odds have none.
+UNIT = np.ones(N_ANSWERS)
+UNIT[DISPLACEMENTS] = np.repeat([0.05, 0.05, 0.10], 3)
 # Numbers of nodes: the first layer, the hidden state, the last layer but one.
 INPUTS, NODES, LEFT = 160, 128, 96
 NETWORKS, EPOCHS = 3, 9
@@ -59,10 +68,15 @@ NOISE = 0.15
 STEADY = 0.01
 # Weight of errors that the correction makes larger.
 HARM = 1.5
-# Recordings with a larger median error are not trained with: no correction mends a lost person, m.
+# Displacements are not trained with recordings of a larger median error: no correction mends a
+# lost person, m.
 LOST_M = 0.35
+# One of this number of recordings calibrates the log-odds.
+CALIBRATING = 10
 # A bone shorter than this has no reliable direction, m.
 LEAST_BONE_M = 0.01
+# Weight of the log loss of the log-odds, m.
+SURE_M = 0.05
 # Larger errors are clipped, as no correction mends a wrong posture; m and m/s^2.
 MOST_M, MOST_M_S2 = 2.0, 60.0
 
@@ -77,21 +91,25 @@ def learn(
     jobs: int = 1,
     count: int | None = None,
 ) -> RecurrentNetwork:
-    """Train ``count`` networks, or ``NETWORKS``, on recordings except those of lost people.
+    """Train ``count`` networks, or ``NETWORKS``; ``jobs`` of them at a time.
 
-    ``jobs`` networks are trained at a time.
+    With 100 recordings or more, one of ten is not trained with and calibrates the log-odds.
 
     Raises:
         CardboxError: the recordings are fewer or shorter than a batch.
     """
-    samples = [one for one in samples if _median_m(one) < LOST_M]
+    calibrating: list[Samples] = []
+    if len(samples) >= CALIBRATING**2:
+        calibrating = list(samples[::CALIBRATING])
+        samples = [one for number, one in enumerate(samples) if number % CALIBRATING]
     lengths = [len(one.features) for one in samples]
     given = sum(-(-length // LENGTH) for length in lengths if length >= LENGTH)
     if given < BATCH:
         raise CardboxError(
             f"the samples have {given} sequences of {LENGTH} images; give {BATCH} or more"
         )
-    mean, scale = networks.mean_and_scale(networks.by_arm(samples), _SELDOM)
+    followed = [one for one in samples if _median_m(one) < LOST_M]
+    mean, scale = networks.mean_and_scale(networks.by_arm(followed or samples), _SELDOM)
     sequences = _sequences(samples, mean, scale)
     seeds = range(seed, seed + (count or NETWORKS))
     with ProcessPoolExecutor(jobs) as pool:
@@ -100,9 +118,10 @@ def learn(
         (np.stack([one[i][0] for one in layers]), np.stack([one[i][1] for one in layers]))
         for i in range(5)
     )
-    return RecurrentNetwork(
-        mean, scale, networks.MOST, input_layer, gru_input, gru_hidden, (first, last), UNIT_M
+    network = RecurrentNetwork(
+        mean, scale, networks.MOST, input_layer, gru_input, gru_hidden, (first, last), UNIT
     )
+    return calibrated(network, calibrating) if calibrating else network
 
 
 def _median_m(samples: Samples) -> float:
@@ -113,7 +132,7 @@ def _median_m(samples: Samples) -> float:
 def _sequences(
     samples: Sequence[Samples], mean: FloatArray, scale: FloatArray
 ) -> list[NDArray[np.float32]]:
-    """Return sequences: features, found, true, whether the truth is known, period."""
+    """Return sequences: features, found, true, truth known, person followed, period."""
     parts: list[tuple[object, ...]] = []
     for one in samples:
         if len(one.features) < LENGTH:
@@ -121,11 +140,12 @@ def _sequences(
         scaled = scaled_features(one.features, mean, scale, networks.MOST)
         period_s = float(np.median(np.diff(one.stamps_ns))) / 1e9
         known = np.asarray(np.isfinite(one.true_m).all(axis=(1, 2)), np.float64)
+        followed = known * (_median_m(one) < LOST_M)
         starts = [*range(0, len(scaled) - LENGTH, LENGTH), len(scaled) - LENGTH]
         for start in starts:
             of = slice(start, start + LENGTH)
             true_m = np.nan_to_num(one.true_m[of])
-            parts.append((scaled[of], one.found_m[of], true_m, known[of], period_s))
+            parts.append((scaled[of], one.found_m[of], true_m, known[of], followed[of], period_s))
     return [np.array(column, np.float32) for column in zip(*parts, strict=True)]
 
 
@@ -139,13 +159,13 @@ def _learned(
     # Several threads slow each other down where other programs run, too.
     torch.set_num_threads(1)
     torch.manual_seed(seed)
-    features, found, true, known, period = map(torch.from_numpy, sequences)
+    features, found, true, known, followed, period = map(torch.from_numpy, sequences)
     modules = nn.ModuleList(
         [
             nn.Linear(features.shape[3], INPUTS),
             nn.GRU(INPUTS, NODES, batch_first=True),
             nn.Linear(NODES + INPUTS, LEFT),
-            nn.Linear(LEFT, len(UNIT_M)),
+            nn.Linear(LEFT, N_ANSWERS),
         ]
     )
     batches = len(features) // BATCH
@@ -156,13 +176,14 @@ def _learned(
     for _ in range(epochs):
         for chosen in torch.randperm(len(features))[: batches * BATCH].split(BATCH):
             noise = NOISE * torch.randn(len(chosen), 1, 2, features.shape[3])
-            answers = _answers(modules, features[chosen] + noise)
+            answers, log_odds = _answers(modules, features[chosen] + noise)
             shares = _shares(period[chosen], LENGTH)
             off, before = (
                 _steadied(points, shares) - true[chosen]
                 for points in (_moved(found[chosen], answers), found[chosen])
             )
-            loss = _loss(off, before, known[chosen], period[chosen])
+            loss = _loss(off, before, followed[chosen], period[chosen])
+            loss = loss + SURE_M * _log_loss(log_odds, off, known[chosen])
             optimizer.zero_grad()
             loss.backward()
             nn.utils.clip_grad_norm_(modules.parameters(), 1.0)
@@ -171,8 +192,8 @@ def _learned(
     return _layers(modules)
 
 
-def _answers(modules: Any, features: Any) -> Any:
-    """Return the answers (B, L, 2, 9), metres, to features (B, L, 2, F)."""
+def _answers(modules: Any, features: Any) -> tuple[Any, Any]:
+    """Return displacements (B, L, 2, 9), m, and log-odds (B, L, 2, 3) for features (B, L, 2, F)."""
     import torch
 
     input_layer, recurrent, first, last = modules
@@ -183,7 +204,8 @@ def _answers(modules: Any, features: Any) -> Any:
     hidden = recurrent(arms)[0]
     scaled = last(torch.relu(first(torch.cat([hidden, arms], dim=2))))
     scaled = scaled.reshape(batch, 2, length, -1).permute(0, 2, 1, 3)
-    return scaled * torch.tensor(UNIT_M, dtype=torch.float32)
+    answers = scaled * torch.tensor(UNIT, dtype=torch.float32)
+    return answers[..., DISPLACEMENTS], answers[..., LOG_ODDS]
 
 
 def _moved(found: Any, answers: Any) -> Any:
@@ -241,8 +263,17 @@ def _loss(off: Any, before: Any, known: Any, period_s: Any) -> Any:
     second = (off[:, :-2] - 2.0 * off[:, 1:-1] + off[:, 2:]) / period_s[:, None, None, None] ** 2
     shaken = _length(second, 0.1).clamp(max=MOST_M_S2)
     three = (known[:, :-2] * known[:, 1:-1] * known[:, 2:])[..., None].expand_as(shaken)
-    error = (each * known[..., None]).sum() / (6.0 * known.sum())
-    return error + STEADY * (shaken * three).sum() / three.sum()
+    error = (each * known[..., None]).sum() / (6.0 * known.sum()).clamp(min=1.0)
+    return error + STEADY * (shaken * three).sum() / three.sum().clamp(min=1.0)
+
+
+def _log_loss(log_odds: Any, off: Any, known: Any) -> Any:
+    """Return the mean log loss of log-odds (B, L, 2, 3) that keypoints are off by over FAR_M."""
+    from torch.nn.functional import binary_cross_entropy_with_logits
+
+    is_far = (off.detach().norm(dim=-1) > FAR_M).reshape(log_odds.shape).to(log_odds.dtype)
+    each = binary_cross_entropy_with_logits(log_odds, is_far, reduction="none")
+    return (each * known[..., None, None]).sum() / (6.0 * known.sum()).clamp(min=1.0)
 
 
 def _aligned(off: Any) -> Any:
@@ -275,7 +306,7 @@ def corrected(network: RecurrentNetwork, samples: Samples, doubt: float = DOUBT)
     result = np.empty_like(samples.found_m)
     for i, (features, found_m) in enumerate(zip(samples.features, samples.found_m, strict=True)):
         answers_m, spread_m, hidden = network(np.asarray(features, np.float64), hidden)
-        answers_m = limited(answers_m, spread_m, doubt)
+        answers_m = limited(answers_m[:, DISPLACEMENTS], spread_m[:, DISPLACEMENTS], doubt)
         if samples.origin.is_measured:
             answers_m[:, MIDDLE_Z] = 0.0
         result[i] = low_pass(

@@ -56,6 +56,9 @@ class Recorder:
         self.latest = Seen(features, found.keypoints_m.copy(), evidence)
         return found.keypoints_m if self._inner is None else self._inner(found)
 
+    def chances_of_error(self) -> None:
+        """Leave the chances to the filter."""
+
     def deviations(self, corrected: Result) -> None:
         """Keep the result; the deviations stay those of the filter."""
         assert self.latest is not None

@@ -34,8 +34,10 @@ START_NS = 1_700_000_000_000_000_000
 RATES = (15.0, 15.0, 20.0, 30.0, 30.0, 60.0)
 """Images per second, one of them for each recording."""
 
-# Shares of the recordings with images, with points, with depth images.
-_IMAGES, _POINTS, _DEPTH = 0.7, 0.25, 0.06
+# Shares of the recordings with images and with depth images.
+_IMAGES, _DEPTH = 0.7, 0.06
+POINTS = 0.25
+"""Share of the measured people with points of a detector."""
 # Deviation of the logarithms of distance and stature as people state them, and of the pitch, rad.
 _TOLD_DISTANCE, _TOLD_STATURE, _TOLD_PITCH_RAD = 0.04, 0.015, 0.01
 # Share of the people whose distance nobody states.
@@ -69,6 +71,7 @@ def simulate(
     rng: np.random.Generator,
     is_measured: bool = True,
     is_corrected: bool = False,
+    points: float = POINTS,
 ) -> Samples | None:
     """Render and track a motion; None if the person was seldom tracked.
 
@@ -78,11 +81,12 @@ def simulate(
         rng: source of the camera, the room, the faults and the way of tracking.
         is_measured: whether the person takes the reference postures first, if they are in sight.
         is_corrected: whether the package's corrector takes part.
+        points: probability that measured people have points.
     """
     fps = float(rng.choice(RATES))
     viewpoint = draw_viewpoint(rng, body.stature_m)
     scene = Scene(body, motion.resampled(fps), viewpoint, Room(viewpoint.camera, rng))
-    has_images, has_points, has_depth = rng.random(3) < (_IMAGES, _POINTS, _DEPTH)
+    has_images, has_points, has_depth = rng.random(3) < (_IMAGES, points, _DEPTH)
     faults = draw_faults(rng)
     person = _measured(scene, faults, rng, has_images) if is_measured else None
     is_measured = person is not None

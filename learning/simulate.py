@@ -1,8 +1,8 @@
 """Simulate recordings and write what the learned parts see in them.
 
 python -m learning.simulate OUTPUT --count N --motions FOLDER [--rocketbox FOLDER]
-                            [--makehuman FOLDER] [--first K] [--measured SHARE] [--corrected]
-                            [--jobs N]
+                            [--makehuman FOLDER] [--first K] [--measured SHARE]
+                            [--points SHARE] [--corrected] [--jobs N]
 
 Each recording has a random body of one of the families, a random excerpt of a motion, a random
 camera, and random faults of its silhouettes; see docs/research/learning.md. Recording K is the same
@@ -23,7 +23,7 @@ import numpy as np
 from learning.bodies import FAMILIES, draw
 from learning.command_line import run
 from learning.motions.library import draw_motion
-from learning.recording import simulate
+from learning.recording import POINTS, simulate
 
 SEED = 28
 # Length of a recording, s.
@@ -38,13 +38,22 @@ class Folders:
     bodies: dict[str, Path]
 
 
-def write(number: int, folders: Folders, output: Path, measured: float, is_corrected: bool) -> str:
+@dataclass(frozen=True)
+class Ways:
+    """How people are tracked: shares of measured ones and of those with points, and a corrector."""
+
+    measured: float = 0.6
+    points: float = POINTS
+    is_corrected: bool = False
+
+
+def write(number: int, folders: Folders, output: Path, ways: Ways) -> str:
     """Simulate a recording, write its samples, and return a line about it."""
     rng = np.random.default_rng((SEED, number))
     body = draw(rng, list(folders.bodies), folders.bodies)
     motion = draw_motion(rng, folders.motions, float(rng.uniform(*SECONDS)))
-    is_measured = bool(rng.random() < measured)
-    samples = simulate(body, motion, rng, is_measured, is_corrected)
+    is_measured = bool(rng.random() < ways.measured)
+    samples = simulate(body, motion, rng, is_measured, ways.is_corrected, ways.points)
     if samples is None:
         return f"{number} {body.name} {motion.name}: seldom tracked, left out"
     samples.save(output / f"{number:05d}.npz")
@@ -66,6 +75,12 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument(
         "--measured", type=float, default=0.6, help="share of measured people (default: 0.6)"
     )
+    parser.add_argument(
+        "--points",
+        type=float,
+        default=POINTS,
+        help=f"share of measured people with points of a detector (default: {POINTS})",
+    )
     parser.add_argument("--corrected", action="store_true", help="use the package's corrector")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(args)
@@ -80,8 +95,7 @@ def main(args: list[str] | None = None) -> int:
             write,
             folders=folders,
             output=given.output,
-            measured=given.measured,
-            is_corrected=given.corrected,
+            ways=Ways(given.measured, given.points, given.corrected),
         )
         for line in pool.map(task, numbers):
             print(line, flush=True)

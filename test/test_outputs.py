@@ -14,7 +14,14 @@ from hypothesis import strategies as st
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.estimate import (
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    KeypointState,
+)
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
     METRICS,
@@ -36,7 +43,13 @@ CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TRACKER = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
 POSTURE = reference_posture("arms")
 POINTS_M = CAMERA.reference_to_optical(keypoints_m(BodyModel(), POSTURE))
-FOUND = Estimate(TRACKING, POSTURE, np.full(12, 0.1), POINTS_M, 812, 0.87654)
+STATES = tuple(KeypointState(one) for one in ("tracked", "uncertain", "lost") * 2)
+CHANCES = np.array([0.01, 0.3, 0.8] * 2)
+FOUND = Estimate(
+    *(TRACKING, POSTURE, np.full(12, 0.1), POINTS_M, 812, 0.87654),
+    keypoint_states=STATES,
+    keypoint_chances=CHANCES,
+)
 PLACED = replace(
     FOUND,
     keypoints_m=POINTS_M + np.array([0.0, 0.05, -0.25]),
@@ -46,7 +59,10 @@ PLACED = replace(
 SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.1, 0.2]))
 BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
 ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch")
-TOPICS = ["tracking_state", "joint_states", "joint_states_stddev", "keypoints", "markers"]
+TOPICS = [
+    *("tracking_state", "keypoint_states", "joint_states", "joint_states_stddev"),
+    *("keypoints", "markers"),
+]
 
 
 def topics(stream: OutputStream, estimate: Estimate, **options: Any) -> list[str]:
@@ -59,8 +75,10 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert {output.topic: output.kind for output in OUTPUTS} == {
         topic: type(value) for topic, value in found.items()
     }
-    state, joints, deviations, points, markers = cast(Any, list(found.values()))
+    state, keypoints, joints, deviations, points, markers = cast(Any, list(found.values()))
     assert state == Text(TRACKING)
+    assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
+    assert (keypoints.states, keypoints.chances.tolist()) == (STATES, CHANCES.tolist())
     assert (joints.names, deviations.names) == (ALL_NAMES, BODY_NAMES)
     np.testing.assert_array_equal(joints.values, [*POSTURE, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0, 0.0])

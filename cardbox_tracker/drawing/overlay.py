@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import cv2
@@ -17,7 +17,7 @@ from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.estimate import Estimate, KeypointState
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, in_front
@@ -38,6 +38,11 @@ _STATE_BGR = {
     "tracking": (120, 255, 120),
     "uncertain": UNCERTAIN_BGR,
     "lost": (90, 110, 255),
+}
+_BONE_BGR = {
+    KeypointState.UNCERTAIN: (0, 230, 255),
+    KeypointState.LOST: (60, 60, 255),
+    KeypointState.HIDDEN: (200, 200, 200),
 }
 
 _SHIFT = 4
@@ -66,7 +71,8 @@ def draw_overlay(
         view = camera.scaled(*canvas.shape[1::-1])
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
         there = estimate.placed(body)
-        draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoints_m)
+        seen = estimate.keypoints_m, estimate.keypoint_states
+        draw_model(canvas, there, view, estimate.posture, outline, *seen)
         if estimate.neck is not None:
             frames = forward_kinematics(there, estimate.posture)
             _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), frames, estimate.neck))
@@ -116,11 +122,14 @@ def draw_model(
     posture: FloatArray,
     outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
     keypoints_m: FloatArray | None = None,
+    states: Sequence[KeypointState] | None = None,
 ) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
     Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. The skeleton
-    has the shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if given.
+    has the shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if given. With
+    ``states`` of the keypoints, bones to uncertain ones are yellow, to lost ones red, and to hidden
+    ones dashed.
     """
     frames = model_frames(body, camera, posture, keypoints_m)
     patches = patches_at(body, frames)
@@ -133,7 +142,7 @@ def draw_model(
     cv2.addWeighted(tint, _FILL, canvas, 1.0 - _FILL, 0.0, canvas)
     thickness = max(1, round(camera.width / 400))
     draw_outline(canvas, camera, patches, outline_bgr, thickness)
-    _draw_skeleton(canvas, frames, camera, thickness)
+    _draw_skeleton(canvas, frames, camera, thickness, states)
 
 
 def draw_outline(
@@ -152,24 +161,47 @@ def draw_outline(
     cv2.polylines(canvas, outlines, True, colour, width, cv2.LINE_AA, OUTLINE_SHIFT)
 
 
-def _draw_skeleton(canvas: ImageArray, frames: BodyFrames, camera: Camera, thickness: int) -> None:
+def _draw_skeleton(
+    canvas: ImageArray,
+    frames: BodyFrames,
+    camera: Camera,
+    thickness: int,
+    states: Sequence[KeypointState] | None,
+) -> None:
+    arms = list(states or [KeypointState.TRACKED] * 6)
+    trunk = [KeypointState.TRACKED] * 3
     chains = [
-        [frames.hip, frames.neck, frames.head],
-        [frames.neck, *frames.left[:3]],
-        [frames.neck, *frames.right[:3]],
+        ([frames.hip, frames.neck, frames.head], trunk),
+        ([frames.neck, *frames.left[:3]], [KeypointState.TRACKED, *arms[:3]]),
+        ([frames.neck, *frames.right[:3]], [KeypointState.TRACKED, *arms[3:]]),
     ]
     joints = []
-    for chain in chains:
+    for chain, reached in chains:
         points = camera.reference_to_optical(np.array(chain))
         if not in_front(points).all():
             continue
-        pixels = _subpixels(camera.project(points))
-        cv2.polylines(canvas, [pixels], False, SKELETON_BGR, thickness + 1, cv2.LINE_AA, _SHIFT)
-        joints.extend(pixels.tolist())
+        pixels = camera.project(points)
+        for begin, end, state in zip(pixels[:-1], pixels[1:], reached[1:], strict=True):
+            _draw_bone(canvas, begin, end, state, thickness + 1)
+        joints.extend(_subpixels(pixels).tolist())
     for colour, rim in (((0, 0, 0), 1), (JOINT_BGR, 0)):
         radius = (thickness + 1 + rim) << _SHIFT
         for joint in joints:
             cv2.circle(canvas, joint, radius, colour, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_bone(
+    canvas: ImageArray, begin: FloatArray, end: FloatArray, state: KeypointState, thickness: int
+) -> None:
+    """Draw a line between two pixels, with dashes if the keypoint at its end is hidden."""
+    colour = _BONE_BGR.get(state, SKELETON_BGR)
+    parts = [(0.0, 1.0)]
+    if state is KeypointState.HIDDEN:
+        dashes = max(2, round(float(np.linalg.norm(end - begin)) / (6 * thickness)))
+        parts = [(number / dashes, (number + 0.5) / dashes) for number in range(dashes)]
+    for shares in parts:
+        line = _subpixels(np.array([begin + share * (end - begin) for share in shares]))
+        cv2.polylines(canvas, [line], False, colour, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:

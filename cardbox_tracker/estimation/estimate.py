@@ -8,11 +8,21 @@ person). Only ``tracking`` and ``uncertain`` have a posture.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
+
+
+class KeypointState(StrEnum):
+    """Whether a keypoint can be relied upon."""
+
+    TRACKED = "tracked"
+    UNCERTAIN = "uncertain"
+    HIDDEN = "hidden"
+    LOST = "lost"
 
 
 @dataclass(frozen=True)
@@ -27,6 +37,10 @@ class Estimate:
             of the particles, or the output of a learned model (``filtering/deviations.py``).
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
+        keypoint_states: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by
+            more than 30 cm); ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of
+            the images). The hands of ``tracking`` are ``tracked``. None if the filter has none.
+        keypoint_chances: probability of each keypoint to be off by more than 30 cm, (6,), or None.
         cost_px: cost of the posture (equation (2)), px.
         iou: intersection over union of model and silhouette, above the hips.
         offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
@@ -47,6 +61,8 @@ class Estimate:
     offset_stddev_m: FloatArray | None = None
     neck: FloatArray | None = None
     neck_stddev: FloatArray | None = None
+    keypoint_states: tuple[KeypointState, ...] | None = None
+    keypoint_chances: FloatArray | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

@@ -257,4 +257,6 @@ class Tracker:
             fit.iou,
             fit.offset_m,
             fit.offset_stddev_m,
+            keypoint_states=fit.keypoint_states,
+            keypoint_chances=fit.keypoint_chances,
         )

@@ -16,12 +16,16 @@ from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import (
+    CHANCE_KEY,
+    LEVELS,
     JointValues,
+    KeypointStates,
     Markers,
     OutputStream,
     Points,
     Text,
     Value,
+    chance_text,
     joint_values,
     positions_of,
 )
@@ -99,5 +103,28 @@ def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value
             bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
         case Markers():
             write_markers(bag, topic, stamp_ns, frame_id, value)
+        case KeypointStates():
+            _write_keypoint_states(bag, topic, stamp_ns, frame_id, value)
         case Text(text):
             bag.write_string(topic, stamp_ns, text)
+
+
+def _write_keypoint_states(
+    bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, found: KeypointStates
+) -> None:
+    status = bag.type("diagnostic_msgs/msg/DiagnosticStatus")
+    pair = bag.type("diagnostic_msgs/msg/KeyValue")
+    each = [
+        status(
+            level=LEVELS[state],
+            name=name,
+            message=str(state),
+            hardware_id="",
+            values=[pair(key=CHANCE_KEY, value=chance_text(chance))],
+        )
+        for name, state, chance in zip(*found, strict=True)
+    ]
+    message = bag.type("diagnostic_msgs/msg/DiagnosticArray")(
+        header=bag.header(stamp_ns, frame_id), status=each
+    )
+    bag.write(topic, message, stamp_ns)

@@ -22,7 +22,7 @@ from cardbox_tracker.drawing.overlay import (
 )
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.estimate import Estimate, KeypointState
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel()
@@ -155,3 +155,21 @@ def test_the_skeletons_marker_has_the_gaze_last() -> None:
     direction = (end - start) / np.linalg.norm(end - start)
     expected = (np.cos(0.5) * np.cos(0.2), np.sin(0.5) * np.cos(0.2), -np.sin(0.2))
     np.testing.assert_allclose(direction, expected, atol=1e-9)
+
+
+def test_bones_to_uncertain_hands_are_yellow_lost_ones_red_and_hidden_ones_dashed() -> None:
+    camera = CAMERA.scaled(960, 720)
+    grey = np.full((720, 960), 90, np.uint8)
+    elbow, hand = camera.project(camera.reference_to_optical(keypoints_m(BODY, FRONT)))[[1, 2]]
+    along = elbow + np.linspace(0.15, 0.85, 60)[:, None] * (hand - elbow)
+    columns, rows = along.round().astype(int).T
+    expected = {
+        KeypointState.TRACKED: (SKELETON_BGR, 1.0, 1.0),
+        KeypointState.UNCERTAIN: ((0, 230, 255), 1.0, 1.0),
+        KeypointState.LOST: ((60, 60, 255), 1.0, 1.0),
+        KeypointState.HIDDEN: ((200, 200, 200), 0.3, 0.8),
+    }
+    for state, (colour, least, most) in expected.items():
+        states = tuple(state if i == 2 else KeypointState.TRACKED for i in range(6))
+        overlay = draw_overlay(grey, BODY, camera, replace(FOUND, keypoint_states=states))
+        assert least <= near(overlay, colour)[rows, columns].mean() <= most

@@ -76,9 +76,13 @@ def test_sequences_cover_a_recording_and_its_end(
     samples.found_m[:, 0, 0] = np.arange(10)
     samples.true_m[3, 5, 1] = np.nan
     columns = tool._sequences([samples, make_samples(3)], np.zeros(5), np.ones(5))
-    features, found, true, known, period = columns
+    features, found, true, known, followed, period = columns
     assert found[:, :, 0, 0].tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [6, 7, 8, 9]]
-    assert known.tolist() == [[1, 1, 1, 0], [1] * 4, [1] * 4]
+    assert known.tolist() == followed.tolist() == [[1, 1, 1, 0], [1] * 4, [1] * 4]
+    samples.true_m[:] += 1.0
+    *_, known, followed, _ = tool._sequences([samples], np.zeros(5), np.ones(5))
+    # A person who was never followed teaches chances, but no displacements.
+    assert known.any() and not followed.any()
     assert np.isfinite(true).all() and period == pytest.approx(0.05)
     assert features[1] == pytest.approx(np.clip(samples.features[4:8], -2.5, 2.5))
 

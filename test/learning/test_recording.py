@@ -44,7 +44,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
         "_STANDING_S": 0.4,
         "_WAY_S": 0.2,
         "_WITHOUT_DISTANCE": 0.0,
-        **dict.fromkeys(("_IMAGES", "_POINTS", "_DEPTH"), 0.0),
+        **dict.fromkeys(("_IMAGES", "_DEPTH"), 0.0),
         **dict.fromkeys(("_TOLD_DISTANCE", "_TOLD_STATURE", "_TOLD_PITCH_RAD"), 0.0),
         "draw_viewpoint": lambda *_: VIEWPOINT,
         "draw_faults": lambda _: Faults(),
@@ -102,9 +102,9 @@ def test_arrays_belong_together_and_the_origin_tells_the_sources(boxes: RiggedBo
 def test_a_measured_person_with_images_points_and_depth(
     plain: pytest.MonkeyPatch, boxes: RiggedBody
 ) -> None:
-    for name in ("_IMAGES", "_POINTS", "_DEPTH"):
+    for name in ("_IMAGES", "_DEPTH"):
         plain.setattr(recording, name, 1.0)
-    origin = simulated(boxes, is_measured=True).origin
+    origin = simulated(boxes, is_measured=True, points=1.0).origin
     assert all((origin.is_measured, origin.has_images, origin.has_points, origin.has_depth))
 
 

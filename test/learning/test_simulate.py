@@ -17,8 +17,8 @@ from learning.samples import load
 def drawn(monkeypatch: pytest.MonkeyPatch, boxes: RiggedBody, make_samples: Any) -> None:
     """Recordings whose results are 3 cm off; in that of number 3 nobody is tracked."""
 
-    def simulate(body: RiggedBody, motion: Any, rng: np.random.Generator, *given: bool) -> Any:
-        is_measured, is_corrected = given
+    def simulate(body: RiggedBody, motion: Any, rng: np.random.Generator, *given: Any) -> Any:
+        is_measured, is_corrected, _ = given
         number = next(n for n in range(9) if same(rng, n))
         one = make_samples(5, is_measured=is_measured, has_images=is_corrected, motion=str(number))
         one.found_m[..., 2] += 0.03
@@ -62,7 +62,7 @@ def test_numbers_name_the_files_and_seed_the_recordings(
 @pytest.mark.usefixtures("drawn")
 def test_nobody_is_measured_with_a_share_of_0(tmp_path: Path) -> None:
     folders = tool.Folders(tmp_path, {"rocketbox": tmp_path})
-    tool.write(1, folders, tmp_path, 0.0, False)
+    tool.write(1, folders, tmp_path, tool.Ways(measured=0.0))
     assert not load(tmp_path / "00001.npz").origin.is_measured
 
 

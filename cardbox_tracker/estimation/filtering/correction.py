@@ -12,7 +12,8 @@ people. So it corrects results of one camera, or of several that look in nearly 
 
 Both arms share the network, whose input is a left arm or a mirrored right arm. Its outputs for each
 arm are the displacement of the middle of the shoulders from the result, and the displacements of
-elbow and hand from this middle, in metres along the axes of the optical frame.
+elbow and hand from this middle, in metres along the axes of the optical frame; then the log-odds
+that the corrected shoulder, elbow and hand are off by more than 30 cm.
 """
 
 from __future__ import annotations
@@ -63,8 +64,12 @@ points, and the binary logarithm of the interval between frames."""
 OF_POINTS = slice(N_FEATURES - 1 - POINT_FEATURES, N_FEATURES - 1)
 OF_DEPTH = slice(OF_POINTS.start - DEPTH_FEATURES, OF_POINTS.start)
 """Columns of the inputs that most frames lack."""
-N_ANSWERS = 9
-"""Outputs of the network: x, y, z of the middle of the shoulders, elbow and hand."""
+DISPLACEMENTS, LOG_ODDS = slice(0, 9), slice(9, 12)
+"""Outputs of the network for an arm: x, y, z of the middle of the shoulders, elbow and hand, m;
+log-odds that shoulder, elbow and hand are off by more than ``FAR_M``."""
+N_ANSWERS = LOG_ODDS.stop
+FAR_M = 0.30
+"""A keypoint that is farther off is wrong, m."""
 
 
 def moved(keypoints_m: FloatArray, answers_m: FloatArray) -> FloatArray:
@@ -143,6 +148,7 @@ class NetworkCorrector:
         self._hidden = network.initial_hidden(2)
         self._deviations = load_network(DATA_OF_DEVIATIONS)
         self.features = self.result_features = np.empty((2, 0))
+        self._log_odds: FloatArray = np.empty(0)
         self._is_used = False
 
     def __call__(self, found: Result) -> FloatArray:
@@ -151,8 +157,9 @@ class NetworkCorrector:
         if not self._is_used:
             return found.keypoints_m
         self.features = inputs_of(found, self._cost, self._camera)
-        answers_m, spread_m, self._hidden = self._network(self.features, self._hidden)
-        answers_m = limited(answers_m, spread_m)
+        answers, spread, self._hidden = self._network(self.features, self._hidden)
+        self._log_odds = answers[:, LOG_ODDS].ravel()
+        answers_m = limited(answers[:, DISPLACEMENTS], spread[:, DISPLACEMENTS])
         if found.viewpoints.is_measured:
             answers_m[:, MIDDLE_Z] = 0.0
         return self._inside_outline(found, answers_m)
@@ -168,6 +175,13 @@ class NetworkCorrector:
             if iou >= found.iou - MOST_IOU_LOSS:
                 return wanted_m
         return found.keypoints_m
+
+    def chances_of_error(self) -> FloatArray | None:
+        """See :class:`~.corrector.Corrector`."""
+        if not self._is_used:
+            return None
+        chances: FloatArray = 1.0 / (1.0 + np.exp(-self._log_odds))
+        return chances
 
     def deviations(self, corrected: Result) -> FloatArray | None:
         """See :class:`~.corrector.Corrector`; the deviations of the angles are learned."""

@@ -45,6 +45,12 @@ class Corrector(Protocol):
         The tracker smooths them and fits the posture to them; the bones keep their lengths.
         """
 
+    def chances_of_error(self) -> FloatArray | None:
+        """Return the probability (6,) that each keypoint of the last frame is off by over 30 cm.
+
+        None lets the filter estimate it from the deviations.
+        """
+
     def deviations(self, corrected: Result) -> FloatArray | None:
         """Return standard deviations (14,) of the corrected result; None keeps the filter's."""
 

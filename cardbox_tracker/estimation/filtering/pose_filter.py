@@ -14,6 +14,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.estimate import KeypointState
 from cardbox_tracker.estimation.filtering.particles import Particles
 
 
@@ -44,6 +45,8 @@ class Fit:
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
         particles: particles of whole states; None if the filter has none.
+        keypoint_chances: probability of each keypoint to be off by more than 30 cm, (6,), or None.
+        keypoint_states: state of each keypoint, (6,), or None.
     """
 
     posture: FloatArray
@@ -58,6 +61,8 @@ class Fit:
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
     particles: Particles | None = None
+    keypoint_chances: FloatArray | None = None
+    keypoint_states: tuple[KeypointState, ...] | None = None
 
     @property
     def is_finite(self) -> bool:
@@ -65,7 +70,7 @@ class Fit:
         values = (self.posture, self.posture_stddev, self.keypoints_m, self.iou)
         return all(
             value is None or bool(np.isfinite(value).all())
-            for value in (*values, self.offset_m, self.offset_stddev_m)
+            for value in (*values, self.offset_m, self.offset_stddev_m, self.keypoint_chances)
         )
 
 

@@ -89,6 +89,10 @@ class Refinement:
         self.found = Result(frame, fitted, stddev, keypoints_m, iou, search, viewpoints)
         return self._posing(fitted, self.corrector(self.found), frame.interval_s)
 
+    def chances_of_error(self) -> FloatArray | None:
+        """Return the corrector's probability (6,) that each keypoint is wrong; None without one."""
+        return None if self.corrector is None else self.corrector.chances_of_error()
+
     def deviations(
         self,
         frame: Frame,

@@ -30,6 +30,7 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import iou_of
+from cardbox_tracker.estimation.estimate import KeypointState
 from cardbox_tracker.estimation.filtering import (
     joint_moves,
     loss,
@@ -41,6 +42,14 @@ from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.evidence import evidence_in
+from cardbox_tracker.estimation.filtering.keypoint_states import (
+    HANDS,
+    SHARE_OF_CAMERAS,
+    SHARE_OF_POINTS,
+    are_hidden,
+    chances_by_spread,
+    states_of,
+)
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
@@ -281,19 +290,28 @@ class WholeBodyFilter:
         deviations = spread if is_by_points else self.refine.deviations(*last)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
         is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
+        chances = None if is_by_points else self.refine.chances_of_error()
+        if chances is None:
+            share = SHARE_OF_POINTS if len(self._seeing) == 1 else SHARE_OF_CAMERAS
+            chances = chances_by_spread(cost.costs[0], result, share * deviations)
+        is_doubtful = self._points.is_doubtful(result)
+        states = states_of(chances, are_hidden(cost, result), is_doubtful)
+        is_sure = is_sure and all(states[hand] is KeypointState.TRACKED for hand in HANDS)
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
             keypoints_m=keypoints_m,
             cost_px=int(cost_px),
             iou=iou,
-            is_uncertain=not is_sure or self._points.is_doubtful(result),
+            is_uncertain=not is_sure or is_doubtful,
             is_poor=is_poor and not self._points.confirm(result),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             seen=fitted,
             seen_iou=fit_iou,
             particles=Particles(*rated, mean, config.spread, deviations / spread),
+            keypoint_chances=chances,
+            keypoint_states=states,
         )
 
     def ious(self) -> list[float | None]:

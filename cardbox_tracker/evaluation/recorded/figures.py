@@ -26,19 +26,19 @@ from cardbox_tracker.evaluation.metrics import (
     beside_shoulders,
 )
 from cardbox_tracker.evaluation.recorded.angles import joint_angles
+from cardbox_tracker.evaluation.recorded.keypoint_states import FAR_M, KINDS, compared
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import SessionRun
 
 FloatArray = NDArray[np.float64]
 
-KINDS = ("shoulder", "elbow", "hand")
-"""Keypoints i and i + 3 are of the same kind."""
-
-FAR_CM = 30.0
+FAR_CM = 100.0 * FAR_M
 """A mean error beyond this counts as a failure of tracking in any state."""
 
 COVERAGE_STDDEVS = 2.0
 _LEAST_STDDEV_DEG = 0.5
+HANDS = [2, 5]
+"""Indices of the hands among the keypoints."""
 
 
 def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
@@ -88,6 +88,12 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
         "acceleration": acceleration_error(off_m, session.stamps_ns),
         "acceleration_beside": acceleration_error(beside_shoulders(off_m), session.stamps_ns),
         "coverage": coverage(session, run),
+        "keypoint_states": compared(
+            np.linalg.norm(off_m, axis=2), run.chances, run.keypoint_states
+        ),
+        "hand_far_but_tracking": int(
+            ((distance[:, HANDS] > FAR_CM).any(axis=1) & is_tracking[have]).sum()
+        ),
     }
     return result
 

@@ -75,6 +75,8 @@ class SessionRun:
         keypoints_m: (n, 6, 3), metres in the optical frame; nan without an estimate.
         postures: (n, 12), rad and metres; nan without an estimate.
         stddevs: standard deviations, (n, 12).
+        keypoint_states: states of the keypoints, (n, 6); empty without an estimate or states.
+        chances: probabilities of keypoints to be off by more than 30 cm, (n, 6); nan likewise.
         milliseconds: processor time of each tracked image from silhouette to posture, (m,).
         input_ms: median processor time of an image before that: decoding, silhouettes and points
             of all cameras; nan if it was not measured.
@@ -86,6 +88,8 @@ class SessionRun:
     keypoints_m: FloatArray
     postures: FloatArray
     stddevs: FloatArray
+    keypoint_states: NDArray[np.str_]
+    chances: FloatArray
     milliseconds: FloatArray
     input_ms: float = float("nan")
 
@@ -268,7 +272,8 @@ def _run(
     n = len(session.stamps_ns)
     states = np.full(n, "", dtype="<U16")
     keypoints = np.full((n, 6, 3), np.nan)
-    postures, stddevs = np.full((n, N_JOINTS), np.nan), np.full((n, N_JOINTS), np.nan)
+    postures, stddevs = np.full((2, n, N_JOINTS), np.nan)
+    keypoint_states, chances = np.full((n, 6), "", dtype="<U16"), np.full((n, 6), np.nan)
     for i, stamp in enumerate(session.stamps_ns.tolist()):
         estimate = estimates.get(stamp)
         if estimate is None:
@@ -278,4 +283,10 @@ def _run(
             keypoints[i], postures[i] = estimate.keypoints_m, estimate.posture[POSTURE]
         if estimate.posture_stddev is not None:
             stddevs[i] = estimate.posture_stddev[POSTURE]
-    return SessionRun(body, failure, states, keypoints, postures, stddevs, np.array(milliseconds))
+        if estimate.keypoint_states is not None and estimate.keypoint_chances is not None:
+            keypoint_states[i], chances[i] = estimate.keypoint_states, estimate.keypoint_chances
+    angles = postures, stddevs
+    of_keypoints = keypoint_states, chances
+    return SessionRun(
+        *(body, failure, states, keypoints), *angles, *of_keypoints, np.array(milliseconds)
+    )

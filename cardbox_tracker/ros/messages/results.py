@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header, String
@@ -17,11 +18,15 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
 from cardbox_tracker.errors import CardboxError, NotFiniteError
 from cardbox_tracker.outputs import (
+    CHANCE_KEY,
+    LEVELS,
     JointValues,
+    KeypointStates,
     Markers,
     Points,
     Text,
     Value,
+    chance_text,
     neck_from,
     posture_from,
 )
@@ -98,10 +103,27 @@ def markers_message(header: Header, markers: Markers) -> MarkerArray:
     return MarkerArray(markers=[_marker(header, shape) for shape in markers.shapes])
 
 
+def keypoint_states_message(header: Header, found: KeypointStates) -> DiagnosticArray:
+    """Return a status for each keypoint: name, level, state, and the probability of an error."""
+    return DiagnosticArray(
+        header=header,
+        status=[
+            DiagnosticStatus(
+                level=bytes([LEVELS[state]]),
+                name=name,
+                message=state,
+                values=[KeyValue(key=CHANCE_KEY, value=chance_text(chance))],
+            )
+            for name, state, chance in zip(*found, strict=True)
+        ],
+    )
+
+
 _ENCODERS: dict[type[Value], tuple[Any, Callable[[Header, Any], Any]]] = {
     JointValues: (JointState, joint_state_message),
     Points: (PoseArray, points_message),
     Markers: (MarkerArray, markers_message),
+    KeypointStates: (DiagnosticArray, keypoint_states_message),
     Text: (String, lambda _, text: String(data=text.text)),
 }
 

@@ -17,7 +17,9 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.correction import (
     DATA,
+    DISPLACEMENTS,
     MIDDLE_Z,
+    N_ANSWERS,
     NetworkCorrector,
     learned,
     limited,
@@ -80,7 +82,7 @@ class Correction:
 
 def test_joints_and_turns_are_steadied(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
-        return np.zeros((2, 9)), np.zeros((2, 9)), hidden
+        return np.zeros((2, N_ANSWERS)), np.zeros((2, N_ANSWERS)), hidden
 
     monkeypatch.setattr(RecurrentNetwork, "__call__", nothing)
     later = FRONT.copy()
@@ -153,27 +155,12 @@ def test_results_come_near_what_the_network_says() -> None:
     network = load_recurrent_network(DATA)
     answers_m, spread_m, _ = network(correction.corrector.features, network.initial_hidden(2))
     points = COST.keypoints(state)
-    answers_m = limited(answers_m, spread_m)
+    answers_m = limited(answers_m[:, DISPLACEMENTS], spread_m[:, DISPLACEMENTS])
     # The distance of a measured person is kept.
     answers_m[:, MIDDLE_Z] = 0.0
     wanted = moved(points, answers_m)
     off, before = (np.linalg.norm(p - wanted, axis=1).mean() for p in (found, points))
     assert off < 0.5 * before
-
-
-def test_displacements_vanish_where_the_networks_differ() -> None:
-    answers = np.zeros((2, 9))
-    answers[0, :3] = 0.03, 0.0, 0.04
-    answers[1, 6:] = 0.1
-    assert np.allclose(limited(answers, np.zeros((2, 9))), answers)
-    spread = np.zeros((2, 9))
-    spread[0, 1] = 0.05
-    spread[1, 6:] = 1.0
-    found = limited(answers, spread)
-    # A spread as large as the displacement halves it.
-    assert found[0, :3] == pytest.approx([0.015, 0.0, 0.02])
-    assert np.abs(found[1, 6:]).max() < 0.1 / 90
-    assert np.allclose(limited(answers, spread, doubt=0.0), answers)
 
 
 def test_a_correction_that_leaves_the_silhouette_is_not_made() -> None:
@@ -186,9 +173,9 @@ def test_a_correction_that_leaves_the_silhouette_is_not_made() -> None:
     network = load_recurrent_network(DATA)
 
     def far(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
-        answers = np.zeros((2, 9))
+        answers = np.zeros((2, N_ANSWERS))
         answers[:, 0] = [0.8, -0.8]
-        return answers, np.zeros((2, 9)), hidden
+        return answers, np.zeros((2, N_ANSWERS)), hidden
 
     points = cost.keypoints(FRONT)
     found = Result(NOBODY, FRONT, STDDEV, points, iou, search(FRONT), VIEWPOINTS)
@@ -208,6 +195,23 @@ def test_cameras_that_show_depth_are_not_corrected(yaw_deg: float, is_moved: boo
     corrector = learned(COST, CAMERA, 2)
     assert np.allclose(corrector(found), points) != is_moved
     assert (corrector.deviations(found) is not None) == is_moved
+
+
+def test_the_chance_of_error_is_that_of_the_log_odds(monkeypatch: pytest.MonkeyPatch) -> None:
+    def said(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
+        answers = np.zeros((2, N_ANSWERS))
+        answers[0, 9:], answers[1, 9:] = np.log([1 / 9, 1.0, 3.0]), np.log([4.0, 99.0, 1 / 99])
+        return answers, np.zeros((2, N_ANSWERS)), hidden
+
+    monkeypatch.setattr(RecurrentNetwork, "__call__", said)
+    corrector = learned(COST, CAMERA, 1)
+    points = COST.keypoints(FRONT)
+    found = Result(NOBODY, FRONT, STDDEV, points, NO_IOU, search(FRONT), VIEWPOINTS)
+    corrector(found)
+    assert corrector.chances_of_error() == pytest.approx([0.1, 0.5, 0.75, 0.8, 0.99, 0.01])
+    apart = Viewpoints.of(0.0, [0.0, np.pi / 3], True)
+    corrector(found._replace(viewpoints=apart))
+    assert corrector.chances_of_error() is None
 
 
 def test_what_was_before_counts() -> None:

@@ -56,6 +56,8 @@ def run_of(session: RecordedSession, postures: np.ndarray, **changes: Any) -> Se
         "keypoints_m": session.keypoints_m.copy(),
         "postures": postures.copy(),
         "stddevs": np.full((N, 12), 0.1),
+        "keypoint_states": np.full((N, 6), "tracked"),
+        "chances": np.full((N, 6), 0.1),
         "milliseconds": np.full(N, 2.0),
     }
     return SessionRun(**{**values, **changes})

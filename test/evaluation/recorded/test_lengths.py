@@ -25,7 +25,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> RecordedSession:
 
 def run_of(body: BodyModel) -> SessionRun:
     nothing = np.empty(0)
-    return SessionRun(body, "", np.empty(0, str), nothing, nothing, nothing, nothing)
+    no_states = np.empty(0, str)
+    return SessionRun(body, "", no_states, *[nothing] * 3, no_states, nothing, nothing)
 
 
 def test_the_true_body_has_the_true_lengths(session: RecordedSession) -> None:

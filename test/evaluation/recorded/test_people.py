@@ -69,7 +69,10 @@ def run_of(session: RecordedSession, postures: np.ndarray, points: np.ndarray) -
     states = np.full(N, "tracking", dtype="<U16")
     states[:2] = "uncertain"
     stddevs = np.full((N, 12), 0.1)
-    return SessionRun(BODY, "", states, points, postures, stddevs, np.full(N, 2.0), 30.0)
+    of_keypoints = np.full((N, 6), "tracked"), np.full((N, 6), 0.1)
+    return SessionRun(
+        *(BODY, "", states, points, postures, stddevs), *of_keypoints, np.full(N, 2.0), 30.0
+    )
 
 
 def test_the_torso_is_found_from_hips_and_shoulders(

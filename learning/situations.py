@@ -1,0 +1,299 @@
+"""Situations that the tracker is not made for, and what its states say about them.
+
+python -m learning.situations --rocketbox FOLDER --makehuman FOLDER --output FILE.md
+
+Simulated people who gesture are measured before a level camera, then one thing goes wrong. The
+table has the error, the state and the deviations; silhouettes are perfect but for the situation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.config import PRESETS
+from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
+from cardbox_tracker.estimation.filtering.correction import FAR_M
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS
+from cardbox_tracker.estimation.initialization.config import InitializationConfig
+from cardbox_tracker.estimation.initialization.measure import initialize_body
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.evaluation.metrics import beside_shoulders
+from cardbox_tracker.files import atomic_path
+from cardbox_tracker.vision.camera import Camera
+from learning.bodies import FAMILIES, RiggedBody, draw
+from learning.command_line import run
+from learning.motions.gestures import gestures
+from learning.motions.reference import Pose, poses, reference_pose
+from learning.motions.rotations import about_axis
+from learning.rendering import render
+from learning.room import Viewpoint
+
+FloatArray = NDArray[np.float64]
+Silhouette = NDArray[np.uint8]
+
+SEED, FPS, SECONDS = 29, 15.0, 20.0
+STANDING_S = 2.0
+"""Time before the situation begins, s."""
+CAMERA = Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
+PLACE_M = np.array([2.3, 0.0, 1.2])
+"""Optical centre in the world of a person who stands at the origin."""
+_LIGHT = np.array([0.0, -0.6, -0.8])
+
+
+def unchanged(silhouette: Silhouette, _: int) -> Silhouette:
+    """Return the silhouette."""
+    return silhouette
+
+
+@dataclass(frozen=True)
+class Situation:
+    """One thing that goes wrong.
+
+    Attributes:
+        name: in the table.
+        turned: rotation (3, 3) of the person in the world about the hips.
+        moved_m: translation (3,) of the person, forward is towards the camera.
+        camera: camera that takes the images; the tracker knows ``CAMERA``.
+        told: camera that the tracker is told, for measurement and tracking.
+        size: size of the person of whom the body was measured, relative to this one.
+        changed: changes the silhouette of image number n.
+        other_m: path (2, 3) of a second person, from the first image to the last; None for nobody.
+    """
+
+    name: str
+    turned: FloatArray = field(default_factory=lambda: np.eye(3))
+    moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    camera: Camera = CAMERA
+    told: Camera = CAMERA
+    size: float = 1.0
+    changed: Callable[[Silhouette, int], Silhouette] = unchanged
+    other_m: FloatArray | None = None
+
+
+def shifted(silhouette: Silhouette, _: int, columns: int) -> Silhouette:
+    """Return the silhouette of a camera that was turned aside by a number of pixels."""
+    return np.roll(silhouette, columns, axis=1)
+
+
+def mirrored(silhouette: Silhouette, _: int) -> Silhouette:
+    """Return the silhouette of a camera that mirrors its images."""
+    return silhouette[:, ::-1]
+
+
+def with_coat_stand(silhouette: Silhouette, _: int) -> Silhouette:
+    """Return the silhouette with a coat stand that touches the person's side."""
+    result = silhouette.copy()
+    cv2.rectangle(result, (205, 60), (211, 239), 255, -1)
+    cv2.ellipse(result, (208, 85), (22, 40), 0, 0, 360, 255, -1)
+    return result
+
+
+def with_chair(silhouette: Silhouette, _: int) -> Silhouette:
+    """Return the silhouette with the back of a chair before the person's hips."""
+    result = silhouette.copy()
+    cv2.rectangle(result, (110, 165), (200, 239), 255, -1)
+    return result
+
+
+_BACK = about_axis(2, np.array([np.pi]))[0]
+_LYING = about_axis(0, np.array([np.pi / 2]))[0]
+_TWO_DEGREES_PX = round(290.0 * np.tan(np.radians(2.0)))
+SITUATIONS = (
+    Situation("none"),
+    Situation("back to the camera", turned=_BACK),
+    Situation("lying on the side", turned=_LYING, moved_m=(0.0, 0.0, 0.2)),
+    Situation("head alone in view", moved_m=(0.0, 0.0, -1.15)),
+    Situation("hips below the image", moved_m=(0.0, 0.0, -0.6)),
+    Situation("0.8 m from the camera", moved_m=(1.5, 0.0, 0.0)),
+    Situation("5 m from the camera", moved_m=(-2.7, 0.0, 0.0)),
+    Situation("second person beside", other_m=np.array([[0.0, 0.75, 0.0]] * 2)),
+    Situation("second person crosses", other_m=np.array([[0.5, -2.0, 0.0], [0.5, 2.0, 0.0]])),
+    Situation("coat stand as foreground", changed=with_coat_stand),
+    Situation("chair as foreground", changed=with_chair),
+    Situation("body of somebody 25 % smaller", size=0.75),
+    Situation("camera bumped by 3 px", changed=partial(shifted, columns=3)),
+    Situation("camera turned by 2 degrees", changed=partial(shifted, columns=_TWO_DEGREES_PX)),
+    Situation("mirrored image", changed=mirrored),
+    Situation("focal length told 20 % too long", told=replace(CAMERA, fx=348.0, fy=348.0)),
+    Situation("pitch told 15 degrees wrong", told=CAMERA.with_pitch(float(np.radians(15.0)))),
+)
+
+
+class Row(NamedTuple):
+    """Figures of the images after the situation began; shares in %, errors in cm."""
+
+    absolute: float
+    aligned: float
+    tracking: float
+    uncertain: float
+    far: float
+    hand_far: float
+    deviation_deg: float
+
+
+def silhouette_of(
+    body: RiggedBody, pose: Pose, turned: FloatArray, moved_m: FloatArray, camera: Camera
+) -> tuple[Silhouette, FloatArray]:
+    """Return the silhouette (H, W) and the keypoints (6, 3), metres in the optical frame."""
+    posed = body.posed(*pose)
+    viewpoint = Viewpoint(camera, PLACE_M)
+
+    def there(points_m: NDArray[np.floating[Any]]) -> FloatArray:
+        return viewpoint.optical((points_m - posed.hips) @ turned.T + posed.hips + moved_m)
+
+    rendering = render(there(posed.vertices), body.faces, body.colours, camera, _LIGHT)
+    return 255 * rendering.silhouette.astype(np.uint8), there(posed.keypoints)
+
+
+def measured(body: RiggedBody, told: Camera, seed: int) -> BodyModel:
+    """Return the body measured before ``CAMERA`` by somebody who believes in ``told``."""
+    still = np.eye(3), np.zeros(3), CAMERA
+    references = {
+        name: silhouette_of(body, reference_pose(name), *still)[0]
+        for name in ("front", "side", "arms")
+    }
+    config = InitializationConfig(
+        distance_m=float(PLACE_M[0]),
+        camera_pitch_rad=told.pitch_rad,
+        check_postures=False,
+        seed=seed,
+    )
+    return initialize_body(references, told, config).body
+
+
+def measurable(family: str, folders: Mapping[str, Path], count: int) -> list[RiggedBody]:
+    """Return people of a family who can be measured; wide clothes can make that impossible."""
+    found: list[RiggedBody] = []
+    for number in itertools.count():
+        body = draw(np.random.default_rng((SEED, number)), [family], folders)
+        with suppress(CardboxError):
+            measured(body, CAMERA, number)
+            found.append(body)
+        if len(found) == count:
+            break
+    return found
+
+
+def scaled(body: BodyModel, size: float) -> BodyModel:
+    """Return the body of somebody of another size at the same place."""
+    return replace(body, person=replace(body.person, sizes=size * body.sizes))
+
+
+def tracked(situation: Situation, people: Sequence[RiggedBody]) -> Row:
+    """Track all people in a situation."""
+    off_m, states, deviations = [], [], []
+    for seed, body in enumerate(people):
+        motion = gestures("", SECONDS, np.random.default_rng((SEED, seed))).resampled(FPS)
+        person = scaled(measured(body, situation.told, seed), situation.size)
+        tracker = Tracker(person, situation.told, PRESETS["default"](), np.random.default_rng(seed))
+        other = people[(seed + 1) % len(people)]
+        standing = [reference_pose("front")] * round(STANDING_S * FPS)
+        every = [*standing, *poses(motion)]
+        for number, pose in enumerate(every):
+            if number < len(standing):
+                silhouette, _ = silhouette_of(body, pose, np.eye(3), np.zeros(3), CAMERA)
+                tracker.track(silhouette, stamp_ns=round(number * 1e9 / FPS))
+                continue
+            given = situation.turned, np.array(situation.moved_m), situation.camera
+            silhouette, true_m = silhouette_of(body, pose, *given)
+            if situation.other_m is not None:
+                share = (number - len(standing)) / len(motion)
+                path_m = situation.other_m[0] + share * np.diff(situation.other_m, axis=0)[0]
+                second = silhouette_of(other, reference_pose("front"), np.eye(3), path_m, CAMERA)[0]
+                silhouette = np.maximum(silhouette, second)
+            silhouette = np.ascontiguousarray(situation.changed(silhouette, number))
+            found = tracker.track(silhouette, stamp_ns=round(number * 1e9 / FPS))
+            states.append(found.state)
+            if found.keypoints_m is None or found.posture_stddev is None:
+                off_m.append(np.full((6, 3), np.nan))
+                deviations.append(np.nan)
+                continue
+            off_m.append(found.keypoints_m - true_m)
+            deviations.append(float(np.degrees(found.posture_stddev[1:]).mean()))
+    return _row(np.array(off_m), np.array(states), np.array(deviations))
+
+
+def _row(off_m: FloatArray, states: NDArray[np.str_], deviations_deg: FloatArray) -> Row:
+    distances_m = np.linalg.norm(off_m, axis=2)
+    aligned_m = np.linalg.norm(beside_shoulders(off_m), axis=2)
+    is_tracking = states == TRACKING
+
+    def percent(which: NDArray[np.bool_]) -> float:
+        return 100.0 * float(which.mean())
+
+    has = np.isfinite(distances_m).all(axis=1)
+    absolute, aligned = (
+        100.0 * float(one[has].mean()) if has.any() else np.nan for one in (distances_m, aligned_m)
+    )
+    far = distances_m.mean(axis=1) > FAR_M
+    hand_far = (distances_m[:, HANDS] > FAR_M).any(axis=1)
+    return Row(
+        absolute,
+        aligned,
+        percent(is_tracking),
+        percent(states == UNCERTAIN),
+        percent(is_tracking & far),
+        percent(is_tracking & hand_far),
+        float(deviations_deg[has].mean()) if has.any() else np.nan,
+    )
+
+
+_TEXT = """\
+# Situations that the tracker is not made for
+
+Simulated people ({people}) gesture for {seconds:.0f} s, {fps:.0f} images a second, after they were
+measured 2.3 m before a level camera; then one thing goes wrong. Silhouettes are perfect otherwise.
+Errors are in cm, absolute and after both skeletons are shifted to the middle of their shoulders;
+shares are of all images: those with the state `tracking` or `uncertain`, and those with `tracking`
+although the mean error, or a hand's, is beyond 30 cm. Deviations are means over the angles, deg.
+Made by `python -m learning.situations`, see [learning](../research/learning.md).
+
+| situation | absolute | aligned | `tracking` | `uncertain` | mean far | hand far | deviation |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+def main(args: list[str] | None = None) -> int:
+    """Track all situations and write the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    for family in FAMILIES:
+        parser.add_argument(f"--{family}", type=Path, required=True)
+    parser.add_argument("--people", type=int, default=2, help="of each family (default: 2)")
+    parser.add_argument("--only", nargs="*", help="names of situations")
+    parser.add_argument("--output", type=Path)
+    given = parser.parse_args(args)
+    folders = {family: getattr(given, family) for family in FAMILIES}
+    people = [one for family in FAMILIES for one in measurable(family, folders, given.people)]
+    lines = []
+    for situation in SITUATIONS:
+        if given.only and situation.name not in given.only:
+            continue
+        row = tracked(situation, people)
+        cells = "{:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} | {:.0f}".format(*row)
+        lines.append(f"| {situation.name} | {cells} |")
+        print(lines[-1], flush=True)
+    if given.output:
+        names = ", ".join(one.name for one in people)
+        text = _TEXT.format(people=names, seconds=SECONDS, fps=FPS)
+        with atomic_path(given.output) as temporary:
+            temporary.write_text(text + "\n".join(lines) + "\n", encoding="utf-8")
+        print(f"written: {given.output}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run(main))
