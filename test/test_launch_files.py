@@ -217,6 +217,11 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
     assert (parameters["width"], parameters["loop"]) == (320, True)
 
 
+def test_live_leaves_the_rate_of_a_file_to_the_camera(launch: Callable[..., Any]) -> None:
+    nodes = launch("live", file=__file__, publish_tf="false")
+    assert nodes[-1].options["parameters"][1]["rate_hz"] == 0.0
+
+
 def namespaces(nodes: list[Action]) -> list[str]:
     """The part of each node's namespace below that of all."""
     parts = [node.options["namespace"] for node in nodes]

@@ -31,6 +31,7 @@ from cardbox_tracker.vision.camera_device import (
 
 _RETRY_S = 1.0
 _SETTLE_S = 0.5
+_USUAL_HZ = 15.0
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,8 @@ class CameraParameters(NodeParameters):
         480, "height to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     rate_hz: float = parameter(
-        15.0,
-        "images a second; 0 takes the file's own rate",
+        0.0,
+        "images a second; 0: the file's own rate, and 15 of a device",
         unit="Hz",
         limits=(0.0, 240.0),
         effect=AT_START,
@@ -124,14 +125,13 @@ class CameraNode(CardboxNode):
         capture = open_device(settings.device)
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height)
-        if settings.rate_hz > 0:
-            capture.set(cv2.CAP_PROP_FPS, settings.rate_hz)
+        capture.set(cv2.CAP_PROP_FPS, settings.rate_hz or _USUAL_HZ)
         return capture
 
     def _period(self, rate_hz: float) -> float:
         if rate_hz <= 0:
             rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / 15.0
+        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / _USUAL_HZ
 
     def _read(self) -> None:
         """Read and publish images at the rate; a file stops or starts over at its end."""
