@@ -15,14 +15,13 @@ from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import PLACE, POSTURE
-from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import atomic_path, stamp_text
 from cardbox_tracker.outputs import JOINT_STATE_NAMES, METRICS, joint_values
+from cardbox_tracker.recordings.overlay_video import overlay_video
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
@@ -42,23 +41,17 @@ NECK_COLUMNS = NECK_NAMES
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
 
-_VIDEO_SCALE = 2
-# Rate of a video of a single image.
-_USUAL_HZ = 15.0
-
 
 class TrackFiles(NamedTuple):
     """Files to write; None for one that is not wanted.
 
     Attributes:
         csv: table with one row for each image.
-        video: overlay video.
-        fps: frames per second of the video; None for the rate of the recording.
+        video: overlay video, at the rate and the resolution of the recording.
     """
 
     csv: Path | None = None
     video: Path | None = None
-    fps: float | None = None
 
 
 _NO_FILES = TrackFiles()
@@ -123,10 +116,9 @@ def track_recording(
             table = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
             rows = csv.writer(table, lineterminator="\n")
             rows.writerow((*CSV_HEADER, *NECK_COLUMNS) if has_points else CSV_HEADER)
-        draw = None
         if files.video is not None:
-            size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
-            draw = stack.enter_context(video_file(files.video, size, files.fps or _rate(recording)))
+            video = stack.enter_context(overlay_video(files.video, recording))
+            observers = (video, *observers)
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
@@ -137,12 +129,6 @@ def track_recording(
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
-            if draw is not None:
-                draw(
-                    draw_overlay(
-                        frame.picture, tracker.body, tracker.camera, estimate, _VIDEO_SCALE
-                    )
-                )
             for observe in observers:
                 observe(frame, estimate, tracker)
             if tracker.agreement is not None and tracker.agreement.is_due:
@@ -157,14 +143,6 @@ def track_recording(
         tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(recording.names[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
-
-
-def _rate(recording: Recording) -> float:
-    """Return the images a second, Hz, as exactly as a video can have them."""
-    try:
-        return round(1e9 / max(1, recording.first.period_ns()), 2)
-    except BagError:
-        return _USUAL_HZ
 
 
 def _neck_fields(estimate: Estimate) -> list[str]:
