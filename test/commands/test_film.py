@@ -56,7 +56,7 @@ def test_a_film_is_tracked_with_a_stature(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["me.body.yaml", "me.csv", "out.mp4"]
     with (tmp_path / "me.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["stamp"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
+    assert [float(row["time_s"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
     assert sum(row["state"] == "tracking" for row in rows) > 0.8 * len(rows)
     body = load_body_model("me.body.yaml")
     assert body.unknown == ()

@@ -28,16 +28,20 @@ from cardbox_tracker.outputs import (
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
-    """Return joint values, rad and metres (or their deviations), as positions.
+    """Return joint values, rad and metres (or their deviations), as positions, and velocities.
 
     Raises:
         NotFiniteError: a value is not a finite number.
     """
-    return JointState(
+    message = JointState(
         header=header,
         name=list(joints.names),
         position=array.array("d", _finite(joints.values, "joint states").tolist()),
     )
+    if joints.velocities is not None:
+        finite = _finite(joints.velocities, "velocities of the joints")
+        message.velocity = array.array("d", finite.tolist())
+    return message
 
 
 def joint_values_of(message: JointState) -> JointValues:

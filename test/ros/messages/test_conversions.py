@@ -219,9 +219,16 @@ def test_joint_state_has_names_positions_and_header() -> None:
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
     assert len(message.velocity) == len(message.effort) == 0
-    names, values = results.joint_values_of(message)
-    assert names == JOINT_NAMES
-    np.testing.assert_array_equal(values, posture)
+    read = results.joint_values_of(message)
+    assert read.names == JOINT_NAMES
+    np.testing.assert_array_equal(read.values, posture)
+
+
+def test_joint_state_has_velocities_where_they_are_known() -> None:
+    moving = JointValues(("a", "b"), np.zeros(2), np.array([0.5, -2.0]))
+    assert list(results.joint_state_message(HEADER, moving).velocity) == [0.5, -2.0]
+    with pytest.raises(NotFiniteError, match="velocities"):
+        results.joint_state_message(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
 
 
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
