@@ -1,7 +1,9 @@
-"""Progress bars of the commands."""
+"""Progress bars of the commands, and the seconds of a wait for a log."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -19,3 +21,26 @@ def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
                 bar.update(percent - bar.n)
 
         yield show
+
+
+@contextmanager
+def told(say: Callable[[str], object], text: str, every_s: float = 5.0) -> Iterator[None]:
+    """Call ``say`` with ``text`` at once, and every ``every_s`` with the seconds that have passed.
+
+    ``say`` is also called by another thread, while the context lasts.
+    """
+    say(text)
+    begun_s, done = time.monotonic(), threading.Event()
+
+    def tell() -> None:
+        while not done.wait(every_s):
+            say(f"{text}: {time.monotonic() - begun_s:.0f} s so far")
+
+    # A signal that ends the program must not wait for this thread.
+    thread = threading.Thread(target=tell, name="told", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
