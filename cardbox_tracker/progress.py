@@ -11,9 +11,16 @@ from tqdm import tqdm
 
 
 @contextmanager
-def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
-    """Yield a function that updates the bar to a finished fraction, 0 to 1."""
-    with tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], None]]:
+    """Yield a function that updates the bar to a finished fraction, 0 to 1.
+
+    The bar is drawn again every ``every_s``, because its seconds go on.
+    """
+    with (
+        tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar,
+        # The first run compiles for minutes before the first image; the seconds go on meanwhile.
+        told(lambda _: bar.refresh(), text, every_s),
+    ):
 
         def show(fraction: float) -> None:
             percent = min(100, max(0, round(100 * fraction)))
