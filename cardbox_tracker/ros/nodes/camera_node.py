@@ -103,7 +103,7 @@ class CameraNode(CardboxNode):
         self._images = self.advertise(Image, "image_raw", qos.CAMERA)
         self._infos = self.advertise(CameraInfo, "camera_info", qos.CAMERA)
         self._capture = open_video(settings.file) if settings.file else self._open_device()
-        self._period_s = self._period(settings.rate_hz)
+        self._period_s = self._period(settings) if settings.file else 0.0
         self._calibration = (
             load_calibration(user_path(settings.calibration_file))
             if settings.calibration_file
@@ -128,9 +128,9 @@ class CameraNode(CardboxNode):
         capture.set(cv2.CAP_PROP_FPS, settings.rate_hz or _USUAL_HZ)
         return capture
 
-    def _period(self, rate_hz: float) -> float:
-        if rate_hz <= 0:
-            rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
+    def _period(self, settings: CameraParameters) -> float:
+        """Return the seconds from image to image of a file."""
+        rate_hz = settings.rate_hz or self._capture.get(cv2.CAP_PROP_FPS)
         return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / _USUAL_HZ
 
     def _read(self) -> None:
