@@ -34,6 +34,8 @@ TEST = [
 VIEW = ["rerun-sdk>=0.41,<0.42"]
 # Inverse kinematics of a robot's hand; a joint map needs none of these.
 RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
+# Writes tables of results in Parquet; what is used of it has not changed for many versions.
+PARQUET = ["pyarrow>=15,<30"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
@@ -96,6 +98,7 @@ setup(
         "learn": LEARN,
         "experiments": EXPERIMENTS,
         "detector": DETECTOR,
+        "parquet": PARQUET,
     },
     entry_points={
         "console_scripts": [

@@ -225,11 +225,6 @@ def _refused(target: Path, error: OSError | str) -> CardboxError:
     )
 
 
-def stamp_text(stamp_ns: int) -> str:
-    """Return a stamp in ns as seconds with nine decimals."""
-    return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
-
-
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Write a CSV file atomically.
 

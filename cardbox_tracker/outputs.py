@@ -1,7 +1,7 @@
 """The tracker's outputs for an image: topics, joints and figures.
 
 :mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
-as messages of a bag, and :mod:`.recordings.track` as rows of a CSV file. Add a joint to
+as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
 ``JOINT_STATE_NAMES`` and the two functions after it, a topic to ``outputs``, and a number to
 ``METRICS``.
 """
@@ -14,20 +14,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
-from cardbox_tracker.estimation.estimate import Estimate, KeypointState
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.keypoint_status import KeypointStates, keypoint_states
 
 
 class JointValues(NamedTuple):
-    """Values (n,) of the joints ``names``, rad and metres."""
+    """Values (n,) of the joints ``names``, rad and metres.
+
+    ``velocities`` (n,) are their changes, rad/s and m/s; None if unknown.
+    """
 
     names: tuple[str, ...]
     values: FloatArray
+    velocities: FloatArray | None = None
 
 
 class Points(NamedTuple):
@@ -48,14 +52,6 @@ class Text(NamedTuple):
     text: str
 
 
-class KeypointStates(NamedTuple):
-    """States of the keypoints ``names``, and their probabilities of being off by over 30 cm."""
-
-    names: tuple[str, ...]
-    states: tuple[KeypointState, ...]
-    chances: FloatArray
-
-
 Value = JointValues | Points | Markers | Text | KeypointStates
 
 
@@ -69,6 +65,7 @@ class Output:
         of: value for an estimate with a posture; None if the estimate has no such value.
         absent: value that is sent once when the posture is lost; None if nothing is sent.
         needs_posture: False if ``of`` has a value for every estimate.
+        moves: whether the values are joints with velocities.
     """
 
     topic: str
@@ -76,6 +73,7 @@ class Output:
     of: Callable[[Estimate, Tracker], Value | None]
     absent: Value | None = None
     needs_posture: bool = True
+    moves: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,18 +103,16 @@ class Metric:
         return "" if value is None else format(value, self.format)
 
 
-CHANCE_KEY = "chance of an error beyond 0.3 m"
-"""Key of the probability in the messages of ``keypoint_states``."""
-LEVELS = {
-    KeypointState.TRACKED: 0,
-    KeypointState.UNCERTAIN: 1,
-    KeypointState.LOST: 2,
-    KeypointState.HIDDEN: 3,
-}
-"""Levels of diagnostic_msgs/DiagnosticStatus: ok, warning, error, stale."""
+# The mean velocity over a longer gap is not that of the moment.
+_LONGEST_NS = 1_000_000_000
 
 JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
 """Joints of ``joint_states``: those of the posture, the person's place, then the neck."""
+
+
+def unit_of(joint: str) -> str:
+    """Return the unit of a joint, ``m`` or ``rad``."""
+    return "m" if joint in (JOINT_NAMES[TORSO_Y], *PLACE_NAMES) else "rad"
 
 
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
@@ -200,18 +196,6 @@ def _keypoints(estimate: Estimate, _: Tracker) -> Points | None:
     return None if estimate.keypoints_m is None else Points(estimate.keypoints_m)
 
 
-def keypoint_states(estimate: Estimate) -> KeypointStates | None:
-    """Return the states of the keypoints of an estimate; None if the filter has none."""
-    if estimate.keypoint_states is None or estimate.keypoint_chances is None:
-        return None
-    return KeypointStates(KEYPOINT_NAMES, estimate.keypoint_states, estimate.keypoint_chances)
-
-
-def chance_text(chance: float) -> str:
-    """Return a probability as the messages have it."""
-    return f"{chance:.3f}"
-
-
 def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
@@ -231,7 +215,12 @@ def outputs(torso_place: bool = True) -> tuple[Output, ...]:
             "tracking_state", Text, lambda estimate, _: Text(estimate.state), needs_posture=False
         ),
         Output("keypoint_states", KeypointStates, lambda found, _: keypoint_states(found)),
-        Output("joint_states", JointValues, lambda found, _: joint_values(found, torso_place)),
+        Output(
+            "joint_states",
+            JointValues,
+            lambda found, _: joint_values(found, torso_place),
+            moves=True,
+        ),
         Output(
             "joint_states_stddev",
             JointValues,
@@ -260,15 +249,18 @@ class OutputStream:
         """Begin before the first image with the ``topics`` of :func:`outputs`."""
         self._topics = topics
         self._state = ""
+        self._motion = _Motion()
 
     def values(
         self,
+        stamp_ns: int,
         estimate: Estimate,
         tracker: Tracker,
         wanted: Callable[[Output], bool] = lambda _: True,
     ) -> Iterator[tuple[Output, Value]]:
-        """Yield the values to send for an image; only ``wanted`` ones are computed."""
+        """Yield the values to send for the image of a stamp; only ``wanted`` ones are computed."""
         is_new, self._state = estimate.state != self._state, estimate.state
+        velocities = self._motion.velocities(stamp_ns, estimate, tracker)
         for output in self._topics:
             has_value = estimate.posture is not None or not output.needs_posture
             if not has_value and not (is_new and output.absent):
@@ -276,5 +268,36 @@ class OutputStream:
             if not wanted(output):
                 continue
             value = output.of(estimate, tracker) if has_value else output.absent
+            if output.moves and isinstance(value, JointValues) and velocities is not None:
+                value = value._replace(velocities=velocities[: len(value.names)])
             if value is not None:
                 yield output, value
+
+
+class _Motion:
+    """Velocities of the joints, from the results of two images that follow each other."""
+
+    def __init__(self) -> None:
+        self._last: tuple[int, FloatArray, bool, Tracker] | None = None
+
+    def velocities(self, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> FloatArray | None:
+        """Return those of ``JOINT_STATE_NAMES``, rad/s and m/s; None without an image before.
+
+        An image counts that has a posture of the same tracker, at most ``_LONGEST_NS`` before.
+        """
+        before, self._last = self._last, None
+        joints = joint_values(estimate)
+        if joints is None:
+            return None
+        has_neck = estimate.neck is not None
+        self._last = stamp_ns, joints.values, has_neck, tracker
+        if before is None or before[3] is not tracker:
+            return None
+        step_ns = stamp_ns - before[0]
+        if not 0 < step_ns <= _LONGEST_NS:
+            return None
+        found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
+        if not (has_neck and before[2]):
+            # A face that appears does not turn.
+            found[-len(NECK_NAMES) :] = 0.0
+        return found

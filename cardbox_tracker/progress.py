@@ -1,7 +1,9 @@
-"""Progress bars of the commands."""
+"""Progress bars of the commands, and the seconds of a wait for a log."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -9,9 +11,16 @@ from tqdm import tqdm
 
 
 @contextmanager
-def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
-    """Yield a function that updates the bar to a finished fraction, 0 to 1."""
-    with tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], None]]:
+    """Yield a function that updates the bar to a finished fraction, 0 to 1.
+
+    The bar is drawn again every ``every_s``, because its seconds go on.
+    """
+    with (
+        tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar,
+        # The first run compiles for minutes before the first image; the seconds go on meanwhile.
+        told(lambda _: bar.refresh(), text, every_s),
+    ):
 
         def show(fraction: float) -> None:
             percent = min(100, max(0, round(100 * fraction)))
@@ -19,3 +28,26 @@ def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
                 bar.update(percent - bar.n)
 
         yield show
+
+
+@contextmanager
+def told(say: Callable[[str], object], text: str, every_s: float = 5.0) -> Iterator[None]:
+    """Call ``say`` with ``text`` at once, and every ``every_s`` with the seconds that have passed.
+
+    ``say`` is also called by another thread, while the context lasts.
+    """
+    say(text)
+    begun_s, done = time.monotonic(), threading.Event()
+
+    def tell() -> None:
+        while not done.wait(every_s):
+            say(f"{text}: {time.monotonic() - begun_s:.0f} s so far")
+
+    # A signal that ends the program must not wait for this thread.
+    thread = threading.Thread(target=tell, name="told", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()

@@ -8,7 +8,9 @@ the error names the missing package.
 
 from __future__ import annotations
 
+import os
 import sys
+import sysconfig
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -55,8 +57,31 @@ def start(name: str, main: Callable[[], int]) -> int:
         return 1
 
 
+def other_package(script: str, package: str, environment: str) -> bool:
+    """Return whether an executable of an environment runs a package from elsewhere.
+
+    A sourced colcon workspace does this, because ``PYTHONPATH`` precedes the environment.
+
+    Args:
+        script: path of the executable.
+        package: folder of the package that runs.
+        environment: folder ``site-packages`` of the environment with its own copy.
+    """
+    own = os.path.join(environment, os.path.basename(package))
+    scripts = os.path.realpath(sysconfig.get_path("scripts"))
+    is_of_environment = os.path.realpath(os.path.dirname(script)) == scripts
+    return is_of_environment and os.path.isdir(own) and not os.path.samefile(own, package)
+
+
 def _run(name: str) -> int:
     """Import and run the program ``name``; return its exit code."""
+    package, environment = os.path.dirname(__file__), sysconfig.get_path("purelib")
+    if other_package(sys.argv[0], package, environment):
+        print(
+            f"{name}: this runs {package}, which PYTHONPATH or a sourced workspace has put before "
+            f"the cardbox_tracker in {environment}",
+            file=sys.stderr,
+        )
     # A node that ends by a signal succeeds; an interrupted command does not.
     interrupts.end_at_once(0 if name in NODES else None)
     code = start(name, lambda: import_module(NODES.get(name, COMMAND)).main())

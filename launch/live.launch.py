@@ -39,7 +39,10 @@ ARGUMENTS = {
     ),
     "width": Argument("640", "width to ask the device for, px", int, limits=(32, 8192)),
     "height": Argument("480", "height to ask the device for, px", int, limits=(32, 8192)),
-    "rate_hz": Argument("15.0", "images a second", float, limits=(0.0, 240.0)),
+    "rate_hz": Argument(
+        *("0.0", "images a second; 0: the file's own rate, and 15 of a device", float),
+        limits=(0.0, 240.0),
+    ),
     "loop": Argument("false", "play the file again and again", bool),
     "frame_id": Argument("camera_optical_frame", "name of the camera's optical frame"),
 }

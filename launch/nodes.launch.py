@@ -88,6 +88,11 @@ ARGUMENTS = {
     "keypoints": Argument("", "2D points of another detector: a topic, or a table FILE.csv"),
     "rula": Argument("false", "start the node rula: RULA scores of the posture", bool),
     "robot_file": Argument("", "start the node retarget with this robot arm, a URDF", Path),
+    "joint_map_file": Argument(
+        "",
+        "with robot_file: map of joints; empty: the hand is followed by inverse kinematics",
+        Path,
+    ),
     "single_process": Argument("false", "all nodes in one process, for least latency", bool),
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),
@@ -154,6 +159,11 @@ def _check(context: LaunchContext) -> list[object]:
             "launch argument silhouettes is detector; expected it without within_m and without "
             "single_process, because a node background would make silhouettes, too"
         )
+    if typed["joint_map_file"] and not typed["robot_file"]:
+        raise ValueError(
+            f"launch argument joint_map_file is '{given['joint_map_file']}'; expected it with "
+            "robot_file, the URDF of the robot whose joints it names"
+        )
     if not Path(given["config_dir"]).is_dir():
         raise ValueError(
             f"launch argument config_dir is '{given['config_dir']}'; expected a folder with the "
@@ -217,7 +227,9 @@ def _users(context: LaunchContext) -> list[object]:
     if typed["rula"]:
         wanted["rula"] = {}
     if typed["robot_file"]:
-        wanted["retarget"] = {"robot_file": typed["robot_file"]}
+        names = ("robot_file", "joint_map_file")
+        # An empty argument leaves the value of retarget.yaml.
+        wanted["retarget"] = {name: typed[name] for name in names if typed[name]}
     return [
         Node(
             package="cardbox_tracker",

@@ -40,7 +40,7 @@ ARGUMENTS = {
     "second_calibration_file": Argument("", "camera_calibration YAML of the second camera", Path),
     "width": Argument("640", "width to ask the devices for, px", int, limits=(32, 8192)),
     "height": Argument("480", "height to ask the devices for, px", int, limits=(32, 8192)),
-    "rate_hz": Argument("15.0", "images a second", float, limits=(0.0, 240.0)),
+    "rate_hz": Argument("0.0", "images a second; 0: 15", float, limits=(0.0, 240.0)),
 }
 # Arguments that are parameters of the node camera.
 OF_BOTH = ("width", "height", "rate_hz")

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
-from cardbox_tracker.estimation.estimate import KeypointState
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.estimation.filtering.correction import DATA as NETWORK
 from cardbox_tracker.estimation.filtering.correction import (
     DISPLACEMENTS,

@@ -217,6 +217,11 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
     assert (parameters["width"], parameters["loop"]) == (320, True)
 
 
+def test_live_leaves_the_rate_of_a_file_to_the_camera(launch: Callable[..., Any]) -> None:
+    nodes = launch("live", file=__file__, publish_tf="false")
+    assert nodes[-1].options["parameters"][1]["rate_hz"] == 0.0
+
+
 def namespaces(nodes: list[Action]) -> list[str]:
     """The part of each node's namespace below that of all."""
     parts = [node.options["namespace"] for node in nodes]
@@ -334,7 +339,20 @@ def test_what_uses_the_posture_is_started_where_it_is_asked_for(
     alone = executables(launch("nodes", **given))
     nodes = launch("nodes", rula="true", robot_file=arm, **given)
     assert executables(nodes) == [*alone, "rula", "retarget"]
-    assert parameters_of(nodes[-1])["robot_file"] == arm
+    assert parameters_of(nodes[-1]) == {"robot_file": arm}
+
+
+def test_a_joint_map_goes_to_the_robot_that_it_is_for(launch: Callable[..., Any]) -> None:
+    config = ROOT / "config"
+    both = {
+        "robot_file": str(config / "example_arm.urdf"),
+        "joint_map_file": str(config / "example_joint_map.yaml"),
+    }
+    nodes = launch("nodes", **both, publish_tf="false")
+    assert parameters_of(nodes[-1]) == both
+    with pytest.raises(Exception, match=r"joint_map_file is .*expected it with robot_file"):
+        launch("nodes", joint_map_file=both["joint_map_file"])
+    assert RUNNING == []
 
 
 @pytest.mark.parametrize(
@@ -371,6 +389,7 @@ def test_what_two_cameras_cannot_be_is_said_before_anything_runs(
         ("live", "cameras", "[left, right]", "nothing: live.launch.py has one camera"),
         ("nodes", "rula", "yes", "true or false"),
         ("nodes", "robot_file", "/nowhere.urdf", "a file that exists"),
+        ("nodes", "joint_map_file", "/nowhere.yaml", "a file that exists"),
         ("nodes", "rep155_id", "1st", "a letter, then"),
         ("nodes", "person_distance_m", "-1", "a number from 0.3 to 20"),
         ("nodes", "image_transport", "jpeg", "raw or compressed"),

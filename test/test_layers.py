@@ -23,6 +23,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("estimation",),
     ("ergonomics", "retargeting"),
     ("drawing",),
+    ("keypoint_status",),
     ("outputs",),
     ("tracking_report",),
     ("recordings",),

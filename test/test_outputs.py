@@ -39,6 +39,7 @@ from cardbox_tracker.outputs import (
 )
 from cardbox_tracker.vision.camera import Camera
 
+STAMP_NS = 5_000_000_000
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TRACKER = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
 POSTURE = reference_posture("arms")
@@ -66,11 +67,13 @@ TOPICS = [
 
 
 def topics(stream: OutputStream, estimate: Estimate, **options: Any) -> list[str]:
-    return [output.topic for output, _ in stream.values(estimate, TRACKER, **options)]
+    return [output.topic for output, _ in stream.values(STAMP_NS, estimate, TRACKER, **options)]
 
 
 def test_a_posture_is_all_topics_in_their_order() -> None:
-    found = {output.topic: value for output, value in OutputStream().values(FOUND, TRACKER)}
+    found = {
+        output.topic: value for output, value in OutputStream().values(STAMP_NS, FOUND, TRACKER)
+    }
     assert list(found) == TOPICS
     assert {output.topic: output.kind for output in OUTPUTS} == {
         topic: type(value) for topic, value in found.items()
@@ -117,7 +120,9 @@ def test_the_neck_is_last_and_has_deviations_if_it_was_seen() -> None:
 
 def test_without_the_place_there_are_the_twelve_joints() -> None:
     stream = OutputStream(outputs(torso_place=False))
-    found = {output.topic: cast(Any, value) for output, value in stream.values(SEEN, TRACKER)}
+    found = {
+        output.topic: cast(Any, value) for output, value in stream.values(STAMP_NS, SEEN, TRACKER)
+    }
     assert list(found) == TOPICS
     for topic, expected in (("joint_states", POSTURE), ("joint_states_stddev", 0.1)):
         assert found[topic].names == JOINT_NAMES
@@ -127,7 +132,7 @@ def test_without_the_place_there_are_the_twelve_joints() -> None:
 def test_markers_are_where_the_estimate_is() -> None:
     """0.25 m nearer is less z of a level camera, 0.05 m lower is more y."""
     at_rest, moved = (
-        cast(Any, {o.topic: v for o, v in OutputStream().values(e, TRACKER)}["markers"])
+        cast(Any, {o.topic: v for o, v in OutputStream().values(STAMP_NS, e, TRACKER)}["markers"])
         for e in (FOUND, PLACED)
     )
     for before, after in zip(at_rest.shapes, moved.shapes, strict=True):
@@ -138,7 +143,9 @@ def test_markers_are_where_the_estimate_is() -> None:
 def test_an_uncertain_posture_is_sent_with_its_state() -> None:
     found = [
         (output.topic, value)
-        for output, value in OutputStream().values(replace(FOUND, state=UNCERTAIN), TRACKER)
+        for output, value in OutputStream().values(
+            STAMP_NS, replace(FOUND, state=UNCERTAIN), TRACKER
+        )
     ]
     assert found[0] == ("tracking_state", Text("uncertain"))
     assert [topic for topic, _ in found] == TOPICS
@@ -148,7 +155,7 @@ def test_an_uncertain_posture_is_sent_with_its_state() -> None:
 def test_markers_go_once_when_the_posture_does(state: str) -> None:
     stream = OutputStream()
     topics(stream, FOUND)
-    gone = list(stream.values(Estimate(state), TRACKER))
+    gone = list(stream.values(STAMP_NS, Estimate(state), TRACKER))
     assert [(output.topic, value) for output, value in gone] == [
         ("tracking_state", Text(state)),
         ("markers", Markers(())),
@@ -163,6 +170,45 @@ def test_what_nobody_wants_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> N
     wanted = topics(stream, FOUND, wanted=lambda output: output.topic == "keypoints")
     assert wanted == ["keypoints"]
     assert topics(stream, Estimate(LOST), wanted=lambda _: False) == []
+
+
+def velocities_of(stream: OutputStream, at_s: float, *seen: Any) -> Any:
+    """Velocities of the joint states that a stream gives for an estimate and a tracker."""
+    found = {output.topic: value for output, value in stream.values(round(at_s * 1e9), *seen)}
+    assert getattr(found.get("joint_states_stddev"), "velocities", None) is None
+    return cast(JointValues, found["joint_states"]).velocities
+
+
+def test_joints_have_velocities_from_the_second_image_on_by_hand() -> None:
+    stream = OutputStream()
+    assert velocities_of(stream, 1.0, FOUND, TRACKER) is None
+    moved = replace(SEEN, posture=POSTURE + np.arange(12) / 100)
+    found = velocities_of(stream, 1.1, moved, TRACKER)
+    # The neck appears only now.
+    np.testing.assert_allclose(found, [*np.arange(12) / 10, 2.5, -0.5, 0.0, 0.0], atol=1e-12)
+    turned = replace(moved, neck=np.array([0.5, -0.1]))
+    found = velocities_of(stream, 1.3, turned, TRACKER)
+    np.testing.assert_allclose(found, [*[0.0] * 14, 0.5, 0.0], atol=1e-12)
+
+
+def test_velocities_begin_anew_after_a_gap_another_tracker_or_a_jump_of_the_stamps() -> None:
+    stream = OutputStream()
+    velocities_of(stream, 1.0, FOUND, TRACKER)
+    assert velocities_of(stream, 1.1, FOUND, TRACKER) is not None
+    list(stream.values(1_200_000_000, Estimate(LOST), TRACKER))
+    assert velocities_of(stream, 1.3, FOUND, TRACKER) is None
+    another = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
+    assert velocities_of(stream, 1.4, FOUND, another) is None
+    assert velocities_of(stream, 1.4, FOUND, another) is None
+    assert velocities_of(stream, 0.5, FOUND, another) is None
+    assert velocities_of(stream, 1.0, FOUND, another) is not None
+    assert velocities_of(stream, 3.5, FOUND, another) is None
+
+
+def test_without_the_place_velocities_are_those_of_the_twelve_joints() -> None:
+    stream = OutputStream(outputs(torso_place=False))
+    velocities_of(stream, 1.0, FOUND, TRACKER)
+    assert velocities_of(stream, 1.1, PLACED, TRACKER).tolist() == [0.0] * 12
 
 
 def test_figures_as_text() -> None:

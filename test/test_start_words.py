@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import sysconfig
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from cardbox_tracker.start import start
+from cardbox_tracker.start import other_package, start
 
 ROOT = Path(__file__).resolve().parents[1]
 WITHOUT = """
 import sys
-sys.modules[sys.argv[1]] = None  # an import of it fails, as under the system's Python
+sys.modules[sys.argv.pop(1)] = None  # an import of it fails, as under the system's Python
 from cardbox_tracker import start
 sys.exit(start.{name}())
 """
@@ -36,6 +38,54 @@ def test_a_missing_package_is_told_in_words(name: str, missing: str) -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_a_missing_library_of_the_robot_is_told_in_words() -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    given = ["--ros-args", "-p", f"robot_file:={ROOT / 'config' / 'example_arm.urdf'}"]
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT.format(name="retarget"), "daqp", *given],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    said = done.stdout + done.stderr
+    assert done.returncode == 1
+    assert "pip install cardbox_tracker[retarget]" in said and "joint_map_file" in said
+    assert "Traceback" not in said
+
+
 def test_another_fault_keeps_its_traceback() -> None:
     with pytest.raises(ModuleNotFoundError):
         start("tracker", lambda: import_module("cardbox_tracker.nothing").main())
+
+
+SCRIPT = Path(sysconfig.get_path("scripts")) / "cardbox"
+INSTALLED = Path(sysconfig.get_path("purelib")) / "cardbox_tracker"
+
+
+def test_only_an_executable_of_the_environment_can_run_another_package(tmp_path: Path) -> None:
+    environment, workspace = tmp_path / "environment", tmp_path / "workspace"
+    for folder in (environment, workspace):
+        (folder / "cardbox_tracker").mkdir(parents=True)
+    own, other = str(environment / "cardbox_tracker"), str(workspace / "cardbox_tracker")
+    assert other_package(str(SCRIPT), other, str(environment))
+    assert not other_package(str(SCRIPT), own, str(environment))
+    assert not other_package(str(SCRIPT), other, str(tmp_path / "without a copy"))
+    assert not other_package(str(workspace / "cardbox"), other, str(environment))
+
+
+@pytest.mark.skipif(
+    not SCRIPT.is_file() or not INSTALLED.is_dir(), reason="cardbox_tracker is not installed"
+)
+@pytest.mark.parametrize(("path", "lines"), [(ROOT, 1), (INSTALLED.parent, 0)])
+def test_a_package_before_the_installed_one_is_told_in_one_line(path: Path, lines: int) -> None:
+    done = subprocess.run(
+        [SCRIPT, "--version"],
+        env=os.environ | {"PYTHONPATH": str(path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.splitlines() if str(ROOT / "cardbox_tracker") in line]
+    assert len(told) == len(done.stderr.splitlines()) == lines

@@ -54,10 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--csv",
         type=Path,
         default=None,
-        metavar="OUT.csv",
-        help="table to write, one row per image; by default it has the name of the recording and "
-        "is in the current folder. With --stature, OUT.body.yaml beside it is the body that was "
-        "used",
+        metavar="OUT.csv|OUT.parquet",
+        help="table to write, one row per image (docs/results.md); by default it has the name of "
+        "the recording and is in the current folder. With --stature, OUT.body.yaml beside it is "
+        "the body that was used",
     )
     parser.add_argument(
         "--bag", type=Path, default=None, metavar="OUT", help="also write the topics of the tracker"
@@ -94,9 +94,11 @@ def run(options: argparse.Namespace) -> None:
             a result cannot be written.
     """
     from cardbox_tracker.body.model_file import save_body_model
+    from cardbox_tracker.recordings.result_table import check_table
     from cardbox_tracker.recordings.track import TrackFiles
 
     table = options.csv or Path(f"{_name(options.recording)}.csv")
+    check_table(table)
     model = None
     if options.stature is not None:
         # There is no place for a further file beside a pipe.

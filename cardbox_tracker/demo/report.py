@@ -120,9 +120,8 @@ def write_overlay(
     path: Path,
 ) -> None:
     """Write a video of the session's images with the published postures drawn over them."""
-    size = (_VIDEO_SCALE * camera.width, _VIDEO_SCALE * camera.height)
     nothing = Estimate("not_tracked")
-    with BagReader(session) as bag, video_file(path, size, 15.0) as write:
+    with BagReader(session) as bag, video_file(path, 15.0) as write:
         first = next(iter(result.truth.cameras), None)
         pipeline = SilhouettePipeline(bag.calibration(first), (camera.width, camera.height))
         for image in bag.images(bag.image_topic(first)):

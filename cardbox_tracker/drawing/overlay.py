@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import gaze_m
@@ -17,7 +18,7 @@ from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.model_frames import model_frames
-from cardbox_tracker.estimation.estimate import Estimate, KeypointState
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import clip_near, in_front

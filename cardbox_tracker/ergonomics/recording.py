@@ -11,13 +11,13 @@ import numpy as np
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.distribution import ScoreDistribution, expected
 from cardbox_tracker.ergonomics.tables import ACTION_LEVELS, HIGHEST
-from cardbox_tracker.files import stamp_text, write_table
+from cardbox_tracker.files import write_table
 
 ABOVE = 5
 """Score above which time is counted, since work has to be changed soon or at once."""
 
 CSV_HEADER = (
-    *("stamp", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
+    *("stamp_ns", "state", "score", "likeliest", f"chance_above_{ABOVE}"),
     *(f"chance_{score}" for score in range(1, HIGHEST + 1)),
     *("left_score", "right_score"),
 )
@@ -86,7 +86,7 @@ def write_csv(rows: Sequence[RulaRow], path: Path) -> None:
 
 
 def _fields(row: RulaRow) -> list[str]:
-    stamp = stamp_text(row.stamp_ns)
+    stamp = str(row.stamp_ns)
     if row.scores is None:
         return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
     scores = row.scores

@@ -8,21 +8,12 @@ person). Only ``tracking`` and ``uncertain`` have a posture.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
-
-
-class KeypointState(StrEnum):
-    """Whether a keypoint can be relied upon."""
-
-    TRACKED = "tracked"
-    UNCERTAIN = "uncertain"
-    HIDDEN = "hidden"
-    LOST = "lost"
 
 
 @dataclass(frozen=True)

@@ -195,13 +195,14 @@ class BagWriter:
         frame_id: str,
         names: Sequence[str],
         positions: NDArray[np.float64],
+        velocities: NDArray[np.float64] | None = None,
     ) -> None:
-        """Write joint positions, rad and metres."""
+        """Write joint positions, rad and metres, and velocities, rad/s and m/s, if known."""
         message = self.type("sensor_msgs/msg/JointState")(
             header=self.header(stamp_ns, frame_id),
             name=list(names),
             position=np.asarray(positions, np.float64),
-            velocity=np.zeros(0),
+            velocity=np.zeros(0) if velocities is None else np.asarray(velocities, np.float64),
             effort=np.zeros(0),
         )
         self.write(topic, message, stamp_ns)

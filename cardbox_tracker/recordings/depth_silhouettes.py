@@ -72,7 +72,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
                 continue
-            stamp_ns, time_s, image = seen
+            stamp_ns, time_s, image, recorded = seen
             if time_s > end_s:
                 break
             if time_s < start_s:
@@ -83,7 +83,7 @@ class DepthSilhouetteSource(SilhouetteSource):
             silhouette = silhouette_within(measured[1], self._within.metres)
             found = self._points(stamp_ns, image)
             pictures = brightness_of(image), silhouette, image
-            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found)
+            yield RecordedFrame(stamp_ns, time_s, *pictures, measured[1], found, recorded)
 
     @property
     def remarks(self) -> list[str]:

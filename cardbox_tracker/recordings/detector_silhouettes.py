@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.detection.landmarks import image_points
 from cardbox_tracker.detection.pose_network import Detection
 from cardbox_tracker.recordings.detector import Detector
 from cardbox_tracker.recordings.image_recording import ImageRecording
 from cardbox_tracker.recordings.point_table import PointTable
-from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
 from cardbox_tracker.vision.empty_scene import brightness_of
 
 
@@ -50,22 +49,22 @@ class DetectorSilhouetteSource(SilhouetteSource):
 
         The detector starts anew at ``start_s``, so that a frame depends on the span alone.
         """
-        for stamp_ns, time_s, image, person in self.detections(start_s, end_s):
+        for (stamp_ns, time_s, image, recorded), person in self.detections(start_s, end_s):
             nobody = np.zeros(image.shape[:2], np.uint8)
             silhouette = nobody if person is None else person.silhouette()
             points = self._points(stamp_ns, image)
             if person is not None and self._has_own_points:
                 points = image_points(person)
             seen = brightness_of(image), silhouette, image
-            yield RecordedFrame(stamp_ns, time_s, *seen, points=points)
+            yield RecordedFrame(stamp_ns, time_s, *seen, points=points, recorded=recorded)
 
     def detections(
         self, start_s: float = 0.0, end_s: float = float("inf")
-    ) -> Iterator[tuple[int, float, NDArray[np.uint8], Detection | None]]:
-        """Yield stamp, ns, seconds from the start, image and person of the images of a span."""
+    ) -> Iterator[tuple[PreparedImage, Detection | None]]:
+        """Yield the images of a span, each with the person in it."""
         self._person.restart()
-        for stamp_ns, time_s, image in self.images():
-            if time_s > end_s:
+        for prepared in self.images():
+            if prepared.time_s > end_s:
                 break
-            if time_s >= start_s:
-                yield stamp_ns, time_s, image, self._person(image)
+            if prepared.time_s >= start_s:
+                yield prepared, self._person(prepared.image)

@@ -46,9 +46,9 @@ class PersonInViewSource(SilhouetteSource):
         self._find_points(points, camera)
         learning = self._pipeline.learning
         every = max(1, round(1e9 / (_LEARNING_HZ * self.period_ns())))
-        for number, (_, _, image) in enumerate(self.images()):
+        for number, prepared in enumerate(self.images()):
             if number % every == 0:
-                learning.add(image)
+                learning.add(prepared.image)
             if learning.has_enough():
                 break
         if not learning.has_enough():

@@ -15,17 +15,14 @@ from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
 from cardbox_tracker.outputs import (
-    CHANCE_KEY,
-    LEVELS,
     JointValues,
-    KeypointStates,
     Markers,
     OutputStream,
     Points,
     Text,
     Value,
-    chance_text,
     joint_values,
     positions_of,
 )
@@ -87,7 +84,7 @@ class _ResultBag:
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
         overlay = draw_overlay(frame.picture, body, camera, estimate)
         bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
-        for output, value in self._outputs.values(estimate, tracker):
+        for output, value in self._outputs.values(stamp, estimate, tracker):
             _write_value(bag, f"/{output.topic}", stamp, optical, value)
         joints = joint_values(estimate)
         if joints is not None:
@@ -97,8 +94,8 @@ class _ResultBag:
 def _write_value(bag: BagWriter, topic: str, stamp_ns: int, frame_id: str, value: Value) -> None:
     """Write an output with the header of its image, like the node."""
     match value:
-        case JointValues(names, values):
-            bag.write_joint_state(topic, stamp_ns, frame_id, names, values)
+        case JointValues():
+            bag.write_joint_state(topic, stamp_ns, frame_id, *value)
         case Points(points_m):
             bag.write_pose_array(topic, stamp_ns, frame_id, points_m)
         case Markers():

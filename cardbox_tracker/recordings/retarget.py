@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from cardbox_tracker.files import stamp_text, write_table
+from cardbox_tracker.files import write_table
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import read_results
@@ -36,16 +36,16 @@ def retarget_bag(bag: BagReader, retargeter: Retargeter) -> list[StampedCommand]
 
 
 def write_csv(commands: Sequence[StampedCommand], joints: Sequence[str], path: Path) -> None:
-    """Write a row with stamp, status and joint positions (rad or m) for each image.
+    """Write a row with stamp, ns, status and joint positions (rad or m) for each image.
 
     Raises:
         CardboxError: the file cannot be written.
     """
     rows = (
-        (stamp_text(stamp_ns), command.status, *(f"{value:.6f}" for value in command.positions))
+        (str(stamp_ns), command.status, *(f"{value:.6f}" for value in command.positions))
         for stamp_ns, command in commands
     )
-    write_table(path, ("stamp", "status", *joints), rows)
+    write_table(path, ("stamp_ns", "status", *joints), rows)
 
 
 def write_bag(

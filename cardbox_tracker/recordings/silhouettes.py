@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.errors import BagError, CardboxError, EncodingError
 from cardbox_tracker.recordings.detector import Detector, FindPoints
-from cardbox_tracker.recordings.image_recording import ImageRecording
+from cardbox_tracker.recordings.image_recording import ImageRecording, RecordedImage
 from cardbox_tracker.recordings.point_table import PointTable
 from cardbox_tracker.vision.background_config import BackgroundConfig
+from cardbox_tracker.vision.camera import Rectifier
 from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.empty_scene import brightness_of
 from cardbox_tracker.vision.learning import Learning
@@ -59,6 +60,22 @@ class TimeSpan(NamedTuple):
         return f"{self.start_s:g}:{self.end_s:g}"
 
 
+class PreparedImage(NamedTuple):
+    """One image of a recording, ready to be segmented.
+
+    Attributes:
+        stamp_ns: stamp of the image.
+        time_s: seconds from the recording's start.
+        image: (H, W, 3) bgr, or (H, W) grey, undistorted, at the working resolution.
+        recorded: the image as it was recorded.
+    """
+
+    stamp_ns: int
+    time_s: float
+    image: NDArray[np.uint8]
+    recorded: RecordedImage
+
+
 class RecordedFrame(NamedTuple):
     """One image of a recording and the silhouette in it.
 
@@ -71,6 +88,7 @@ class RecordedFrame(NamedTuple):
             was not requested.
         depth_m: (H, W), metres, from which the silhouette was cut out; None without depth.
         points: joints of the person in the image, from a detector; None without one.
+        recorded: the image as it was recorded; None if it was not kept.
     """
 
     stamp_ns: int
@@ -80,6 +98,7 @@ class RecordedFrame(NamedTuple):
     image: NDArray[np.uint8] | None = None
     depth_m: DepthImage | None = None
     points: ImagePoints | None = None
+    recorded: RecordedImage | None = None
 
     @property
     def picture(self) -> NDArray[np.uint8]:
@@ -128,7 +147,7 @@ class SilhouetteSource:
         self._open(bag, size or bag.working_size, camera, config)
         self._find_points(points, camera)
         is_readable = False
-        for _, time_s, image in self.images():
+        for _, time_s, image, _ in self.images():
             is_readable = True
             if time_s > background.end_s or self._pipeline.has_enough:
                 break
@@ -161,6 +180,8 @@ class SilhouetteSource:
         self._pipeline = SilhouettePipeline(calibration, size, config, learning)
         self.frame_id = calibration.frame_id
         self.camera = self._pipeline.camera
+        self._full_size: tuple[int, int] | None = None
+        self._full_rectifier: Rectifier | None = None
 
     @property
     def has_points(self) -> bool:
@@ -199,14 +220,14 @@ class SilhouetteSource:
         self._pipeline.restart()
         if self._detector is not None:
             self._detector.restart()
-        for stamp_ns, time_s, image in self.images():
+        for stamp_ns, time_s, image, recorded in self.images():
             if time_s > end_s:
                 break
             silhouette = self._pipeline.silhouette(image, stamp_ns)
             if time_s >= start_s:
                 found = self._points(stamp_ns, image)
                 seen = brightness_of(image), silhouette, image
-                yield RecordedFrame(stamp_ns, time_s, *seen, points=found)
+                yield RecordedFrame(stamp_ns, time_s, *seen, points=found, recorded=recorded)
 
     def held(self, span: TimeSpan, what: str) -> list[RecordedFrame]:
         """Return the frames of a span in which a posture is held.
@@ -214,7 +235,8 @@ class SilhouetteSource:
         Raises:
             CardboxError: no image lies in the span; the text names ``what``.
         """
-        found = list(self.frames(*span))
+        # Full images of a whole span would take hundreds of megabytes.
+        found = [frame._replace(recorded=None) for frame in self.frames(*span)]
         if not found:
             raise CardboxError(
                 f"no image lies in the {what} span {span} s of a recording of "
@@ -257,11 +279,19 @@ class SilhouetteSource:
             remarks.append(f"the detector finds nobody in {self._detector.missed} images")
         return remarks
 
-    def images(self) -> Iterator[tuple[int, float, NDArray[np.uint8]]]:
-        """Yield stamp, ns, seconds from the start, and image of every image that can be decoded.
+    def full_picture(self, frame: RecordedFrame) -> NDArray[np.uint8]:
+        """Return the picture of a frame, undistorted, at the resolution of the recording."""
+        if frame.recorded is None:
+            return frame.picture
+        image = frame.recorded.as_sent
+        height, width = image.shape[:2]
+        if self._full_size != (width, height):
+            self._full_size = width, height
+            self._full_rectifier = self._pipeline.calibration.rectifier(width, height)
+        return image if self._full_rectifier is None else self._full_rectifier(image)
 
-        The images are undistorted, at the working resolution.
-        """
+    def images(self) -> Iterator[PreparedImage]:
+        """Yield every image that can be decoded."""
         for number, image in enumerate(self._bag.images(self._topic), 1):
             if number == 1:
                 late_ns = image.time_ns - image.stamp_ns
@@ -272,4 +302,4 @@ class SilhouetteSource:
                 self._broken[number] = str(error)
                 continue
             time_ns = image.stamp_ns + self._clock_ns - self._bag.start_ns
-            yield image.stamp_ns, time_ns / 1e9, prepared
+            yield PreparedImage(image.stamp_ns, time_ns / 1e9, prepared, image)

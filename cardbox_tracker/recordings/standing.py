@@ -40,7 +40,7 @@ def camera_of_standing(
     found = []
     with open_images(path, camera) as images:
         source = DetectorSilhouetteSource(images, detector, name)
-        for _, _, _, person in source.detections(*span):
+        for _, person in source.detections(*span):
             if person is not None:
                 points = dict(zip(LANDMARKS, person.points_px, strict=True))
                 scores = dict(zip(LANDMARKS, person.scores.tolist(), strict=True))

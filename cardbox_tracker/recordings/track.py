@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -11,54 +10,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import PLACE, POSTURE
-from cardbox_tracker.drawing.overlay import draw_overlay
-from cardbox_tracker.drawing.video import video_file
-from cardbox_tracker.errors import BagError, CardboxError
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.files import atomic_path, stamp_text
-from cardbox_tracker.outputs import JOINT_STATE_NAMES, METRICS, joint_values
+from cardbox_tracker.recordings.overlay_video import overlay_video
 from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-
-# New columns are appended, because scripts read these by their position.
-CSV_HEADER = (
-    "stamp",
-    "state",
-    *JOINT_STATE_NAMES[POSTURE],
-    *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"),
-    *(metric.name for metric in METRICS),
-    *JOINT_STATE_NAMES[PLACE],
-)
-
-NECK_COLUMNS = NECK_NAMES
-"""Columns that follow ``CSV_HEADER`` if the recording has points of the person."""
 
 Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
 """Callback that receives each image with its estimate and the tracker."""
-
-_VIDEO_SCALE = 2
-# Rate of a video of a single image.
-_USUAL_HZ = 15.0
 
 
 class TrackFiles(NamedTuple):
     """Files to write; None for one that is not wanted.
 
     Attributes:
-        csv: table with one row for each image.
-        video: overlay video.
-        fps: frames per second of the video; None for the rate of the recording.
+        table: one row for each image, see :func:`~.result_table.result_table`.
+        video: overlay video, at the rate and the resolution of the recording.
     """
 
-    csv: Path | None = None
+    table: Path | None = None
     video: Path | None = None
-    fps: float | None = None
 
 
 _NO_FILES = TrackFiles()
@@ -117,32 +92,21 @@ def track_recording(
     ious: list[float] = []
     frames = frames_uncertain = 0
     with ExitStack() as stack:
-        rows, has_points = None, recording.first.has_points
-        if files.csv is not None:
-            path = stack.enter_context(atomic_path(files.csv))
-            table = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
-            rows = csv.writer(table, lineterminator="\n")
-            rows.writerow((*CSV_HEADER, *NECK_COLUMNS) if has_points else CSV_HEADER)
-        draw = None
+        add_row = None
+        if files.table is not None:
+            add_row = stack.enter_context(result_table(files.table, recording.first.has_points))
         if files.video is not None:
-            size = (_VIDEO_SCALE * tracker.camera.width, _VIDEO_SCALE * tracker.camera.height)
-            draw = stack.enter_context(video_file(files.video, size, files.fps or _rate(recording)))
+            video = stack.enter_context(overlay_video(files.video, recording))
+            observers = (video, *observers)
         for taken in recording.frames(start_s):
             estimate, frame = tracker.track(taken.observations), taken.first
             frames += 1
             frames_uncertain += estimate.state == UNCERTAIN
-            if rows is not None:
-                neck = _neck_fields(estimate) if has_points else []
-                rows.writerow([*csv_row(frame.stamp_ns, estimate), *neck])
+            if add_row is not None:
+                add_row(frame, estimate)
             if estimate.cost_px is not None and estimate.iou is not None:
                 costs.append(estimate.cost_px)
                 ious.append(estimate.iou)
-            if draw is not None:
-                draw(
-                    draw_overlay(
-                        frame.picture, tracker.body, tracker.camera, estimate, _VIDEO_SCALE
-                    )
-                )
             for observe in observers:
                 observe(frame, estimate, tracker)
             if tracker.agreement is not None and tracker.agreement.is_due:
@@ -157,34 +121,3 @@ def track_recording(
         tracker.agreement.check(is_last=True)
         remarks = tracker.agreement.remarks(recording.names[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
-
-
-def _rate(recording: Recording) -> float:
-    """Return the images a second, Hz, as exactly as a video can have them."""
-    try:
-        return round(1e9 / max(1, recording.first.period_ns()), 2)
-    except BagError:
-        return _USUAL_HZ
-
-
-def _neck_fields(estimate: Estimate) -> list[str]:
-    if estimate.neck is None:
-        return [""] * len(NECK_COLUMNS)
-    return [f"{value:.6f}" for value in estimate.neck]
-
-
-def csv_row(stamp_ns: int, estimate: Estimate) -> list[str]:
-    """Return the row of one image; unknown values are empty."""
-    stamp = stamp_text(stamp_ns)
-    joints = joint_values(estimate)
-    if joints is None or estimate.keypoints_m is None:
-        return [stamp, estimate.state, *[""] * (len(CSV_HEADER) - 2)]
-    values = [f"{value:.6f}" for value in joints.values]
-    return [
-        stamp,
-        estimate.state,
-        *values[POSTURE],
-        *(f"{value:.6f}" for value in estimate.keypoints_m.ravel()),
-        *(metric.text(estimate) for metric in METRICS),
-        *values[PLACE],
-    ]

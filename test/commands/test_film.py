@@ -56,7 +56,7 @@ def test_a_film_is_tracked_with_a_stature(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["me.body.yaml", "me.csv", "out.mp4"]
     with (tmp_path / "me.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["stamp"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
+    assert [float(row["time_s"]) for row in rows[:3]] == pytest.approx([16.0, 16.25, 16.5])
     assert sum(row["state"] == "tracking" for row in rows) > 0.8 * len(rows)
     body = load_body_model("me.body.yaml")
     assert body.unknown == ()
@@ -69,6 +69,27 @@ def test_a_film_is_tracked_with_a_stature(
     cardbox("track", film, "--fov", fov, *GIVEN).assert_refused("track", "me.csv exists")
     words = ("--background", "0:3.9", "--model", "me.body.yaml", "--start", 16, "--csv", "b.csv")
     assert cardbox("track", film, "--fov", fov, *words).code == 0
+
+
+def test_the_overlay_has_the_aspect_and_the_resolution_of_a_film_held_upright(
+    files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cardbox: Callable[..., Any]
+) -> None:
+    """The film is 720 px wide and 960 px high, with stripes that the working resolution blurs."""
+    monkeypatch.chdir(tmp_path)
+    writer = cv2.VideoWriter("up.mp4", cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (720, 960))
+    stripes = np.zeros((960, 720, 3), np.uint8)
+    stripes[:, ::4] = stripes[:, 1::4] = 200
+    for _ in range(6):
+        writer.write(stripes)
+    writer.release()
+    given = ("--model", files / "person.yaml", "--background", "0:0.1", "--start", 0.1)
+    done = cardbox("track", "up.mp4", "--fov", 45, *given, "--video", "overlay.mp4")
+    assert done.code == 0, done.err
+    overlay = cv2.VideoCapture("overlay.mp4")
+    assert overlay.get(cv2.CAP_PROP_FPS) == pytest.approx(30.0)
+    image = overlay.read()[1]
+    assert image.shape == (960, 720, 3)
+    assert image[700:900].mean(axis=(0, 2)).std() > 60
 
 
 def test_the_body_that_exists_is_kept(

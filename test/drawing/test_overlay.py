@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
@@ -22,7 +23,7 @@ from cardbox_tracker.drawing.overlay import (
 )
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.estimate import Estimate, KeypointState
+from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel()

@@ -15,7 +15,7 @@ LEVELS = (30, 90, 150, 210)
 
 
 def write(path: Path | str, count: int = len(LEVELS)) -> None:
-    with video_file(path, (64, 48), 10.0) as add:
+    with video_file(path, 10.0) as add:
         for level in LEVELS[:count]:
             add(np.full((48, 64, 3), level, np.uint8))
 
@@ -44,7 +44,7 @@ def test_a_wrong_ending_is_refused(tmp_path: Path, name: str) -> None:
 
 def test_nothing_appears_before_the_video_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "a.avi"
-    with video_file(path, (64, 48), 10.0) as add:
+    with video_file(path, 10.0) as add:
         add(np.zeros((48, 64, 3), np.uint8))
         assert not path.exists()
     assert path.stat().st_size > 0
@@ -54,7 +54,7 @@ def test_an_error_on_the_way_leaves_the_old_video(tmp_path: Path) -> None:
     path = tmp_path / "a.avi"
     write(path)
     old = path.read_bytes()
-    with pytest.raises(RuntimeError, match="stop"), video_file(path, (64, 48), 10.0):
+    with pytest.raises(RuntimeError, match="stop"), video_file(path, 10.0):
         raise RuntimeError("stop")
     assert path.read_bytes() == old
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.avi"]
@@ -63,3 +63,13 @@ def test_an_error_on_the_way_leaves_the_old_video(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(CardboxError, match=r"none/a\.avi"):
         write(tmp_path / "none" / "a.avi")
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.avi"])
+def test_the_first_image_gives_the_size(tmp_path: Path, name: str) -> None:
+    with video_file(tmp_path / name, 10.0) as add:
+        add(np.full((81, 45, 3), 90, np.uint8))
+        add(np.full((48, 64, 3), 90, np.uint8))
+    video = cv2.VideoCapture(str(tmp_path / name))
+    assert [video.read()[1].shape for _ in range(2)] == [(80, 44, 3)] * 2
+    assert not video.read()[0]

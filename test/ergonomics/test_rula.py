@@ -214,8 +214,8 @@ def test_table_and_plot_are_written(tmp_path: Path) -> None:
     with (tmp_path / "r.csv").open(encoding="utf-8") as file:
         header, first, lost, last = csv.reader(file)
     assert tuple(header) == CSV_HEADER
-    assert first[:5] == ["0.000000000", "tracking", "3.000", "3", "0.000"]
-    assert lost == ["0.100000000", "lost", *[""] * (len(CSV_HEADER) - 2)]
+    assert first[:5] == ["0", "tracking", "3.000", "3", "0.000"]
+    assert lost == ["100000000", "lost", *[""] * (len(CSV_HEADER) - 2)]
     assert (last[3], last[4]) == ("6", "1.000")
     plot_scores(rows, tmp_path / "r.png")
     assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")

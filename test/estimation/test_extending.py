@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -157,6 +158,26 @@ def test_the_examples_pass_ruff_and_strict_mypy(folder: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", *FILES],
         env={"MYPYPATH": str(ROOT), "PATH": ""},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_the_examples_pass_strict_mypy_as_parts_of_the_package(tmp_path: Path) -> None:
+    ignored = shutil.ignore_patterns("__pycache__")
+    package = shutil.copytree(
+        ROOT / "cardbox_tracker", tmp_path / "cardbox_tracker", ignore=ignored
+    )
+    places = "cost/clicked_points.py", "filtering/linear_corrector.py"
+    files = [package / "estimation" / place for place in places]
+    for file in files:
+        file.write_text(FILES[file.name])
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", *files],
+        cwd=tmp_path,
+        env={"PATH": ""},
         capture_output=True,
         text=True,
     )

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.description.link_transforms import LinkTransforms
@@ -21,31 +21,16 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.outputs import JOINT_STATE_NAMES
+from cardbox_tracker.outputs import JOINT_STATE_NAMES, unit_of
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_table import columns
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.recordings.track import (
-    CSV_HEADER,
-    TrackFiles,
-    TrackSummary,
-    csv_row,
-    track_recording,
-)
+from cardbox_tracker.recordings.track import TrackFiles, TrackSummary, track_recording
 
 CONFIG = default_preset()
-
-HEADER = (
-    "stamp,state,torso_y,torso_roll,torso_pitch,torso_yaw,"
-    "left_shoulder_abduction,left_shoulder_flexion,left_elbow_abduction,left_elbow_flexion,"
-    "right_shoulder_abduction,right_shoulder_flexion,right_elbow_abduction,right_elbow_flexion,"
-    "left_shoulder_x,left_shoulder_y,left_shoulder_z,left_elbow_x,left_elbow_y,left_elbow_z,"
-    "left_hand_x,left_hand_y,left_hand_z,"
-    "right_shoulder_x,right_shoulder_y,right_shoulder_z,right_elbow_x,right_elbow_y,right_elbow_z,"
-    "right_hand_x,right_hand_y,right_hand_z,cost,iou,torso_x,torso_z"
-)
 
 
 def track(
@@ -117,49 +102,44 @@ def test_a_reference_outside_of_the_recording_is_refused(
         initialize_from_recording(source, spans, InitializationConfig())
 
 
-def test_the_header_is_that_of_the_design() -> None:
-    assert ",".join(CSV_HEADER) == HEADER
-
-
 def test_there_is_one_row_an_image_with_its_stamp(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     summary = track(recording, source, tmp_path / "person.csv")
     text = (tmp_path / "person.csv").read_text()
-    assert text.splitlines()[0] == HEADER
+    assert text.splitlines()[0] == ",".join(columns())
     assert text.endswith("\n")
     assert "\r" not in text
     rows = rows_of(tmp_path / "person.csv")
-    stamps = [frame.stamp_ns for frame in source.frames(recording.start_s())]
-    assert [row["stamp"] for row in rows] == [stamp_text(s) for s in stamps]
+    frames = list(source.frames(recording.start_s()))
+    assert [row["stamp_ns"] for row in rows] == [str(frame.stamp_ns) for frame in frames]
+    times_s = [float(row["time_s"]) for row in rows]
+    assert times_s == pytest.approx([frame.time_s for frame in frames], abs=1e-6)
+    assert recording.start_s() <= times_s[0] < recording.start_s() + 0.5
     assert summary.frames == summary.frames_tracked == len(rows)
-    assert summary.mean_cost_px == pytest.approx(np.mean([int(row["cost"]) for row in rows]))
+    assert summary.mean_cost_px == pytest.approx(np.mean([int(row["cost_px"]) for row in rows]))
     assert summary.mean_iou == pytest.approx(np.mean([float(row["iou"]) for row in rows]), abs=1e-4)
-
-
-def stamp_text(stamp_ns: int) -> str:
-    seconds, nanoseconds = divmod(stamp_ns, 10**9)
-    return f"{seconds}.{nanoseconds:09d}"
 
 
 def test_the_numbers_of_a_row_belong_together(
     recording: Any, source: SilhouetteSource, tmp_path: Path
 ) -> None:
     track(recording, source, tmp_path / "person.csv")
-    names = HEADER.split(",")
     errors_m = []
     for row in rows_of(tmp_path / "person.csv"):
         assert row["state"] in ("tracking", "uncertain")
-        posture = np.array([float(row[name]) for name in JOINT_NAMES])
-        points_m = np.array([float(row[name]) for name in names[14:32]]).reshape(6, 3)
-        place = np.array([float(row[name]) for name in PLACE_NAMES])
+        posture = np.array([float(row[f"{name}_{unit_of(name)}"]) for name in JOINT_NAMES])
+        points_m = np.array(
+            [[float(row[f"{name}_{axis}_m"]) for axis in "xyz"] for name in KEYPOINT_NAMES]
+        )
+        place = np.array([float(row[f"{name}_m"]) for name in PLACE_NAMES])
         body = Estimate("tracking", posture, offset_m=place).placed(recording.body)
         expected = source.camera.reference_to_optical(keypoints_m(body, posture))
         # The tracker lifts the shoulder of a raised arm a little, which the kinematics do not.
         np.testing.assert_allclose(points_m, expected, atol=2e-3)
         assert 0.5 < float(row["iou"]) <= 1.0
-        assert int(row["cost"]) > 0
-        stamp_ns = int(row["stamp"].replace(".", ""))
+        assert int(row["cost_px"]) > 0
+        stamp_ns = int(row["stamp_ns"])
         errors_m.append(
             np.linalg.norm(points_m - recording.truth.frames[stamp_ns].keypoints_m, axis=1)
         )
@@ -177,36 +157,10 @@ def test_what_is_not_known_is_left_empty(
     assert len(empty) >= 20
     assert summary.frames_tracked <= len(rows) - len(empty)
     for row in rows:
-        values = set(list(row.values())[2:])
+        values = set(list(row.values())[3:])
         assert ("" in values) == (row["state"] in ("lost", "no_person"))
         if "" in values:
             assert values == {""}
-
-
-@pytest.mark.parametrize("state", ["no_person", "lost"])
-def test_a_row_without_an_estimate_by_hand(state: str) -> None:
-    assert csv_row(1_700_000_000_000_000_005, Estimate(state)) == [
-        "1700000000.000000005",
-        state,
-        *[""] * 34,
-    ]
-
-
-@pytest.mark.parametrize(
-    ("offset_m", "written"),
-    [(None, ["0.000000", "0.000000"]), (np.array([0.25, -0.05]), ["0.250000", "-0.050000"])],
-)
-@pytest.mark.parametrize("state", ["tracking", "uncertain"])
-def test_a_row_by_hand(state: str, offset_m: np.ndarray | None, written: list[str]) -> None:
-    points_m = np.arange(18).reshape(6, 3) / 4
-    estimate = Estimate(
-        *(state, np.arange(12) / 10, np.ones(12), points_m, 812, 0.87654), offset_m=offset_m
-    )
-    row = csv_row(42, estimate)
-    assert len(row) == len(CSV_HEADER)
-    assert row[:4] == ["0.000000042", state, "0.000000", "0.100000"]
-    assert row[13:16] == ["1.100000", "0.000000", "0.250000"]
-    assert row[-5:] == ["4.250000", "812", "0.8765", *written]
 
 
 def test_uncertain_images_are_counted(
@@ -257,8 +211,8 @@ def test_observers_see_every_image(
 
     track(recording, source, tmp_path / "person.csv", observers=(observe,))
     rows = rows_of(tmp_path / "person.csv")
-    assert [(stamp_text(stamp_ns), state) for stamp_ns, state in seen] == [
-        (row["stamp"], row["state"]) for row in rows
+    assert [(str(stamp_ns), state) for stamp_ns, state in seen] == [
+        (row["stamp_ns"], row["state"]) for row in rows
     ]
 
 
@@ -310,12 +264,21 @@ def test_the_bag_of_results_holds_what_the_tracker_would_publish(
         messages["joint_states"], messages["keypoints"], rows, strict=True
     ):
         for header in (state.header, points.header):
-            assert f"{header.stamp.sec}.{header.stamp.nanosec:09d}" == row["stamp"]
+            assert header.stamp.sec * 10**9 + header.stamp.nanosec == int(row["stamp_ns"])
         assert tuple(state.name) == JOINT_STATE_NAMES
-        expected = [float(row[name]) for name in (*JOINT_NAMES, *PLACE_NAMES)]
+        names = JOINT_NAMES + PLACE_NAMES
+        expected = [float(row[f"{name}_{unit_of(name)}"]) for name in names]
         np.testing.assert_allclose(state.position, [*expected, 0.0, 0.0], atol=5.1e-7)
         assert points.header.frame_id == source.frame_id
-        assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x"]), abs=1e-6)
+        assert points.poses[2].position.x == pytest.approx(float(row["left_hand_x_m"]), abs=1e-6)
+    first, *later = messages["joint_states"]
+    assert list(first.velocity) == []
+    for before, state, row_before, row in zip(
+        messages["joint_states"], later, rows, rows[1:], strict=False
+    ):
+        step_s = float(row["time_s"]) - float(row_before["time_s"])
+        moved = (np.array(state.position) - before.position) / step_s
+        np.testing.assert_allclose(state.velocity, moved, atol=1e-4)
     links = LinkTransforms(messages["robot_description"][0].data)
     assert len(messages["tf"]) == len(rows)
     for message, state in zip(messages["tf"], messages["joint_states"], strict=True):
@@ -365,27 +328,3 @@ def test_without_a_path_there_is_no_bag(
     with result_bag(None, source.frame_id) as results:
         track(recording, source, tmp_path / "person.csv", observers=(results,))
     assert os.listdir(tmp_path) == ["person.csv"]
-
-
-def test_the_neck_has_columns_where_the_person_has_points(
-    recording: Any,
-    source: SilhouetteSource,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The face is seen in the first image only."""
-    real, seen = Tracker.track, iter(range(10_000))
-
-    def looking(self: Tracker, *images: Any) -> Estimate:
-        neck = np.array([0.25, -0.5]) if next(seen) == 0 else None
-        return replace(real(self, *images), neck=neck)
-
-    track(recording, source, tmp_path / "plain.csv")
-    monkeypatch.setattr(Tracker, "track", looking)
-    monkeypatch.setattr(SilhouetteSource, "has_points", True)
-    track(recording, source, tmp_path / "points.csv")
-    header, first, second, *_ = (tmp_path / "points.csv").read_text().splitlines()
-    _, plain_first, plain_second, *_ = (tmp_path / "plain.csv").read_text().splitlines()
-    assert header == f"{HEADER},neck_yaw,neck_pitch"
-    assert first == f"{plain_first},0.250000,-0.500000"
-    assert second == f"{plain_second},,"

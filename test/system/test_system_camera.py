@@ -74,6 +74,22 @@ def test_a_video_is_seen_from_its_beginning_and_says_what_it_lacks(
     assert images[0].data[0] < 5
 
 
+def test_a_video_has_its_own_rate_unless_another_one_is_given(
+    own_graph: Any, tmp_path: Path
+) -> None:
+    path, count, slow_hz = tmp_path / "slow.avi", 8, 5.0
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), slow_hz, (64, 48))
+    for _ in range(count):
+        writer.write(np.zeros((48, 64, 3), np.uint8))
+    writer.release()
+    own_graph.start("camera", file=path)
+    images = own_graph.collect(Image, "image_raw", qos.REPLAY)
+    own_graph.wait(lambda: len(images) == count, "all images")
+    span_s = (stamp_ns(images[-1].header.stamp) - stamp_ns(images[0].header.stamp)) / 1e9
+    # Even a slow machine must not exceed the file's rate.
+    assert span_s > 0.8 * (count - 1) / slow_hz
+
+
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [

@@ -145,3 +145,24 @@ def test_an_initialization_can_be_cancelled(person: Person) -> None:
     graph.wait(lambda: not person.guiding[-1].data, "the end of the guidance")
     again = graph.call("initializer/cancel")
     assert not again.success and "no initialization is running" in again.message
+
+
+def test_a_call_before_the_first_silhouette_waits_for_it(own_graph: Any, scene: Any) -> None:
+    own_graph.start("initializer", count_down_s=1, capture_frames=3, person_distance_m=2.3)
+    client = own_graph.node.create_client(Trigger, "initializer/initialize")
+    own_graph.wait(client.service_is_ready, "service")
+    statuses = own_graph.collect(String, "initializer/status", qos.LATCHED)
+    answer = client.call_async(Trigger.Request())
+    own_graph.wait(lambda: statuses, "the words")
+    assert statuses[-1].data.startswith("waiting for the first silhouette on /silhouette")
+    Person(own_graph, scene)
+    own_graph.wait(answer.done, "the answer")
+    assert answer.result().success, answer.result().message
+
+
+def test_a_call_without_a_background_node_is_refused_after_a_while(own_graph: Any) -> None:
+    process = own_graph.start("initializer")
+    response = own_graph.call("initializer/initialize")
+    assert not response.success
+    assert "no silhouette was received yet on /silhouette" in response.message
+    assert "waiting for the first silhouette on /silhouette: 5 s so far" in process.text()

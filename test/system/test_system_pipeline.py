@@ -129,7 +129,6 @@ def measured(learned: Session) -> tuple[Session, str, str]:
     ("service", "words"),
     [
         ("initializer/capture_front", ("no silhouette was received yet on /silhouette",)),
-        ("initializer/initialize", ("no silhouette was received yet on /silhouette",)),
         ("background/learn", ("no image was received yet on /image_raw", "/camera_info")),
         ("tracker/reset", ("nothing to reset", "/body_model")),
     ],

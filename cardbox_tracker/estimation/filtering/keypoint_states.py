@@ -12,11 +12,11 @@ from math import erfc, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.body_outline import TRUNK_PATCHES
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.estimate import KeypointState
 from cardbox_tracker.estimation.filtering.correction import FAR_M
 
 BoolArray = NDArray[np.bool_]

@@ -9,12 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.estimate import KeypointState
 from cardbox_tracker.estimation.filtering.particles import Particles
 
 

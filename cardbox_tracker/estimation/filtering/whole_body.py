@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     PLACE,
@@ -30,7 +31,6 @@ from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import iou_of
-from cardbox_tracker.estimation.estimate import KeypointState
 from cardbox_tracker.estimation.filtering import (
     joint_moves,
     loss,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.estimation.estimate import KeypointState
+from cardbox_tracker.body.keypoint_state import KeypointState
 
 FloatArray = NDArray[np.float64]
 

@@ -17,32 +17,33 @@ from visualization_msgs.msg import Marker, MarkerArray
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.drawing.markers import MarkerShape, Rgba
 from cardbox_tracker.errors import CardboxError, NotFiniteError
+from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
 from cardbox_tracker.outputs import (
-    CHANCE_KEY,
-    LEVELS,
     JointValues,
-    KeypointStates,
     Markers,
     Points,
     Text,
     Value,
-    chance_text,
     neck_from,
     posture_from,
 )
 
 
 def joint_state_message(header: Header, joints: JointValues) -> JointState:
-    """Return joint values, rad and metres (or their deviations), as positions.
+    """Return joint values, rad and metres (or their deviations), as positions, and velocities.
 
     Raises:
         NotFiniteError: a value is not a finite number.
     """
-    return JointState(
+    message = JointState(
         header=header,
         name=list(joints.names),
         position=array.array("d", _finite(joints.values, "joint states").tolist()),
     )
+    if joints.velocities is not None:
+        finite = _finite(joints.velocities, "velocities of the joints")
+        message.velocity = array.array("d", finite.tolist())
+    return message
 
 
 def joint_values_of(message: JointState) -> JointValues:

@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from cardbox_tracker.errors import BackgroundFileError, CameraError
+from cardbox_tracker.progress import told
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.depth_cut import DepthCut
@@ -112,7 +113,6 @@ class BackgroundNode(CardboxNode):
     def __init__(self, **options: Any) -> None:
         """Subscribe to the camera and wait for its images."""
         super().__init__("background", **options)
-        warm_up()
         self.parameters = LiveParameters(self, BackgroundParameters, self._changed)
         settings = self.parameters.value
         path = background_path(settings.background_file)
@@ -122,6 +122,9 @@ class BackgroundNode(CardboxNode):
         self._outputs = SilhouetteOutputs(self)
         self._mean = self.advertise(Image, "~/mean", qos.LATCHED)
         self._stddev = self.advertise(Image, "~/stddev", qos.LATCHED)
+        # The initializer waits for a node that already advertises silhouettes.
+        with told(self.get_logger().info, "preparing (the very first start compiles)"):
+            warm_up()
         self.camera_images = CameraImages(
             self,
             settings.image_transport,

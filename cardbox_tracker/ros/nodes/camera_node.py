@@ -31,6 +31,7 @@ from cardbox_tracker.vision.camera_device import (
 
 _RETRY_S = 1.0
 _SETTLE_S = 0.5
+_USUAL_HZ = 15.0
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,8 @@ class CameraParameters(NodeParameters):
         480, "height to ask the device for", unit="px", limits=(32, 8192), effect=AT_START
     )
     rate_hz: float = parameter(
-        15.0,
-        "images a second; 0 takes the file's own rate",
+        0.0,
+        "images a second; 0: the file's own rate, and 15 of a device",
         unit="Hz",
         limits=(0.0, 240.0),
         effect=AT_START,
@@ -102,7 +103,7 @@ class CameraNode(CardboxNode):
         self._images = self.advertise(Image, "image_raw", qos.CAMERA)
         self._infos = self.advertise(CameraInfo, "camera_info", qos.CAMERA)
         self._capture = open_video(settings.file) if settings.file else self._open_device()
-        self._period_s = self._period(settings.rate_hz)
+        self._period_s = self._period(settings) if settings.file else 0.0
         self._calibration = (
             load_calibration(user_path(settings.calibration_file))
             if settings.calibration_file
@@ -124,14 +125,13 @@ class CameraNode(CardboxNode):
         capture = open_device(settings.device)
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height)
-        if settings.rate_hz > 0:
-            capture.set(cv2.CAP_PROP_FPS, settings.rate_hz)
+        capture.set(cv2.CAP_PROP_FPS, settings.rate_hz or _USUAL_HZ)
         return capture
 
-    def _period(self, rate_hz: float) -> float:
-        if rate_hz <= 0:
-            rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / 15.0
+    def _period(self, settings: CameraParameters) -> float:
+        """Return the seconds from image to image of a file."""
+        rate_hz = settings.rate_hz or self._capture.get(cv2.CAP_PROP_FPS)
+        return 1.0 / rate_hz if 0 < rate_hz < 1000 else 1.0 / _USUAL_HZ
 
     def _read(self) -> None:
         """Read and publish images at the rate; a file stops or starts over at its end."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from functools import partial
 from typing import Any
 
@@ -30,6 +31,7 @@ from cardbox_tracker.estimation.initialization.guidance import (
     spoken,
 )
 from cardbox_tracker.estimation.initialization.saved_model import SavedModel
+from cardbox_tracker.progress import told
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.messages.measurement import (
     answer_text,
@@ -47,6 +49,8 @@ from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.vision.camera import Camera
 
 _DOES = "Measure a person from the silhouettes of three reference postures."
+# Longest waits for a silhouette that a node advertises, and for a node that does.
+_ANNOUNCED_S, _FIND_S, _STEP_S = 60.0, 10.0, 0.1
 
 
 class InitializerNode(CardboxNode):
@@ -143,6 +147,7 @@ class InitializerNode(CardboxNode):
     def _measure(self) -> str:
         settings, references = self.parameters.value, self._references
         distance = self._distance if settings.measure_distance else None
+        self._await_silhouettes()
         references.check_running()
         if distance is not None:
             distance.check()
@@ -167,6 +172,22 @@ class InitializerNode(CardboxNode):
         answer += self._saved.save(result.body)
         references.captured, references.images = {}, {}
         return answer
+
+    def _await_silhouettes(self) -> None:
+        """Wait for the first silhouette: the background node may still compile or learn."""
+        if self._references.has_silhouettes:
+            return
+        begun_s = time.monotonic()
+        with told(self._tell, f"waiting for the first silhouette on {self._topic}"):
+            while not self._references.has_silhouettes:
+                is_announced = self.count_publishers(self._topic) > 0
+                if time.monotonic() - begun_s > (_ANNOUNCED_S if is_announced else _FIND_S):
+                    return
+                self._cancellation.wait(_STEP_S)
+
+    def _tell(self, text: str) -> None:
+        self.get_logger().info(text)
+        self._guide.tell(text)
 
     def _show(self, prompt: Prompt) -> None:
         self._guide.show(prompt, self.parameters.value.bell)
@@ -227,6 +248,10 @@ class GuideOutputs:
                 print("\a", file=sys.stderr, flush=True)
         self._prompt = prompt
         self._status.publish(String(data=prompt.text))
+
+    def tell(self, text: str) -> None:
+        """Tell the operator a line before the guidance."""
+        self._status.publish(String(data=text))
 
     def end(self, text: str, words: str) -> None:
         """End the guidance with a last line, and ``words`` to say."""

@@ -95,6 +95,11 @@ class ReferenceCapture:
         """Names of the references still to be captured."""
         return [name for name in REFERENCE_NAMES if name not in self.captured]
 
+    @property
+    def has_silhouettes(self) -> bool:
+        """Whether a silhouette was received."""
+        return bool(self._recent)
+
     def check_running(self) -> None:
         """Raise InitializationError if no silhouette was received yet."""
         if not self._recent:

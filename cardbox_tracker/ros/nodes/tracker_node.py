@@ -17,6 +17,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.precompile import compile_all
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.files import user_path
+from cardbox_tracker.progress import told
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, Received
 from cardbox_tracker.ros.nodes.tracker_outputs import TrackerOutputs
@@ -31,6 +32,7 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.stamps import StampOrder
 
 _DOES = "Follow the measured person: silhouettes in, joint states out."
+_PREPARING = "preparing (the very first start compiles for one to two minutes)"
 
 
 class TrackerNode(CardboxNode):
@@ -40,9 +42,11 @@ class TrackerNode(CardboxNode):
         """Subscribe to silhouettes and wait for a body model."""
         super().__init__("tracker", **options)
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
+        # Calls that come while the code is compiled are answered afterwards.
+        self.offer("~/reset", self._reset)
         # The code is compiled before the first image arrives, unless the cache has it.
-        self.get_logger().info("preparing (the very first start compiles for one to two minutes)")
-        compile_all()
+        with told(self.get_logger().info, _PREPARING):
+            compile_all()
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
@@ -55,7 +59,6 @@ class TrackerNode(CardboxNode):
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)
         self._inputs = CameraInputs(self, settings, self._on_cameras, self._on_input)
         self._agreement = AgreementWatch([name.strip("/") for name in settings.cameras])
-        self.offer("~/reset", self._reset)
         self.diagnostics.source = f"silhouettes on {self._inputs.source}"
         self.diagnostics.extra = self._values
         if settings.model_file:

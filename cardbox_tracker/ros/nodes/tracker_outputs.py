@@ -53,7 +53,8 @@ class TrackerOutputs:
     def publish(self, seen: ObservationSet, estimate: Estimate, tracker: Tracker) -> None:
         """Publish the outputs of an image; a lost posture is not repeated."""
         header = seen.header
-        for output, value in self._stream.values(estimate, tracker, self._is_wanted):
+        stamp_ns = conversions.stamp_ns(header.stamp)
+        for output, value in self._stream.values(stamp_ns, estimate, tracker, self._is_wanted):
             self._publishers[output.topic].publish(results.message_of(header, value))
         if self._human is not None:
             self._human.publish(header, estimate, tracker)

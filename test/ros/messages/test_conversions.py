@@ -8,15 +8,18 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
 from cardbox_tracker.errors import CameraError, EncodingError, NotFiniteError
+from cardbox_tracker.keypoint_status import KeypointStates
 from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points, Text
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.vision.camera import Calibration, Camera
@@ -219,9 +222,16 @@ def test_joint_state_has_names_positions_and_header() -> None:
     np.testing.assert_array_equal(message.position, posture)
     assert message.header.frame_id == "optical"
     assert len(message.velocity) == len(message.effort) == 0
-    names, values = results.joint_values_of(message)
-    assert names == JOINT_NAMES
-    np.testing.assert_array_equal(values, posture)
+    read = results.joint_values_of(message)
+    assert read.names == JOINT_NAMES
+    np.testing.assert_array_equal(read.values, posture)
+
+
+def test_joint_state_has_velocities_where_they_are_known() -> None:
+    moving = JointValues(("a", "b"), np.zeros(2), np.array([0.5, -2.0]))
+    assert list(results.joint_state_message(HEADER, moving).velocity) == [0.5, -2.0]
+    with pytest.raises(NotFiniteError, match="velocities"):
+        results.joint_state_message(HEADER, moving._replace(velocities=np.array([0.0, np.inf])))
 
 
 def test_markers_are_the_patches_and_the_skeleton_in_the_optical_frame() -> None:
@@ -260,8 +270,15 @@ def test_a_state_is_a_word() -> None:
 
 
 def test_every_output_has_its_message() -> None:
-    values = (JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()), Text("a"))
+    states = KeypointStates(("a",), (KeypointState.LOST,), np.array([0.75]))
+    values = (
+        *(JointValues(("a",), np.zeros(1)), Points(np.zeros((1, 3))), Markers(()), Text("a")),
+        states,
+    )
     for value in values:
         message = results.message_of(HEADER, value)
         assert isinstance(message, results.message_type(type(value)))
     assert {output.kind for output in OUTPUTS} <= {type(value) for value in values}
+    (status,) = results.message_of(HEADER, states).status
+    assert (status.name, status.message, status.level) == ("a", "lost", DiagnosticStatus.ERROR)
+    assert status.values[0].value == "0.750"

@@ -45,9 +45,8 @@ def test_a_home_folder_is_known_to_every_node(
     monkeypatch.setattr("cardbox_tracker.ros.nodes.camera_node.open_video", lambda _: None)
     (tmp_path / "bad.yaml").write_text("- nothing\n")
     name = "calibration_file" if make is CameraNode else "model_file"
-    parameters = (
-        {name: "~/bad.yaml", "file": "video"} if make is CameraNode else {name: "~/bad.yaml"}
-    )
+    more = {"file": "video", "rate_hz": 15.0} if make is CameraNode else {}
+    parameters = {name: "~/bad.yaml", **more}
     overrides = [Parameter(key, value=value) for key, value in parameters.items()]
     with pytest.raises(CardboxError, match=rf"{tmp_path}/bad\.yaml: .*mapping"):
         make(context=context, parameter_overrides=overrides, enable_rosout=False)
@@ -68,6 +67,7 @@ def test_a_folder_that_is_gone_costs_no_second_posing(
         enable_rosout=False,
     )
     references = node._references
+    monkeypatch.setattr(type(references), "has_silhouettes", True)
     monkeypatch.setattr(references, "check_running", lambda: None)
     node._camera = Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
     captured = {name: np.zeros((24, 32), np.uint8) for name in REFERENCE_NAMES}

@@ -1,0 +1,136 @@
+"""The table of results: its columns, its rows by hand, and its two formats."""
+
+from __future__ import annotations
+
+import csv
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.recordings.result_table import check_table, columns, result_table, row_of
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+
+ROOT = Path(__file__).parents[2]
+ANGLES = (
+    *("torso_roll", "torso_pitch", "torso_yaw"),
+    *("left_shoulder_abduction", "left_shoulder_flexion"),
+    *("left_elbow_abduction", "left_elbow_flexion"),
+    *("right_shoulder_abduction", "right_shoulder_flexion"),
+    *("right_elbow_abduction", "right_elbow_flexion"),
+)
+HEADER = (
+    *("stamp_ns", "time_s", "state", "torso_y_m"),
+    *(f"{name}_rad" for name in ANGLES),
+    *("left_shoulder_x_m", "left_shoulder_y_m", "left_shoulder_z_m"),
+    *("left_elbow_x_m", "left_elbow_y_m", "left_elbow_z_m"),
+    *("left_hand_x_m", "left_hand_y_m", "left_hand_z_m"),
+    *("right_shoulder_x_m", "right_shoulder_y_m", "right_shoulder_z_m"),
+    *("right_elbow_x_m", "right_elbow_y_m", "right_elbow_z_m"),
+    *("right_hand_x_m", "right_hand_y_m", "right_hand_z_m"),
+    *("cost_px", "iou", "torso_x_m", "torso_z_m", "torso_y_stddev_m"),
+    *(f"{name}_stddev_rad" for name in ANGLES),
+    *("torso_x_stddev_m", "torso_z_stddev_m"),
+    *("left_shoulder_state", "left_elbow_state", "left_hand_state"),
+    *("right_shoulder_state", "right_elbow_state", "right_hand_state"),
+    *("left_shoulder_chance", "left_elbow_chance", "left_hand_chance"),
+    *("right_shoulder_chance", "right_elbow_chance", "right_hand_chance"),
+)
+NECK = ("neck_yaw_rad", "neck_pitch_rad", "neck_yaw_stddev_rad", "neck_pitch_stddev_rad")
+POINTS_M = np.arange(18).reshape(6, 3) / 4
+FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
+PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
+SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.2, 0.3]))
+STAMP_NS = 1_700_000_000_000_000_005
+
+
+def test_the_columns_have_their_units() -> None:
+    assert columns() == HEADER
+    assert columns(has_points=True) == HEADER + NECK
+
+
+@pytest.mark.parametrize("state", ["no_person", "lost"])
+def test_a_row_without_an_estimate_by_hand(state: str) -> None:
+    row = row_of(STAMP_NS, 2.5, Estimate(state), has_points=True)
+    assert row == [STAMP_NS, 2.5, state, *[None] * (len(HEADER) + len(NECK) - 3)]
+
+
+@pytest.mark.parametrize("state", ["tracking", "uncertain"])
+def test_a_row_by_hand(state: str) -> None:
+    row = dict(zip(HEADER, row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
+    assert [row[name] for name in HEADER[:5]] == [42, 1.5, state, 0.0, 0.1]
+    assert (row["right_elbow_flexion_rad"], row["right_elbow_flexion_stddev_rad"]) == (1.1, 0.11)
+    assert (row["left_shoulder_y_m"], row["right_hand_z_m"]) == (0.25, 4.25)
+    assert (row["cost_px"], row["iou"]) == (812, 0.87654)
+    assert (row["torso_x_m"], row["torso_z_m"]) == (0.25, -0.05)
+    assert (row["torso_x_stddev_m"], row["torso_z_stddev_m"]) == (0.03, 0.01)
+    still = dict(zip(HEADER, row_of(42, 1.5, FOUND), strict=True))
+    assert (still["torso_x_m"], still["torso_x_stddev_m"]) == (0.0, 0.0)
+    unsure = row_of(42, 1.5, replace(FOUND, posture_stddev=None))
+    first = HEADER.index("torso_y_stddev_m")
+    assert unsure[first : first + 14] == [None] * 14
+
+
+def test_keypoints_have_states_and_chances() -> None:
+    states = tuple(KeypointState(one) for one in ("tracked", "uncertain", "hidden") * 2)
+    known = replace(PLACED, keypoint_states=states, keypoint_chances=np.arange(6) / 10)
+    row = dict(zip(HEADER, row_of(42, 1.5, known), strict=True))
+    assert (row["left_elbow_state"], row["right_hand_state"]) == ("uncertain", "hidden")
+    assert (row["left_shoulder_chance"], row["right_hand_chance"]) == (0.0, 0.5)
+    unknown = row_of(42, 1.5, PLACED)
+    assert unknown[HEADER.index("left_shoulder_state") :] == [None] * 12
+
+
+def test_the_neck_is_empty_while_the_face_is_not_seen() -> None:
+    assert row_of(42, 1.5, SEEN, has_points=True)[-4:] == [0.4, -0.1, 0.2, 0.3]
+    assert row_of(42, 1.5, PLACED, has_points=True)[-4:] == [None] * 4
+
+
+def write(path: Path) -> None:
+    grey = np.zeros((3, 4), np.uint8)
+    with result_table(path, has_points=True) as add:
+        for number, estimate in enumerate((SEEN, Estimate("lost"))):
+            add(RecordedFrame(STAMP_NS + number, number / 4, grey, grey), estimate)
+
+
+def test_both_formats_have_the_same_content(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    write(tmp_path / "a.csv")
+    write(tmp_path / "a.parquet")
+    with (tmp_path / "a.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    table: Any = parquet.read_table(tmp_path / "a.parquet")
+    assert tuple(table.column_names) == tuple(rows[0]) == HEADER + NECK
+    assert len(rows) == table.num_rows == 2
+    for row, other in zip(rows, table.to_pylist(), strict=True):
+        assert (row["stamp_ns"], row["state"]) == (str(other["stamp_ns"]), other["state"])
+        for name in set(row) - {"stamp_ns", "state"}:
+            known = None if row[name] == "" else float(row[name])
+            assert known == (None if other[name] is None else pytest.approx(other[name], abs=1e-6))
+
+
+def test_without_pyarrow_the_extra_is_named_and_nothing_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    for use in (check_table, write):
+        with pytest.raises(CardboxError, match=r"pip install cardbox_tracker\[parquet\].*\.csv"):
+            use(tmp_path / "a.parquet")
+    check_table(tmp_path / "a.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_lists_all_columns_in_their_order() -> None:
+    """A row of the page may name several columns; JOINT stands for every joint of the posture."""
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    listed: list[str] = []
+    for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
+        listed += re.findall(r"`([a-z_]+)`", cell)
+    assert tuple(listed) == HEADER + NECK
