@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.estimation.cost.joint_points_kernels import WRIST_SHARE
 from cardbox_tracker.vision.camera import Camera
 
 FloatArray = NDArray[np.float64]
@@ -24,8 +25,6 @@ _SLOW_S = 0.6
 _DEPTH_CONSTANT_M, _DEPTH_SLOW_M = 0.03, 0.04
 # Forearms of such networks come forward by this share of their length.
 _FORWARD = 0.14
-# The wrist on the line from elbow to knuckles.
-_WRIST = 0.73
 # A joint this far behind the seen surface is hidden, m.
 _HIDDEN_M = 0.12
 # Chances for each second that a hand is lost, and that both hands are exchanged; duration, s.
@@ -132,7 +131,7 @@ def _places(joints_m: dict[str, FloatArray], axes: dict[str, FloatArray]) -> Flo
         elbow, hand = joints_m[f"{side}_elbow"], joints_m[f"{side}_hand"]
         put(f"{side}_shoulder", joints_m[f"{side}_shoulder"])
         put(f"{side}_elbow", elbow)
-        put(f"{side}_wrist", elbow + _WRIST * (hand - elbow))
+        put(f"{side}_wrist", elbow + WRIST_SHARE * (hand - elbow))
         put(f"{side}_index", hand + _KNUCKLE_M * axes[f"{side}_hand"])
         put(f"{side}_little_finger", hand - _KNUCKLE_M * axes[f"{side}_hand"])
     return points

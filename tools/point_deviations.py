@@ -41,6 +41,7 @@ from cardbox_tracker.estimation.cost.joint_points_kernels import (
     SHOULDER,
     SHOULDERS,
     WRIST,
+    WRIST_SHARE,
 )
 from cardbox_tracker.vision.camera import Camera
 from tools.detected_sessions import first_camera_of, motions, opened, source_of, source_weights
@@ -61,8 +62,6 @@ LEAST_SCORE = 0.5
 """Points with a smaller score are not compared."""
 
 N_TRUE = HIPS + 1
-# Wrist between elbow and hand, as a fraction, as joint_points_kernels places it.
-_WRIST = 0.73
 _OUTWARDS = np.array([1.0] * POINTS_OF_ARM + [-1.0] * POINTS_OF_ARM + [1.0])
 # Standard deviation of a normal distribution, as a multiple of its median absolute difference.
 _NORMAL = 1.4826
@@ -96,7 +95,7 @@ def true_points(keypoints_m: FloatArray, hips_m: FloatArray) -> FloatArray:
     joints = np.empty((N_TRUE, 3))
     for arm in range(2):
         shoulder, elbow, hand = keypoints_m[3 * arm : 3 * arm + 3]
-        wrist = elbow + _WRIST * (hand - elbow)
+        wrist = elbow + WRIST_SHARE * (hand - elbow)
         joints[POINTS_OF_ARM * arm : POINTS_OF_ARM * (arm + 1)] = shoulder, elbow, wrist, hand
     joints[HIPS] = hips_m
     return joints

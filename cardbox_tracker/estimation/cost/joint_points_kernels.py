@@ -45,9 +45,9 @@ SHOULDERS, N_BONES = 4, 5
 
 MOST = 16.0
 """Limit of a squared residual."""
-# Wrist between elbow and knuckles, as a fraction of the forearm: 0.146 and 0.054 of the stature
-# (Drillis & Contini 1966) for forearm and half of the hand.
-_WRIST = 0.73
+WRIST_SHARE = 0.73
+"""Place of the wrist between elbow and knuckles: forearm and half of the hand have 0.146 and 0.054
+of the stature (Drillis & Contini 1966)."""
 _NEAREST_M = 0.1
 
 
@@ -98,7 +98,7 @@ def _place_arm(
         elbow, hand = posed.joints[1, c], posed.joints[2, c]
         points[first + SHOULDER, c] = posed.joints[0, c]
         points[first + ELBOW, c] = elbow
-        points[first + WRIST, c] = elbow + _WRIST * (hand - elbow)
+        points[first + WRIST, c] = elbow + WRIST_SHARE * (hand - elbow)
         points[first + KNUCKLES, c] = hand
 
 

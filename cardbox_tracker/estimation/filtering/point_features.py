@@ -13,11 +13,10 @@ from cardbox_tracker.estimation.cost.joint_points_kernels import (
     POINTS_OF_ARM,
     SHOULDER,
     WRIST,
+    WRIST_SHARE,
 )
 from cardbox_tracker.vision.camera import Camera
 
-# Wrist on the line from elbow to knuckles, as the term of the points has it.
-_WRIST_SHARE = 0.73
 # Three values of each point of the arm, then two of each of its bones.
 POINT_FEATURES = 3 * POINTS_OF_ARM + 2 * 2
 """Number of features of an arm from :func:`features_of_points`."""
@@ -53,7 +52,7 @@ def features_of_points(
         shoulder, elbow, hand = keypoints_m[3 * arm : 3 * arm + 3]
         joints = np.empty((POINTS_OF_ARM, 3))
         joints[[SHOULDER, ELBOW, KNUCKLES]] = shoulder, elbow, hand
-        joints[WRIST] = elbow + _WRIST_SHARE * (hand - elbow)
+        joints[WRIST] = elbow + WRIST_SHARE * (hand - elbow)
         of_arm = found[POINTS_OF_ARM * arm : POINTS_OF_ARM * (arm + 1)]
         metre_px = camera.fx / np.maximum(joints[:, 2:], _NEAREST_M)
         offsets_m = (of_arm[:, :2] - camera.project(joints)) / metre_px
