@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
@@ -31,6 +32,12 @@ class LiveView(CardboxNode):
             JointState,
             "joint_states_stddev",
             lambda m, _: feed.deviations(_stamp_ns(m), results.joint_values_of(m)),
+            qos.RESULT,
+        )
+        self.subscribe(
+            DiagnosticArray,
+            "keypoint_states",
+            lambda m, _: feed.keypoint_states(_stamp_ns(m), [one.message for one in m.status]),
             qos.RESULT,
         )
         self.subscribe(
@@ -72,7 +79,7 @@ class LiveView(CardboxNode):
             self._feed.state(self._latest_ns, message.data)
 
 
-def _stamp_ns(message: Image | JointState | PoseArray) -> int:
+def _stamp_ns(message: DiagnosticArray | Image | JointState | PoseArray) -> int:
     return conversions.stamp_ns(message.header.stamp)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ class Feed:
         """Start; ``truth`` has the true frames by stamp, if they are known."""
         self._scene, self._truth = scene, truth or {}
         self._joints: tuple[int, JointValues] | None = None
+        self._states: tuple[int, Sequence[str]] | None = None
 
     def model(self, text: str, source: str) -> None:
         """Show a body model, YAML text; ``source`` names it in errors."""
@@ -41,13 +42,20 @@ class Feed:
             self._scene.at(stamp_ns)
             self._scene.uncertain_joints(self._joints[1], deviations)
 
+    def keypoint_states(self, stamp_ns: int, states: Sequence[str]) -> None:
+        """Take the states of the six keypoints, which precede the keypoints."""
+        self._states = stamp_ns, states
+
     def keypoints(self, stamp_ns: int, points_m: FloatArray) -> None:
         """Show shoulder, elbow and hand of both arms, (6, 3); other shapes are ignored."""
         if points_m.shape != (6, 3) or not np.isfinite(points_m).all():
             return
         frame = self._truth.get(stamp_ns)
         self._scene.at(stamp_ns)
-        self._scene.keypoints(points_m, None if frame is None else frame.keypoints_m)
+        states = None
+        if self._states is not None and self._states[0] == stamp_ns:
+            states = self._states[1]
+        self._scene.keypoints(points_m, None if frame is None else frame.keypoints_m, states)
 
     def image(self, stamp_ns: int, bgr: NDArray[np.uint8]) -> None:
         """Show the overlay, (H, W, 3)."""

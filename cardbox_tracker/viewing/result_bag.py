@@ -60,6 +60,9 @@ def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
         space + "/tracking_state": lambda m, c: feed.state(m.time_ns, str(c.data)),
         space + _JOINTS: lambda _, c: feed.joints(stamp_ns_of(c), joints_of(c)),
         space + "/joint_states_stddev": lambda _, c: feed.deviations(stamp_ns_of(c), joints_of(c)),
+        space + "/keypoint_states": lambda _, c: feed.keypoint_states(
+            stamp_ns_of(c), [str(one.message) for one in c.status]
+        ),
         space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
         space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
     }

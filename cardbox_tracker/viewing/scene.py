@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.description.urdf import urdf_from_body
@@ -27,8 +28,15 @@ from cardbox_tracker.viewing.layout import (
 )
 from cardbox_tracker.viewing.library import rerun
 
+Rgb = tuple[int, int, int]
+
 _COLOURS = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
 _MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
+_STATE_RGB: dict[str, Rgb] = {
+    KeypointState.UNCERTAIN: (255, 230, 0),
+    KeypointState.LOST: (255, 60, 60),
+    KeypointState.HIDDEN: (160, 160, 160),
+}
 _SPREAD = 2.0
 """Standard deviations of an interval with 90 % of the errors."""
 _HALF_TURN = (0.0, 0.0, 1.0, 0.0)
@@ -139,22 +147,33 @@ class Scene:
                 turned = known[name].compute_transform(value, clamp=False)
                 self._stream.log(f"{robot}/joints/{name}", turned)
 
-    def keypoints(self, points_m: FloatArray, truth_m: FloatArray | None = None) -> None:
-        """Show keypoints (6, 3), metres in the optical frame, and plot their errors."""
-        self._arms("keypoints", points_m, _MEASURED_RGB)
+    def keypoints(
+        self,
+        points_m: FloatArray,
+        truth_m: FloatArray | None = None,
+        states: Sequence[str] | None = None,
+    ) -> None:
+        """Show keypoints (6, 3), metres in the optical frame, and plot their errors.
+
+        With ``states``, uncertain joints are yellow, lost ones red and hidden ones grey.
+        """
+        joints = [_STATE_RGB.get(state, _MEASURED_RGB) for state in states or ()]
+        self._arms("keypoints", points_m, _MEASURED_RGB, joints)
         if truth_m is None:
             return
         self._arms("truth", truth_m, _TRUE_RGB)
         for number, (name, value) in enumerate(errors_cm(points_m, truth_m).items()):
             self._plot(f"{ERROR}/{name}", name, value, number, 2.0)
 
-    def _arms(self, entity: str, points_m: FloatArray, rgb: tuple[int, int, int]) -> None:
+    def _arms(
+        self, entity: str, points_m: FloatArray, rgb: Rgb, joint_rgb: Sequence[Rgb] = ()
+    ) -> None:
         if self._pitch_rad is None:
             return  # the camera's pitch is still unknown
         points = level_points(points_m, self._pitch_rad)
         strips = [points[list(arm)] for arm in _ARMS]
         bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
-        joints = self._rr.Points3D(points, colors=rgb, radii=_RADIUS_M)
+        joints = self._rr.Points3D(points, colors=list(joint_rgb) or rgb, radii=_RADIUS_M)
         for name, shown in (("arms", bones), ("joints", joints)):
             self._once(f"{entity}/{name}", self._rr.CoordinateFrame(ROOT_FRAME))
             self._stream.log(f"{entity}/{name}", shown)

@@ -42,5 +42,7 @@ class ShownTracking:
             self.count += 1
             feed.joints(stamp_ns, joints)
             feed.deviations(stamp_ns, deviations)
+        if estimate.keypoint_states is not None:
+            feed.keypoint_states(stamp_ns, estimate.keypoint_states)
         if estimate.keypoints_m is not None:
             feed.keypoints(stamp_ns, np.asarray(estimate.keypoints_m))

@@ -10,6 +10,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import Point, Pose, PoseArray  # noqa: E402
 from sensor_msgs.msg import Image, JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -18,6 +19,7 @@ from cardbox_tracker.ros import live_view  # noqa: E402
 
 TOPICS = {
     *("body_model", "tracking_state", "joint_states", "joint_states_stddev", "keypoints"),
+    "keypoint_states",
     *("overlay", "retarget/robot_description", "retarget/joint_states"),
 }
 
@@ -60,6 +62,8 @@ def test_every_result_is_shown_under_its_stamp(node: Any) -> None:
     hand(node, "joint_states", stamped(joints, 2))
     hand(node, "tracking_state", String(data="lost"))
     hand(node, "joint_states_stddev", stamped(JointState(), 2))
+    states = DiagnosticArray(status=[DiagnosticStatus(message="lost")])
+    hand(node, "keypoint_states", stamped(states, 2))
     hand(node, "keypoints", stamped(PoseArray(poses=[Pose(position=Point(x=1.0))]), 2))
     image = Image(height=1, width=2, step=6, encoding="bgr8", data=bytes(6))
     hand(node, "overlay", stamped(image, 3))
@@ -68,11 +72,12 @@ def test_every_result_is_shown_under_its_stamp(node: Any) -> None:
     hand(node, "retarget/joint_states", JointState(name=["a"], position=[1.0]))
     told = {name: values for name, *values in node._feed.told}
     assert [name for name, *_ in node._feed.told] == [
-        *("joints", "state", "deviations", "keypoints", "image", "model", "robot"),
-        "robot_joints",
+        *("joints", "state", "deviations", "keypoint_states", "keypoints", "image"),
+        *("model", "robot", "robot_joints"),
     ]
     assert told["joints"][0] == told["state"][0] == 2 * 10**9
     assert told["state"][1] == "lost"
+    assert told["keypoint_states"] == [2 * 10**9, ["lost"]]
     np.testing.assert_array_equal(told["keypoints"][1], [(1.0, 0.0, 0.0)])
     assert told["image"][1].shape == (1, 2, 3)
     assert told["robot"] == ["retarget", "<robot/>"]
