@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.chroma import bgr_of
 from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, sum_cells
 
@@ -133,6 +134,7 @@ class LightFollower:
         Returns:
             The background, an array that the next call may change, and the factor.
         """
+        check_array("brightness", brightness, self._mean.shape)
         self._estimate(brightness)
         if self.level * self._highest_field * self._highest < CUT_OFF:
             return self._relative, self.level

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 
 ImageArray = NDArray[np.uint8]
 
@@ -55,10 +56,18 @@ class Window(NamedTuple):
 
 
 def window_of(image: ImageArray) -> Window:
-    """Return a window that contains all pixels of an image (H, W), contiguous, that are not 0.
+    """Return a window that contains all pixels of an image (H, W), uint8, that are not 0.
 
     It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
+
+    Raises:
+        ValueError: the image is of another type.
     """
+    # A read-only array would make numba compile another version.
+    image = np.require(image, requirements=("C", "W", "A"))
+    check_array("image", image, (ANY, ANY))
+    if not image.size:
+        return Window(0, 0, 0, 0)
     if image.shape[1] % 8:
         return Window(*_bounds(image.view(np.uint8), 1))
     return Window(*_bounds(image.view(np.uint64), 8))

@@ -25,6 +25,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
+from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
 CountArray = NDArray[np.int64]
@@ -59,6 +60,8 @@ class CompiledSilhouette(SilhouetteTerm):
 
     def observe(self, frame: Frame) -> CompiledObservation:
         """See :class:`SilhouetteTerm`."""
+        size = self.camera.height, self.camera.width
+        check_array("silhouette", frame.silhouette, size)
         upper = np.ascontiguousarray(frame.silhouette[: self.rows])
         words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
         row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
