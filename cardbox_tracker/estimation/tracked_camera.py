@@ -85,9 +85,8 @@ class TrackedCamera:
             interval_s: time since the previous frame, s.
 
         Raises:
-            ValueError: the observation is none, the size of an array is not the camera's, its type
-                or values are impossible (:mod:`~cardbox_tracker.vision.given_arrays`), or the
-                points are no ImagePoints.
+            ValueError: the size of an array is not the camera's, its type or values are impossible
+                (:mod:`~cardbox_tracker.vision.given_arrays`), or the points are no ImagePoints.
         """
         observation = None if observation is None else self._checked(observation)
         posture, depth_m = before, None
@@ -114,11 +113,6 @@ class TrackedCamera:
 
     def _checked(self, given: Observation) -> Observation:
         """Return an observation with arrays that compiled code can take."""
-        if not isinstance(given, Observation):
-            raise ValueError(
-                f"the observation of {self._name} is of the type {type(given).__name__}; expected "
-                "an Observation, such as Observation(silhouette), or None"
-            )
         points, depth_m = given.points, None
         if points is not None and not isinstance(points, ImagePoints):
             raise ValueError(

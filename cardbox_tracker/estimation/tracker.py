@@ -188,6 +188,12 @@ class Tracker:
                 f"there are {len(observations)} observations; expected one for each of "
                 f"{len(self._cameras)} cameras"
             )
+        for one in observations:
+            if one is not None and not isinstance(one, Observation):
+                raise ValueError(
+                    f"an observation is of the type {type(one).__name__}; expected an Observation, "
+                    "such as Observation(silhouette), or None"
+                )
         frames = self._frames_of(observations)
         estimate = self._track(frames)
         return self._head.see(frames[0], estimate)

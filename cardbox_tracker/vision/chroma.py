@@ -134,7 +134,7 @@ class ChromaScore:
         """
         image = np.ascontiguousarray(image)
         check_array("image", image, (ANY, ANY, 3))
-        if half_size(image) != self._mean.shape[1:]:
+        if not image.size or half_size(image) != self._mean.shape[1:]:
             raise ValueError(
                 f"an image of the shape {image.shape} does not fit the background's chroma, whose "
                 f"shape is {self._mean.shape}"

@@ -69,7 +69,15 @@ class LightFollower:
         Args:
             mean: mean brightness of the background, (H, W) float32.
             chroma: its brightness, Cr and Cb at any resolution, (3, h, w); None if it is grey.
+
+        Raises:
+            ValueError: the background is narrower or lower than 2 px.
         """
+        if min(mean.shape) < 2:
+            raise ValueError(
+                f"the background has the shape {mean.shape}; expected 2x2 px or more: learn it "
+                "from larger images"
+            )
         self._prepare(mean, chroma)
         self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
         self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)

@@ -82,7 +82,7 @@ def clean_silhouette(
     """
     check_array("foreground", foreground, (ANY, ANY))
     silhouette = np.zeros(foreground.shape, np.uint8)
-    if window is not None and window.is_empty:
+    if not foreground.size or (window is not None and window.is_empty):
         return silhouette
     # Background in a window is at least as long as a side; unless holes are smaller than that, the
     # whole image is used.
