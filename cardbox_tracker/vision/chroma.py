@@ -130,7 +130,8 @@ class ChromaScore:
             (H, W), or of the window's size.
 
         Raises:
-            ValueError: the image is not of that size.
+            ValueError: the image is not of that size, or the window is empty, not in the image, or
+                has odd edges.
         """
         image = np.ascontiguousarray(image)
         check_array("image", image, (ANY, ANY, 3))
@@ -139,6 +140,10 @@ class ChromaScore:
                 f"an image of the shape {image.shape} does not fit the background's chroma, whose "
                 f"shape is {self._mean.shape}"
             )
+        if window is not None:
+            window.check_within(image.shape, 2)
+            if window.is_empty or window.top % 2 or window.bottom % 2:
+                raise ValueError(f"{window} is empty or has odd edges; expected neither")
         part = image if window is None else image[window.slices]
         colors = _small(part)
         if window is None and self._follow:

@@ -72,13 +72,7 @@ def decide_shadows(
     if colored is not None:
         sides = window.bottom - window.top, window.right - window.left
         check_array("colored", colored, sides, np.float32)
-    is_inside = 0 <= window.top <= window.bottom <= height and 0 <= window.left <= window.right
-    unit = 1 if width % 8 else 8
-    if not is_inside or window.right > width or window.left % unit or window.right % unit:
-        raise ValueError(
-            f"{window} does not fit an image of {width}x{height}; expected a part of it whose "
-            f"columns are multiples of {unit}"
-        )
+    window.check_within(shape, 1 if width % 8 else 8)
     part = foreground[window.slices]
     by_color = _NO_COLOR
     if colored is not None:

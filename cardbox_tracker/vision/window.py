@@ -31,6 +31,21 @@ class Window(NamedTuple):
         """Whether the window has no pixels."""
         return self.bottom <= self.top or self.right <= self.left
 
+    def check_within(self, shape: tuple[int, ...], unit: int) -> None:
+        """Refuse a window that is not in an image of ``shape``, or not in steps of ``unit`` px.
+
+        Raises:
+            ValueError: its edges are elsewhere.
+        """
+        is_inside = (
+            0 <= self.top <= self.bottom <= shape[0] and 0 <= self.left <= self.right <= shape[1]
+        )
+        if not is_inside or any(edge % unit for edge in (self.left, self.right)):
+            raise ValueError(
+                f"{self} does not fit an image of the shape {shape}; expected a part of it whose "
+                f"columns are multiples of {unit}"
+            )
+
     def joined(self, other: Window) -> Window:
         """Return the smallest window that contains both; an empty one is ignored."""
         if self.is_empty or other.is_empty:
