@@ -48,8 +48,8 @@ def silhouette_from(
         mask = mask[..., 0]
     if mask.ndim != 2 or not mask.size:
         raise ValueError(
-            f"{name} has the shape {mask.shape}; expected (height, width): give one person's mask, "
-            "one value for each pixel"
+            f"{name} has the shape {mask.shape}; expected {size or '(height, width)'}: give one "
+            "person's mask, one value for each pixel"
         )
     _check_size(mask, name, size)
     if mask.dtype == np.bool_:
@@ -89,8 +89,8 @@ def image_from(given: ArrayLike, name: str = "image", size: Size | None = None) 
         if image.ndim == 3 and image.shape[2] == 4:
             remedy = "leave out its fourth channel, as image[..., :3] does"
         raise ValueError(
-            f"{name} has the shape {image.shape}; expected (height, width) grey or (height, width, "
-            f"3) bgr: {remedy}"
+            f"{name} has the shape {image.shape}; expected {size or '(height, width)'} grey or the "
+            f"same with 3 channels, bgr: {remedy}"
         )
     _check_size(image, name, size)
     if image.dtype == np.bool_:
@@ -122,7 +122,9 @@ def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None
     if depth.ndim == 3 and depth.shape[2] == 1:
         depth = depth[..., 0]
     if depth.ndim != 2:
-        raise ValueError(f"{name} has the shape {depth.shape}; expected (height, width)")
+        raise ValueError(
+            f"{name} has the shape {depth.shape}; expected {size or '(height, width)'}"
+        )
     _check_size(depth, name, size)
     if not np.issubdtype(depth.dtype, np.floating):
         raise ValueError(

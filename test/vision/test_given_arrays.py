@@ -66,9 +66,9 @@ def test_a_mask_of_low_levels_shows_nobody() -> None:
         (-PERSON.astype(int), "from -1 to 0; expected"),
         (257 * SILHOUETTE.astype(np.uint16), "to 65535; expected"),
         (SILHOUETTE.T, r"shape \(4, 3\); the camera's is \(3, 4\): resize it"),
-        (SILHOUETTE[None], r"shape \(1, 3, 4\); expected \(height, width\)"),
-        (np.zeros((3, 4, 3), np.uint8), r"expected \(height, width\)"),
-        (np.zeros((0, 4)), r"expected \(height, width\)"),
+        (SILHOUETTE[None], r"shape \(1, 3, 4\); expected \(3, 4\)"),
+        (np.zeros((3, 4, 3), np.uint8), r"expected \(3, 4\): give one"),
+        (np.zeros((0, 4)), r"expected \(3, 4\)"),
         (np.float32(1), r"shape \(\); expected"),
         (PERSON.astype(object), "of object; expected an array of numbers"),
         (PERSON.astype(complex), "of complex128; expected"),
@@ -146,7 +146,7 @@ def test_unknown_depths_are_zero() -> None:
         (np.array([[0, 0, np.nan, 2500.0], [0, 0, 101, 101]]), "is 101 or more .*millimetres"),
         (np.full((2, 4), True), "bool"),
         (np.zeros((4, 2)), r"shape \(4, 2\); the camera's is \(2, 4\)"),
-        (np.zeros((2, 4, 2)), r"expected \(height, width\)"),
+        (np.zeros((2, 4, 2)), r"expected \(2, 4\)"),
     ],
 )
 def test_what_is_no_depth_is_refused_in_words(given: Any, words: str) -> None:
