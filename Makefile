@@ -7,6 +7,7 @@
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make people      track the films of real people in ../shared/data; writes docs/evaluation/real-people.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
+# make bounds  tests of compiled code with bounds checks; the first run compiles for minutes
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove the results of the targets above
@@ -142,6 +143,13 @@ EXAMPLES ?= 100000
 .PHONY: reliability
 reliability: $(VENV)/package
 	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
+
+# Code with bounds checks is slow, so it has a cache of its own. Only some: make bounds TESTS=test/vision
+TESTS ?= test/reliability test/vision test/body test/estimation
+.PHONY: bounds
+bounds: $(VENV)/extras
+	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/$(VENV)/bounds \
+		$(BIN)/python -m pytest --timeout 3600 $(TESTS)
 
 # The build uses a copy, like a workspace of its own. 'make test' runs the slow tests.
 COLCON := build/colcon

@@ -7,7 +7,8 @@ and compiles damaged code again.
 
 Compiled code contains its callees and the constants of other files, but numba only checks the file
 of the function itself. Here an entry is valid for one state of all kernel sources of a package, see
-:func:`digest_of_kernels`. A newer entry overwrites the older one.
+:func:`digest_of_kernels`. A newer entry overwrites the older one. Code with bounds checks
+(``NUMBA_BOUNDSCHECK=1``, ``make bounds``) has entries of its own.
 
 A user who can write to the folder of the cache can execute code in each program that loads it. So
 the folder belongs to the user, and only the user may write to it; other folders are not used.
@@ -149,6 +150,9 @@ class _Cache(FunctionCache):
         digests = tuple(digest_of_kernels(package) for package in sorted(packages))
         # Names without line numbers, so that a moved function leaves no old files behind.
         name = _LINE_NUMBER.sub("", self._impl.filename_base)
+        settings: Any = numba.config
+        if settings.BOUNDSCHECK:
+            name += ".bounds"
         stamp = locator.get_source_stamp(), digests
         self._cache_file = IndexDataCacheFile(locator.get_cache_path(), name, stamp)
 

@@ -55,6 +55,30 @@ def test_a_file_that_was_cut_off_is_made_again(ending: str, module: Path) -> Non
         assert used(module) == ("42\n", ""), "it was kept again"
 
 
+READER = """
+import numpy
+from cardbox_tracker.compiling import njit
+
+@njit(cache=True)
+def read(array, place):
+    return array[place]
+
+def double(place):
+    try:
+        return read(numpy.zeros(place + 1)[:place], place)
+    except IndexError:
+        return "refused"
+"""
+
+
+def test_code_with_bounds_checks_is_kept_apart(module: Path) -> None:
+    (module / "twice.py").write_text(READER)
+    for _ in range(2):
+        assert used(module, NUMBA_BOUNDSCHECK="0") == ("0.0\n", "")
+        assert used(module, NUMBA_BOUNDSCHECK="1") == ("refused\n", "")
+    assert len(list((module / "__pycache__").glob("*.nbc"))) == 2, "neither replaces the other"
+
+
 CALLEE = """
 from cardbox_tracker.compiling import njit
 {constant}

@@ -104,6 +104,8 @@ class ImagePoints:
 def _array(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Return a copy of ``values`` if it has the expected shape."""
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         array = np.array(values, np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(

@@ -15,11 +15,15 @@ class Observation:
 
     An observation without a silhouette stands for a camera without data at this time.
 
+    The tracker converts arrays of other types, or refuses them with a ValueError; see
+    :mod:`cardbox_tracker.vision.given_arrays`.
+
     Attributes:
-        silhouette: (H, W), 0 or 255, of the camera's size; None if there is none.
+        silhouette: (H, W), 0 or 255, of the camera's size, or a mask of another numeric type; None
+            if there is none.
         image: (H, W) grey or (H, W, 3) bgr of the same time, for terms that use it.
-        depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths are 0
-            or not finite. Only the depth image of the first camera is used.
+        depth_m: (H, W), metres along the optical axis, for the term ``Depth``; unknown depths are
+            not above 0 or not finite. Only the depth image of the first camera is used.
         stamp_ns: time of the data, ns; None if it is unknown.
         points: the person's joints in the image, from a detector; None without one.
     """

@@ -24,6 +24,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.estimation.person_masks import Mask, PersonDrawer, PersonMasks
 from cardbox_tracker.estimation.still_things import CHANGED, SAME, THING, StillThings
+from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.regions import Regions, find_regions
 
@@ -61,6 +62,7 @@ class PersonRegion:
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Set up for one body and one camera, which includes the pitch."""
+        self._size = camera.height, camera.width
         self._drawer = PersonDrawer(body, camera)
         self._start = self._drawer.masks(self._drawer.front, _NEAR_START_M)
         self._kernels, self._anchor = self._drawer.head_and_shoulders()
@@ -92,7 +94,11 @@ class PersonRegion:
             is_sure: whether that posture fitted well.
             image: (H, W) grey or (H, W, 3) bgr of the same frame; without it, pixels in front of
                 an object at rest belong to the person only near the last posture.
+
+        Raises:
+            ValueError: the silhouette is not of that size and type.
         """
+        check_array("silhouette", silhouette, self._size)
         regions = find_regions(silhouette)
         seen = _cells(silhouette, self._cell_px)
         is_large = regions.areas_px.sum() > self._large_px

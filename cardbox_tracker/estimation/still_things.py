@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import check_array
 
 ImageArray = NDArray[np.uint8]
 
@@ -49,6 +50,7 @@ class StillThings:
     def learn(self, image: ImageArray, shows: NDArray[np.uint8]) -> None:
         """Update from an image, of which ``shows`` (H, W) has the class of each pixel."""
         planes = _planes(image)
+        check_array("shows", shows, planes.shape[:2])
         if self._looks is None or self._looks.shape != planes.shape:
             self._looks = np.zeros_like(planes)
             self._counts = np.zeros(planes.shape[:2], np.int16)

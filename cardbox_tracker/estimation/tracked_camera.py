@@ -18,6 +18,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.given_arrays import depth_from, image_from, silhouette_from
 
 
 class TrackedCamera:
@@ -84,9 +85,10 @@ class TrackedCamera:
             interval_s: time since the previous frame, s.
 
         Raises:
-            ValueError: the size of the silhouette or the image is not the camera's, or the points
-                are no ImagePoints.
+            ValueError: the size of an array is not the camera's, its type or values are impossible
+                (:mod:`~cardbox_tracker.vision.given_arrays`), or the points are no ImagePoints.
         """
+        observation = None if observation is None else self._checked(observation)
         posture, depth_m = before, None
         stamp_ns = None if observation is None else observation.stamp_ns
         if self.view is None:
@@ -97,7 +99,6 @@ class TrackedCamera:
             nothing = np.zeros((self._camera.height, self._camera.width), np.uint8)
             return Frame(nothing, self._rows, 0, None, posture, depth_m, interval_s, stamp_ns)
         points = observation.points
-        self._check(observation)
         silhouette, image = observation.silhouette, observation.image
         if self.view is not None:
             silhouette, image = _upright(self.view, silhouette, image)
@@ -110,22 +111,22 @@ class TrackedCamera:
         seen = silhouette, self._rows, foreground_px, image
         return Frame(*seen, posture, depth_m, interval_s, stamp_ns, points)
 
-    def _check(self, observation: Observation) -> None:
-        points = observation.points
+    def _checked(self, given: Observation) -> Observation:
+        """Return an observation with arrays that compiled code can take."""
+        points, depth_m = given.points, None
         if points is not None and not isinstance(points, ImagePoints):
             raise ValueError(
                 f"points are of the type {type(points).__name__}; expected ImagePoints, such as "
                 "ImagePoints.of(...), or None"
             )
-        for name, pixels, most in (
-            ("silhouette", observation.silhouette, 2),
-            ("image", observation.image, 3),
-        ):
-            if pixels is not None and (pixels.shape[:2] != self._size or pixels.ndim > most):
-                raise ValueError(
-                    f"{name} has shape {pixels.shape}; the camera's is {self._size}, of "
-                    f"{self._name}"
-                )
+        if self.view is None and given.depth_m is not None:
+            depth_m = depth_from(given.depth_m, f"depth_m of {self._name}", self._size)
+        silhouette, image = given.silhouette, given.image
+        if silhouette is not None:
+            silhouette = silhouette_from(silhouette, f"silhouette of {self._name}", self._size)
+        if image is not None:
+            image = image_from(image, f"image of {self._name}", self._size)
+        return Observation(silhouette, image, depth_m, given.stamp_ns, points)
 
 
 def _upright(

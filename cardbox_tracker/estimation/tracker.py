@@ -160,15 +160,17 @@ class Tracker:
         Args:
             observations: one for each camera, the first camera first. A camera without data has
                 None or an observation without a silhouette, and may be missing at the end. A single
-                observation or silhouette (H, W), 0 or 255, belongs to the first camera.
+                observation or silhouette (H, W) belongs to the first camera. Masks of any numeric
+                type are silhouettes, see
+                :func:`~cardbox_tracker.vision.given_arrays.silhouette_from`.
             image: (H, W) grey or (H, W, 3) bgr of the same time as a bare silhouette.
             stamp_ns: time of a bare silhouette, ns. Without a stamp, the interval to the previous
                 frame is 1/15 s.
 
         Raises:
-            ValueError: the size of a silhouette or an image is not its camera's; points are no
-                ImagePoints; there are more observations than cameras; or ``image`` or ``stamp_ns``
-                is given in addition to observations.
+            ValueError: the size of an array is not its camera's, or its type or values are
+                impossible; points are no ImagePoints; there are more observations than cameras; or
+                ``image`` or ``stamp_ns`` is given in addition to observations.
         """
         if isinstance(observations, np.ndarray):
             observations = Observation(observations, image, stamp_ns=stamp_ns)
@@ -176,11 +178,22 @@ class Tracker:
             raise ValueError("give image and stamp_ns in the observations, not beside them")
         if isinstance(observations, Observation):
             observations = (observations,)
+        if not isinstance(observations, Sequence):
+            raise ValueError(
+                f"the observations are of the type {type(observations).__name__}; expected a "
+                "silhouette as a numpy array, an Observation, or a list with one for each camera"
+            )
         if not 1 <= len(observations) <= len(self._cameras):
             raise ValueError(
                 f"there are {len(observations)} observations; expected one for each of "
                 f"{len(self._cameras)} cameras"
             )
+        for one in observations:
+            if one is not None and not isinstance(one, Observation):
+                raise ValueError(
+                    f"an observation is of the type {type(one).__name__}; expected an Observation, "
+                    "such as Observation(silhouette), or None"
+                )
         frames = self._frames_of(observations)
         estimate = self._track(frames)
         return self._head.see(frames[0], estimate)

@@ -25,6 +25,7 @@ from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.chroma import ChromaScore
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.given_arrays import image_from
 from cardbox_tracker.vision.light import LightFollower
 from cardbox_tracker.vision.partial_scene import merged
 from cardbox_tracker.vision.regions import clean_silhouette
@@ -115,12 +116,15 @@ class SilhouetteExtractor:
         """Return the silhouette (H, W) of an image: 255 for the person, else 0.
 
         Args:
-            image: brightness (H, W), or bgr (H, W, 3), uint8.
+            image: brightness (H, W), or bgr (H, W, 3); other types than uint8 are converted, see
+                :func:`~cardbox_tracker.vision.given_arrays.image_from`.
             stamp_ns: stamp of the image; 0 if unknown.
 
         Raises:
-            ValueError: the image's size is not the background's.
+            ValueError: the image's size is not the background's, or its type or values are
+                impossible.
         """
+        image = image_from(image)
         brightness = brightness_of(image)
         if brightness.shape != self.model.mean.shape:
             raise ValueError(

@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CameraError, quoted
-from cardbox_tracker.vision.camera_checks import distortion_problem, matrix_problem
+from cardbox_tracker.vision.camera_checks import (
+    distortion_problem,
+    matrix_problem,
+    real_number,
+    whole_pixels,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +51,11 @@ class Camera:
     pitch_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check the values; whole numbers of another type become ``int``."""
+        for name in ("width", "height"):
+            object.__setattr__(self, name, whole_pixels(name, getattr(self, name)))
+        for name in ("fx", "fy", "cx", "cy", "pitch_rad"):
+            object.__setattr__(self, name, real_number(name, getattr(self, name)))
         if not all(0 < side <= _MOST_SIDE_PX for side in (self.width, self.height)):
             raise CameraError(
                 f"the camera's image has {self.width}x{self.height} px; expected 1 to "

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from cardbox_tracker.errors import CameraError, quoted
 
 # Limits of the focal length as multiples of the image's width: fields of view from 177 degrees down
 # to a twentieth of a degree.
 _SHORTEST, _LONGEST = 0.02, 1000.0
 # The principal point lies outside the image if a driver crops a region of interest.
 _FARTHEST = 100.0
+# Beyond it, a number cannot be the side of an image.
+_MOST = 1e9
 
 
 def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
@@ -39,6 +44,35 @@ def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
             f"image of {width}x{height}"
         )
     return ""
+
+
+def whole_pixels(name: str, value: object) -> int:
+    """Return a camera's ``width`` or ``height``, px, as ``int``.
+
+    Raises:
+        CameraError: the value is no whole number.
+    """
+    number = real_number(name, value)
+    if not abs(number) < _MOST or number % 1 != 0:
+        raise CameraError(
+            f"the camera's {name} is {quoted(value)}; expected a whole number of px: give the size "
+            "of the silhouettes"
+        )
+    return int(number)
+
+
+def real_number(name: str, value: object) -> float:
+    """Return one of a camera's other values as ``float``.
+
+    Raises:
+        CameraError: the value is no number, or too large for ``float``.
+    """
+    try:
+        if isinstance(value, Real):
+            return float(value)
+    except OverflowError:
+        pass
+    raise CameraError(f"the camera's {name} is {quoted(value)}; expected a number")
 
 
 def distortion_problem(distortion: NDArray[Any]) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -52,11 +53,16 @@ def chroma_planes(image: ImageArray) -> ImageArray:
     return np.ascontiguousarray(_small(image).transpose(2, 0, 1))
 
 
+def half_size(image: NDArray[Any]) -> tuple[int, int]:
+    """Return the rows and columns of an image (H, W, ...) at half its resolution."""
+    height, width = image.shape[:2]
+    return max(height // 2, 1), max(width // 2, 1)
+
+
 def _small(image: ImageArray) -> ImageArray:
     """Return brightness, Cr and Cb (h, w, 3) uint8, smoothed, at half the resolution."""
-    height, width = image.shape[:2]
-    size = (max(width // 2, 1), max(height // 2, 1))
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    height, width = half_size(image)
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.blur(cv2.cvtColor(small, cv2.COLOR_BGR2YCrCb), _SMOOTHING), np.uint8)
 
 
@@ -90,7 +96,12 @@ class ChromaScore:
             edge: fraction of the highest score nearby at which the outline is put.
             follow: compensate a change of the white balance.
             before: the previous score, whose estimate of the white balance is kept.
+
+        Raises:
+            ValueError: mean and standard deviation differ in shape.
         """
+        for name, planes in model._asdict().items():
+            check_array(name, planes, (3, *np.shape(model.mean)[1:]), np.float32)
         self._mean = model.mean
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
         self._weights = np.asarray(1.0 / limits, np.float32)
@@ -117,7 +128,22 @@ class ChromaScore:
 
         Returns:
             (H, W), or of the window's size.
+
+        Raises:
+            ValueError: the image is not of that size, or the window is empty, not in the image, or
+                has odd edges.
         """
+        image = np.ascontiguousarray(image)
+        check_array("image", image, (ANY, ANY, 3))
+        if not image.size or half_size(image) != self._mean.shape[1:]:
+            raise ValueError(
+                f"an image of the shape {image.shape} does not fit the background's chroma, whose "
+                f"shape is {self._mean.shape}"
+            )
+        if window is not None:
+            window.check_within(image.shape, 2)
+            if window.is_empty or window.top % 2 or window.bottom % 2:
+                raise ValueError(f"{window} is empty or has odd edges; expected neither")
         part = image if window is None else image[window.slices]
         colors = _small(part)
         if window is None and self._follow:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.encodings import image_parts
+from cardbox_tracker.vision.given_arrays import depth_from
 
 DepthImage = NDArray[np.float32]
 
@@ -92,11 +93,17 @@ def depth_from_image(message: Any) -> DepthImage:
         message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
 
     Raises:
-        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`.
+        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`, or the depths look like
+            millimetres.
     """
     if hasattr(message, "format"):
-        return unpack_depth(message.data, message.format)
-    return decode_depth(*image_parts(message))
+        depth_m = unpack_depth(message.data, message.format)
+    else:
+        depth_m = decode_depth(*image_parts(message))
+    try:
+        return depth_from(depth_m, "the depth image")
+    except ValueError as error:
+        raise EncodingError(str(error)) from None
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:

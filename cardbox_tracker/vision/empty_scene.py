@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.vision.chroma import ChromaModel, chroma_planes
+from cardbox_tracker.vision.array_checks import ANY, check_array
+from cardbox_tracker.vision.chroma import ChromaModel, chroma_planes, half_size
+from cardbox_tracker.vision.given_arrays import image_from
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -22,11 +24,23 @@ class BackgroundModel:
         mean: mean brightness.
         stddev: standard deviation of the brightness.
         chroma: mean and standard deviation of the colours; None if the images were grey.
+
+    Raises:
+        ValueError: an array has another shape or type.
     """
 
     mean: FloatImage
     stddev: FloatImage
     chroma: ChromaModel | None = None
+
+    def __post_init__(self) -> None:
+        """Check the shapes."""
+        check_array("mean", self.mean, (ANY, ANY), np.float32)
+        check_array("stddev", self.stddev, self.mean.shape, np.float32)
+        if self.chroma is not None:
+            shape = (3, *half_size(self.mean))
+            check_array("mean of chroma", self.chroma.mean, shape, np.float32)
+            check_array("stddev of chroma", self.chroma.stddev, shape, np.float32)
 
 
 class BackgroundLearner:
@@ -43,15 +57,20 @@ class BackgroundLearner:
         return self._brightness.count
 
     def add(self, image: NDArray[np.uint8] | FloatImage) -> None:
-        """Learn from one image: brightness (H, W), or bgr (H, W, 3) uint8.
+        """Learn from one image: brightness (H, W), or bgr (H, W, 3).
+
+        Types other than uint8 are converted, see
+        :func:`~cardbox_tracker.vision.given_arrays.image_from`.
 
         Raises:
-            ValueError: the size differs from that of the earlier images.
+            ValueError: the size differs from that of the earlier images, or the image's type or
+                values are impossible.
         """
+        image = image_from(image)
         self._brightness.add(brightness_of(image) if image.ndim == 3 else image)
         # A single grey image makes the comparison by colour impossible.
         if image.ndim == 3 and self._chroma.count == self._brightness.count - 1:
-            self._chroma.add(chroma_planes(np.asarray(image, np.uint8)))
+            self._chroma.add(chroma_planes(image))
 
     def model(self) -> BackgroundModel:
         """Return the learned background.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -37,7 +38,14 @@ def segment_foreground(
 
     Returns:
         (H, W), 0 or 255.
+
+    Raises:
+        ValueError: the arrays differ in shape, or one is read-only.
     """
+    check_array("difference", difference, (ANY, ANY), np.float32, is_written=True)
+    named = {"brighter": brighter, "darker": darker, "score": score}
+    for name, array in named.items():
+        check_array(name, array, difference.shape, np.float32, is_written=True)
     foreground = np.empty(difference.shape, np.uint8)
     _foreground(difference, brighter, darker, np.float32(edge), score, foreground)
     return foreground

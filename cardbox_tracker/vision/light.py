@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.chroma import bgr_of
 from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, sum_cells
 
@@ -68,7 +69,19 @@ class LightFollower:
         Args:
             mean: mean brightness of the background, (H, W) float32.
             chroma: its brightness, Cr and Cb at any resolution, (3, h, w); None if it is grey.
+
+        Raises:
+            ValueError: an array has another shape or type, or the background is narrower or lower
+                than 2 px.
         """
+        check_array("mean", mean, (ANY, ANY), np.float32)
+        if chroma is not None:
+            check_array("chroma", chroma, (3, ANY, ANY), np.float32)
+        if min(mean.shape) < 2:
+            raise ValueError(
+                f"the background has the shape {mean.shape}; expected 2x2 px or more: learn it "
+                "from larger images"
+            )
         self._prepare(mean, chroma)
         self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
         self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)
@@ -133,6 +146,7 @@ class LightFollower:
         Returns:
             The background, an array that the next call may change, and the factor.
         """
+        check_array("brightness", brightness, self._mean.shape)
         self._estimate(brightness)
         if self.level * self._highest_field * self._highest < CUT_OFF:
             return self._relative, self.level
@@ -205,6 +219,7 @@ class LightFollower:
 
     def exclude(self, silhouette: ImageArray) -> None:
         """Exclude the person, given the silhouette (H, W) of the last image."""
+        check_array("silhouette", silhouette, self._mean.shape)
         if cv2.countNonZero(silhouette) > _COVERAGE * silhouette.size:
             self._settling = _SETTLING - 1
             return

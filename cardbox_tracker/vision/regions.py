@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.window import Window
 
 ImageArray = NDArray[np.uint8]
@@ -33,7 +34,11 @@ def remove_small_regions(image: ImageArray, colour: int, area_px: float) -> None
         image: (H, W), contiguous, 0 or 255.
         colour: 0 or 255.
         area_px: smallest area that is kept, px.
+
+    Raises:
+        ValueError: the image is read-only, or of another type or layout.
     """
+    check_array("image", image, (ANY, ANY), is_written=True)
     height, width = image.shape
     words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
     runs = np.empty((4, height * (width // 2 + 1)), np.int32)
@@ -71,9 +76,13 @@ def clean_silhouette(
 
     Returns:
         A new (H, W) image, 0 or 255.
+
+    Raises:
+        ValueError: the image is of another type or layout.
     """
+    check_array("foreground", foreground, (ANY, ANY))
     silhouette = np.zeros(foreground.shape, np.uint8)
-    if window is not None and window.is_empty:
+    if not foreground.size or (window is not None and window.is_empty):
         return silhouette
     # Background in a window is at least as long as a side; unless holes are smaller than that, the
     # whole image is used.
@@ -92,9 +101,14 @@ def clean_silhouette(
 
 
 def find_regions(image: ImageArray) -> Regions:
-    """Return the connected regions of the pixels of ``image`` (H, W) that are 255."""
+    """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255.
+
+    Raises:
+        ValueError: the image is of another type.
+    """
     # A read-only array would make numba compile another version.
-    image = np.require(image, requirements=("C", "W"))
+    image = np.require(image, requirements=("C", "W", "A"))
+    check_array("image", image, (ANY, ANY))
     height, width = image.shape
     words = image.view(np.uint64) if width % 8 == 0 else _NO_WORDS
     runs = np.empty((4, height * (width // 2 + 1)), np.int32)
@@ -141,6 +155,10 @@ def _list_runs(image: Any, words: Any, colour: Any, runs: Any, firsts: Any) -> A
         u = _end_of(image, words, v, 0, other)
         while u < width:
             end = _end_of(image, words, v, u, colour)
+            if end == u:
+                # A pixel of neither colour belongs to no region.
+                u += 1
+                continue
             starts[count], ends[count] = u, end
             parents[count], areas[count] = count, end - u
             # Runs above that end before this one begins touch none of the following runs.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -59,8 +60,19 @@ def decide_shadows(
         softest: largest variation of the darkness around a pixel of a shadow.
         window: a window that contains all foreground, whose columns are multiples of 8 if the
             width is one; the whole image if None.
+
+    Raises:
+        ValueError: the arrays differ in shape, one is read-only, or the window is not in the image.
     """
-    window = window or Window(0, foreground.shape[0], 0, foreground.shape[1])
+    check_array("foreground", foreground, (ANY, ANY), is_written=True)
+    height, width = shape = foreground.shape
+    window = window or Window(0, height, 0, width)
+    check_array("difference", difference, shape, np.float32, is_written=True)
+    check_array("per_level", per_level, shape, np.float32, is_written=True)
+    if colored is not None:
+        sides = window.bottom - window.top, window.right - window.left
+        check_array("colored", colored, sides, np.float32)
+    window.check_within(shape, 1 if width % 8 else 8)
     part = foreground[window.slices]
     by_color = _NO_COLOR
     if colored is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
+from cardbox_tracker.vision.array_checks import ANY, check_array
 
 ImageArray = NDArray[np.uint8]
 
@@ -29,6 +30,21 @@ class Window(NamedTuple):
     def is_empty(self) -> bool:
         """Whether the window has no pixels."""
         return self.bottom <= self.top or self.right <= self.left
+
+    def check_within(self, shape: tuple[int, ...], unit: int) -> None:
+        """Refuse a window that is not in an image of ``shape``, or not in steps of ``unit`` px.
+
+        Raises:
+            ValueError: its edges are elsewhere.
+        """
+        is_inside = (
+            0 <= self.top <= self.bottom <= shape[0] and 0 <= self.left <= self.right <= shape[1]
+        )
+        if not is_inside or any(edge % unit for edge in (self.left, self.right)):
+            raise ValueError(
+                f"{self} does not fit an image of the shape {shape}; expected a part of it whose "
+                f"columns are multiples of {unit}"
+            )
 
     def joined(self, other: Window) -> Window:
         """Return the smallest window that contains both; an empty one is ignored."""
@@ -55,10 +71,18 @@ class Window(NamedTuple):
 
 
 def window_of(image: ImageArray) -> Window:
-    """Return a window that contains all pixels of an image (H, W), contiguous, that are not 0.
+    """Return a window that contains all pixels of an image (H, W), uint8, that are not 0.
 
     It may be up to eight columns wider at either side than necessary; it is empty if all are 0.
+
+    Raises:
+        ValueError: the image is of another type.
     """
+    # A read-only array would make numba compile another version.
+    image = np.require(image, requirements=("C", "W", "A"))
+    check_array("image", image, (ANY, ANY))
+    if not image.size:
+        return Window(0, 0, 0, 0)
     if image.shape[1] % 8:
         return Window(*_bounds(image.view(np.uint8), 1))
     return Window(*_bounds(image.view(np.uint64), 8))

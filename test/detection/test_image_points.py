@@ -66,6 +66,7 @@ def test_the_arrays_are_copies() -> None:
         ({"px": np.zeros((2, COUNT))}, r"px .*\(2, 17\)"),
         ({"px": None}, r"px .*\(\)"),
         ({"px": [[1.0, 2.0], [3.0]]}, r"px .*\[\[1.0, 2.0\], \[3.0\]\].*numbers"),
+        ({"px": PX * 1j}, r"(?s)px .*7\.j.*numbers"),
         ({"px": "nose"}, r"px .*'nose'.*numbers"),
         ({"px": [[object()] * 2] * COUNT}, r"px .*object.*numbers"),
         ({"px": [[10**400] * 2] * COUNT}, r"px .*numbers"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -45,13 +46,27 @@ def test_projection_by_hand() -> None:
         ({"fy": float("inf")}, r"300 and inf px"),
         ({"cx": float("nan")}, r"principal point \(nan, 119.5\)"),
         ({"pitch_rad": float("inf")}, r"pitch inf rad is not finite"),
+        ({"width": float("nan")}, r"width is nan; expected a whole number"),
+        ({"width": 320.5}, r"width is 320\.5; expected a whole number"),
+        ({"width": "320"}, r"width is '320'; expected a number"),
+        ({"height": 10**5000}, r"height is .*; expected"),
+        ({"fx": None}, r"fx is None; expected a number"),
+        ({"fy": 10**400}, r"fy is 1000.*; expected a number"),
+        ({"cy": 1j}, r"cy is 1j; expected a number"),
     ],
 )
-def test_an_impossible_camera_is_refused(changes: dict[str, float], words: str) -> None:
+def test_an_impossible_camera_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(CameraError, match=words):
-        replace(CAMERA, **changes)  # type: ignore[arg-type]
+        replace(CAMERA, **changes)
     with pytest.raises(CameraError, match="0x0 px"):
         CAMERA.scaled(0, 0)
+
+
+def test_a_size_in_another_type_of_number_becomes_whole() -> None:
+    """OpenCV gives the width of a video as 320.0."""
+    camera = Camera(320.0, np.uint16(240), 300, np.float32(310), 159.5, 119.5)  # type: ignore[arg-type]
+    assert camera == CAMERA
+    assert (type(camera.width), type(camera.height), type(camera.fx)) == (int, int, float)
 
 
 def test_the_axes_of_the_two_frames() -> None:

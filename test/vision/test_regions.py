@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import cv2
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.vision.regions import find_regions, remove_small_regions
+from cardbox_tracker.vision.window import window_of
 
 
 def image(*rows: str) -> np.ndarray:
@@ -105,6 +108,40 @@ def test_regions_by_hand() -> None:
         painted(before), [[1, 0, 0, 2, 2], [1, 0, 1, 0, 2], [1, 1, 1, 0, 0], [0, 0, 0, 0, 3]]
     )
     assert find_regions(before).areas_px.tolist() == [6, 3, 1]
+
+
+@pytest.mark.parametrize("other", [1, 128, 254])
+def test_pixels_of_another_value_belong_to_no_region(other: int) -> None:
+    before = image("x.ox..oo", "oo.x.xxx", "xxxxxxxo")
+    expected = painted(before)
+    before[0, 2] = before[0, 6] = before[1, 0] = before[2, 7] = other
+    np.testing.assert_array_equal(painted(before), expected)
+    after = recoloured(before, 255, 100)
+    np.testing.assert_array_equal(after, np.where(before == other, other, 0))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (np.zeros((4, 8), np.int32), "int32; expected .* of uint8"),
+        (np.zeros((4, 8), np.bool_), "bool"),
+        (np.zeros((4, 8, 1), np.uint8), r"\(4, 8, 1\)"),
+        (np.zeros(8, np.uint8), r"\(8,\)"),
+    ],
+)
+def test_another_type_or_shape_is_refused(wrong: np.ndarray, words: str) -> None:
+    for function in (find_regions, window_of, partial(recoloured, colour=255, area_px=1)):
+        with pytest.raises(ValueError, match=words):
+            function(wrong)
+
+
+def test_an_image_that_cannot_be_written_is_refused() -> None:
+    white = np.full((4, 8), 255, np.uint8)
+    with pytest.raises(ValueError, match="not contiguous"):
+        remove_small_regions(white[:, ::2], 255, 1)
+    white.setflags(write=False)
+    with pytest.raises(ValueError, match="read-only"):
+        remove_small_regions(white, 255, 1)
 
 
 @given(arrays(np.bool_, st.tuples(st.integers(1, 12), st.integers(1, 20))))

@@ -25,6 +25,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.camera import Camera
 
 CountArray = NDArray[np.int64]
@@ -59,6 +60,8 @@ class CompiledSilhouette(SilhouetteTerm):
 
     def observe(self, frame: Frame) -> CompiledObservation:
         """See :class:`SilhouetteTerm`."""
+        size = self.camera.height, self.camera.width
+        check_array("silhouette", frame.silhouette, size)
         upper = np.ascontiguousarray(frame.silhouette[: self.rows])
         words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
         row_sums = np.empty((self.rows, self.camera.width + 1), self._sums)
@@ -144,9 +147,11 @@ class CompiledObservation(SilhouetteObservation):
 
     def polygons(self, corners_m: FloatArray) -> CountArray:
         """Return costs (N,) of planar quadrilaterals (N, K, 4, 3), metres in the optical frame."""
-        costs = np.empty(len(corners_m), np.int64)
+        contiguous = np.ascontiguousarray(corners_m, dtype=np.float64)
+        check_array("corners_m", contiguous, (ANY, ANY, 4, 3), np.float64)
+        costs = np.empty(len(contiguous), np.int64)
         kernels.polygon_costs(
-            np.ascontiguousarray(corners_m, dtype=np.float64),
+            contiguous,
             self.cardbox[3],
             self.row_sums,
             self.frame.foreground_px,
@@ -156,6 +161,7 @@ class CompiledObservation(SilhouetteObservation):
 
     def _full(self, postures: FloatArray) -> tuple[CountArray, CountArray]:
         contiguous = np.ascontiguousarray(postures, dtype=np.float64)
+        check_array("postures", contiguous, (ANY, N_JOINTS), np.float64)
         costs = np.empty(len(contiguous), np.int64)
         areas = np.empty(len(contiguous), np.int64)
         kernels.full_costs(

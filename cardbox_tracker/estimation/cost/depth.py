@@ -43,6 +43,7 @@ from cardbox_tracker.estimation.cost.terms import (
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import Settings, setting
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.camera import Camera
 
 _SILENCE = Silence()
@@ -81,6 +82,7 @@ class DepthTerm:
     def __init__(self, config: Depth, body: BodyModel, camera: Camera) -> None:
         """Prepare for one body and one camera, and compile the kernel if necessary."""
         self.config = config
+        self._size = camera.height, camera.width
         model = WholeBodyCost(body, camera, WholeBodyCostConfig())
         self.body = model.body
         # Areas at the place of the body model, so that a nearer state has no advantage.
@@ -91,7 +93,7 @@ class DepthTerm:
         self.areas_px = np.ascontiguousarray(areas_px)
         # The areas of the limbs count for both arms.
         self.body_px = float(areas_px[:3].sum() + 2.0 * areas_px[3:].sum())
-        self.costs(np.zeros((1, N_STATE)), np.zeros((camera.height, camera.width), np.float32))
+        self.costs(np.zeros((1, N_STATE)), np.zeros(self._size, np.float32))
 
     def observe(self, frame: Frame) -> TermObservation:
         """Return the term's observation, which is zero without a depth image."""
@@ -108,7 +110,13 @@ class DepthTerm:
         depth_m: DepthImage,
         drawn: Drawn = (True, True, True),
     ) -> FloatArray:
-        """Return the costs (N,), px, of some parts of states (N, 14)."""
+        """Return the costs (N,), px, of some parts of states (N, 14).
+
+        Raises:
+            ValueError: the shape of an array is another one.
+        """
+        check_array("states", states, (ANY, N_STATE), np.float64)
+        check_array("depth_m", depth_m, self._size, np.float32)
         costs = np.empty(len(states))
         kernels.depth_costs(
             np.ascontiguousarray(states, dtype=np.float64),

@@ -156,10 +156,11 @@ def find_outline(
 
 @kernel
 def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
-    """Return the value of ``field`` (H, W) at a point by bilinear interpolation."""
+    """Return the value of ``field`` (H, W), 2x2 or larger, at a point by bilinear interpolation."""
     height, width = field.shape
-    x = min(max(x, 0.0), width - 1.001)
-    y = min(max(y, 0.0), height - 1.001)
+    # In this order nan becomes 0, which is an index.
+    x = min(max(0.0, x), width - 1.001)
+    y = min(max(0.0, y), height - 1.001)
     u, v = int(x), int(y)
     a, b = x - u, y - v
     upper = field[v, u] * (1.0 - a) + field[v, u + 1] * a

@@ -98,7 +98,8 @@ def new_workspace(patches: int, rows: int) -> Workspace:
 @inlined_kernel
 def _snap(pixel: float) -> float:
     """Return the nearest point of the 1/256 px grid, within 16000 px."""
-    near = min(max(pixel, -FARTHEST_PX), FARTHEST_PX)
+    # In this order nan becomes the limit, so that rows of a patch never stay unwritten.
+    near = min(max(-FARTHEST_PX, pixel), FARTHEST_PX)
     snapped: float = np.floor(near * SUBPIXELS + 0.5) / SUBPIXELS
     return snapped
 

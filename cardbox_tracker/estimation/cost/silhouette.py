@@ -21,6 +21,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette, TermObservation
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.given_arrays import image_from, silhouette_from
 
 
 class SilhouetteObservation(TermObservation):
@@ -53,14 +54,13 @@ class SilhouetteTerm(ABC):
             image: (H, W) grey or (H, W, 3) bgr of the same time, or None.
 
         Raises:
-            ValueError: the size of ``silhouette`` or ``image`` is not the camera's.
+            ValueError: the size of ``silhouette`` or ``image`` is not the camera's, or its type or
+                values are impossible.
         """
-        for name, pixels in (("silhouette", silhouette), ("image", image)):
-            size = (self.camera.height, self.camera.width)
-            if pixels is not None and (
-                pixels.shape[:2] != size or pixels.ndim > (2 if name == "silhouette" else 3)
-            ):
-                raise ValueError(f"{name} has shape {pixels.shape}; the camera's is {size}")
+        size = self.camera.height, self.camera.width
+        silhouette = silhouette_from(silhouette, size=size)
+        if image is not None:
+            image = image_from(image, size=size)
         upper = np.ascontiguousarray(silhouette[: self.rows])
         return Frame(silhouette, self.rows, cv2.countNonZero(upper), image)
 

@@ -36,6 +36,7 @@ from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums, leave_out, median_column
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
 SIDES = tuple(ARMS)
@@ -88,6 +89,7 @@ class WholeBodyCost:
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
         config, camera = self._config, self._camera
+        check_array("silhouette", silhouette, (camera.height, camera.width))
         hip = self.hips(state, camera)
         depth_m = max(float(hip[2]), 1e-3)
         column, row = camera.fx * hip[0] / depth_m + camera.cx, camera.fy * hip[1] / depth_m

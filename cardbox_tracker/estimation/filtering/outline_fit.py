@@ -173,10 +173,11 @@ def signed_distances(
 
     Returns:
         The first column and row of the window around the foreground above ``end_row``, and the
-        distances there, px; empty without foreground.
+        distances there, px; empty without foreground, or with a single row above ``end_row``.
     """
     rows = silhouette[: int(np.clip(end_row + _MARGIN_PX, 0, len(silhouette)))]
-    if not rows.size:
+    # The interpolation between pixels needs two rows.
+    if len(rows) < 2:
         return 0, 0, np.zeros((0, 0), np.float32)
     left, top, width, height = cv2.boundingRect(rows)
     left, right = max(left - _MARGIN_PX, 0), left + width + _MARGIN_PX

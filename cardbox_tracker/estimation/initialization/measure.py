@@ -65,6 +65,7 @@ from cardbox_tracker.estimation.initialization.shoulders import GIRDLE_RISE
 from cardbox_tracker.estimation.initialization.skeleton import measure_skeleton
 from cardbox_tracker.estimation.initialization.stature import SHOULDER_TO_HIP, stature_m
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.given_arrays import image_from, silhouette_from
 
 STEPS = (("O1", "front"), ("O2", "side"), ("O3", "arms"))
 """Subset of the sizes and its reference, in the order of the paper."""
@@ -100,7 +101,8 @@ def initialize_body(
     """Measure a person and learn the person's colours.
 
     Args:
-        references: silhouettes (H, W), 0 or 255, of ``front``, ``side`` and ``arms``.
+        references: silhouettes (H, W) of ``front``, ``side`` and ``arms``, or masks of any numeric
+            type, see :func:`~cardbox_tracker.vision.given_arrays.silhouette_from`.
         camera: working camera of the silhouettes' size.
         config: settings; None for the defaults.
         progress: called with the finished fraction.
@@ -110,9 +112,21 @@ def initialize_body(
     Raises:
         InitializationError: the references are unusable, show other postures, or the model does
             not fit them; the text names the reference and the remedy.
+        ValueError: a silhouette or an image has another size than the camera, or its type or values
+            are impossible.
     """
     config = config or InitializationConfig()
+    references = {
+        name: silhouette_from(references[name], f"reference '{name}'")
+        for name in REFERENCE_NAMES
+        if name in references
+    }
     check_references(references)
+    silhouette_from(references["front"], "reference 'front'", (camera.height, camera.width))
+    images = images and {
+        name: [image_from(image, f"image of the reference '{name}'") for image in images[name]]
+        for name in images
+    }
     camera = camera.with_pitch(config.camera_pitch_rad)
     references = {name: filled(references[name]) for name in REFERENCE_NAMES}
     if config.check_postures:

@@ -7,6 +7,7 @@ too: rclpy checks every byte of any other type.
 from __future__ import annotations
 
 import array
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,18 @@ from cardbox_tracker.vision.encodings import (
     decode_compressed,
     image_parts,
 )
+from cardbox_tracker.vision.given_arrays import silhouette_from
 
 ImageArray = NDArray[np.uint8]
 
 # The parameters of the background node have the same limit.
 _MOST_WORKING_PIXELS = 4096 * 4096
+
+# Encodings of masks, and the types of their pixels.
+_MASKS = MappingProxyType(
+    {"mono8": "u1", "8UC1": "u1", "8SC1": "i1", "mono16": "u2", "16UC1": "u2", "16SC1": "i2"}
+    | {"32SC1": "i4", "32FC1": "f4", "64FC1": "f8"}
+)
 
 
 def stamp_ns(stamp: Time) -> int:
@@ -77,24 +85,33 @@ def image_behind(silhouette: ImageArray, message: Image | None) -> ImageArray | 
 
 
 def silhouette_of(message: Image) -> ImageArray:
-    """Return the silhouette (H, W), 0 or 255; it is a view of the data if rows have no padding.
+    """Return the silhouette (H, W), 0 or 255, of a mask with one number for each pixel.
+
+    :func:`~cardbox_tracker.vision.given_arrays.silhouette_from` says which pixels are the person.
 
     Raises:
-        EncodingError: the encoding is not mono8, or the bytes do not match the size.
+        EncodingError: the encoding is not that of a mask, the bytes do not match the size, or the
+            values are impossible.
     """
-    if message.encoding not in ("mono8", "8UC1"):
+    if message.encoding not in _MASKS:
         raise EncodingError(
             f"the silhouette has encoding {quoted(message.encoding)}; expected mono8 with 0 for "
             "the background and 255 for the person, as the background node publishes it"
         )
+    kind = np.dtype(_MASKS[message.encoding]).newbyteorder(">" if message.is_bigendian else "<")
     data = np.frombuffer(message.data, dtype=np.uint8)
     height, width, step = message.height, message.width, message.step
-    if width == 0 or height == 0 or step < width or data.size < step * height:
+    row_bytes = width * kind.itemsize
+    if width == 0 or height == 0 or step < row_bytes or data.size < step * height:
         raise EncodingError(
             f"the silhouette claims {width}x{height} with {step} bytes a row but has {data.size} "
-            "bytes; expected step x height bytes, and a step of at least the width"
+            f"bytes; expected step x height bytes, and a step of at least {row_bytes}"
         )
-    return data[: step * height].reshape(height, step)[:, :width]
+    rows = data[: step * height].reshape(height, step)[:, :row_bytes]
+    try:
+        return silhouette_from(np.ascontiguousarray(rows).view(kind), "the silhouette")
+    except ValueError as error:
+        raise EncodingError(str(error)) from None
 
 
 def image_message(header: Header, image: NDArray[Any], encoding: str = "") -> Image:

@@ -359,7 +359,7 @@ def test_read_only_and_strided_silhouettes_are_taken(term: SilhouetteTerm) -> No
     assert term.look(wide[:, ::2]).postures(np.zeros((1, 12))).tolist() == [0]
 
 
-@pytest.mark.parametrize("shape", [(64, 48), (48, 63), (47, 64), (48, 64, 1)])
+@pytest.mark.parametrize("shape", [(64, 48), (48, 63), (47, 64), (48, 64, 2)])
 def test_a_silhouette_of_another_size_is_refused(
     term: SilhouetteTerm, shape: tuple[int, ...]
 ) -> None:

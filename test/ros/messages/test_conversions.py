@@ -87,21 +87,21 @@ def test_a_depth_camera_is_one_or_none(value: float) -> None:
     assert conversions.depth_camera_of(CameraInfo(p=info().p)) is None
 
 
-def test_silhouette_goes_and_comes_back_without_a_copy() -> None:
+def test_silhouette_goes_and_comes_back() -> None:
     silhouette = np.zeros((240, 320), np.uint8)
     silhouette[50:200, 100:150] = 255
     message = conversions.image_message(HEADER, silhouette, "mono8")
     assert isinstance(message.data, array.array) and message.step == 320
     received = conversions.silhouette_of(message)
     np.testing.assert_array_equal(received, silhouette)
-    assert np.shares_memory(received, np.frombuffer(message.data, np.uint8))
 
 
 def test_padded_rows_are_read() -> None:
     message = Image(height=2, width=3, step=4, encoding="mono8", data=bytes(range(8)))
-    expected = [[0, 1, 2], [4, 5, 6]]
+    np.testing.assert_array_equal(conversions.image_of(message), [[0, 1, 2], [4, 5, 6]])
+    message.data = bytes([0, 1, 1, 9, 1, 0, 1, 9])
+    expected = [[0, 255, 255], [255, 0, 255]]
     np.testing.assert_array_equal(conversions.silhouette_of(message), expected)
-    np.testing.assert_array_equal(conversions.image_of(message), expected)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,96 @@
+"""A silhouette of another node is tracked whatever its encoding, or refused; the tracker stays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time  # noqa: E402
+from sensor_msgs.msg import Image  # noqa: E402
+from std_msgs.msg import Header, String  # noqa: E402
+
+from cardbox_tracker.body.cardbox import cardbox_patches  # noqa: E402
+from cardbox_tracker.body.model import BodyModel  # noqa: E402
+from cardbox_tracker.body.model_file import dumps_body_model  # noqa: E402
+from cardbox_tracker.body.posture import reference_posture  # noqa: E402
+from cardbox_tracker.ros.messages.conversions import camera_info_message  # noqa: E402
+from cardbox_tracker.ros.nodes.initializer_node import InitializerNode  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+from cardbox_tracker.vision.rasterisation import render  # noqa: E402
+
+CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
+BODY = BodyModel()
+PERSON = render(cardbox_patches(BODY, reference_posture("front")), CAMERA) > 0
+
+
+def header(number: int) -> Header:
+    return Header(frame_id="eye", stamp=Time(sec=10 + number))
+
+
+def message(number: int, pixels: np.ndarray, encoding: str) -> Image:
+    """The pixels as they are, which ``image_message`` would not send."""
+    height, width = pixels.shape[:2]
+    step, data = pixels.nbytes // height, pixels.tobytes()
+    is_big = pixels.dtype.byteorder == ">"
+    return Image(
+        header=header(number),
+        height=height,
+        width=width,
+        step=step,
+        encoding=encoding,
+        is_bigendian=int(is_big),
+        data=data,
+    )
+
+
+MASKS = (
+    (PERSON.astype(np.uint8), "mono8"),
+    (PERSON * np.uint8(255), "8UC1"),
+    (np.where(PERSON, 200, 100).astype(np.uint8), "mono8"),
+    (PERSON.astype(np.int8), "8SC1"),
+    (PERSON.astype("<u2"), "mono16"),
+    (PERSON.astype(">u2") * 255, "16UC1"),
+    (PERSON.astype("<i4"), "32SC1"),
+    (np.where(PERSON, 0.9, 0.1).astype("<f4"), "32FC1"),
+    (np.where(PERSON, 255.0, 0.0), "64FC1"),
+)
+WRONG = (
+    (np.where(PERSON, np.nan, 0).astype("<f4"), "32FC1", "nan"),
+    (PERSON.astype("<u2") * 65535, "mono16", "to 65535; expected"),
+    (-PERSON.astype(np.int8), "8SC1", "from -1"),
+    (np.zeros((72, 96, 3), np.uint8), "bgr8", "expected mono8"),
+    (PERSON[:40].astype(np.uint8), "mono8", "expected the same size"),
+)
+
+
+def test_the_tracker_tracks_any_mask_and_stays_after_what_is_none(bus: Any) -> None:
+    bus.start(TrackerNode, use_image=False)
+    bus.send("/body_model", String(data=dumps_body_model(BODY)))
+    bus.send("/silhouette/camera_info", camera_info_message(header(0), CAMERA))
+    number = 0
+    for pixels, encoding in MASKS:
+        number += 1
+        bus.send("/silhouette", message(number, pixels, encoding))
+        states = bus.texts("/tracking_state")
+        assert len(states) == number and states[-1] == "tracking", encoding
+    for pixels, encoding, words in WRONG:
+        number += 1
+        bus.send("/silhouette", message(number, pixels, encoding))
+        status = bus.tick()
+        assert words in status.message and "unexpected" not in status.message
+    assert len(bus.texts("/tracking_state")) == len(MASKS)
+    bus.send("/silhouette", message(number + 1, PERSON.astype(np.uint8), "mono8"))
+    assert bus.texts("/tracking_state")[len(MASKS) :] == ["tracking"]
+
+
+def test_the_initializer_says_what_is_wrong_with_a_mask(bus: Any) -> None:
+    bus.start(InitializerNode)
+    for number, (pixels, encoding, words) in enumerate(WRONG[:4]):
+        bus.send("/silhouette", message(number, pixels, encoding))
+        status = bus.tick()
+        assert words in status.message and "unexpected" not in status.message
