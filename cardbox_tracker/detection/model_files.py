@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import UnreadableFileError, atomic_path, read_regular
 
 REQUIREMENT = "mediapipe==0.10.21"
 """The one release whose wheel ships its models; Apache-2.0."""
@@ -70,9 +70,11 @@ def installed_models() -> ModelFiles:
     paths = [model_folder() / name for name in FILES]
     for path, file in zip(paths, FILES.values(), strict=True):
         try:
-            content = path.read_bytes() if path.stat().st_size <= _MOST_BYTES else b""
-        except OSError:
-            raise CardboxError(f"the detector needs {path}, which is missing; {HINT}") from None
+            content = read_regular(path, _MOST_BYTES)
+        except UnreadableFileError as error:
+            raise CardboxError(
+                f"the detector needs {path}, which cannot be read: {error}; {HINT}"
+            ) from None
         if hashlib.sha256(content).hexdigest() != file.sha256:
             raise CardboxError(f"{path} is damaged or another network; {HINT} again")
     return ModelFiles(*paths)

@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, EncodingError
+from cardbox_tracker.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import RecordedImage
-from cardbox_tracker.vision.encodings import decode_compressed
+from cardbox_tracker.vision.encodings import MOST_PIXELS, decode_compressed
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
 """Endings of the images, in small or capital letters."""
 FPS = 30.0
 """Images a second unless another rate is given."""
+# More than the largest image needs without compression.
+_MOST_BYTES = 4 * MOST_PIXELS
 
 
 def image_files(folder: Path) -> list[Path]:
@@ -72,10 +75,8 @@ class ImageFolder(Film):
 def _image(file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
     """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""
     try:
-        image = decode_compressed(file.read_bytes())
-    except OSError as error:
-        raise EncodingError(f"{file.name}: {error.strerror}") from None
-    except EncodingError as error:
+        image = decode_compressed(read_regular(file, _MOST_BYTES))
+    except (EncodingError, UnreadableFileError) as error:
         raise EncodingError(f"{file.name}: {error}") from None
     found = image.shape[1], image.shape[0]
     if size is not None and found != size:

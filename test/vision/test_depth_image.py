@@ -12,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.errors import EncodingError
-from cardbox_tracker.vision.depth_image import depth_from_image, median_depth, unpack_depth
+from cardbox_tracker.vision.depth_image import (
+    decode_depth,
+    depth_from_image,
+    median_depth,
+    unpack_depth,
+)
 
 
 def packed(pixels: np.ndarray, a: float = 0.0, b: float = 0.0) -> bytes:
@@ -59,6 +64,32 @@ def test_what_is_no_depth_is_refused(encoding: str, pixels: np.ndarray | None) -
     data = packed(pixels) if pixels is not None else bytes(40)
     with pytest.raises(EncodingError, match="expected '16UC1"):
         unpack_depth(data, encoding)
+
+
+@pytest.mark.promise("An image that is too large is refused before it is decoded")
+@pytest.mark.parametrize(("width", "height"), [(20_000, 15_000), (60_000, 60_000), (2**31, 1)])
+@pytest.mark.parametrize("kind", ["16UC1", "32FC1"])
+def test_a_depth_image_too_large_is_refused_before_memory_is_taken(
+    kind: str, width: int, height: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = bytearray(packed(np.full((4, 4), 7, np.uint16)))
+    # The size follows the message's header, the magic number and the name of the first chunk.
+    data[12 + 16 : 12 + 24] = struct.pack(">II", width, height)
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
+        unpack_depth(bytes(data), f"{kind}; compressedDepth png")
+    with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
+        decode_depth(b"", height, width, 4 * width, kind, is_bigendian=False)
+
+
+def test_what_opencv_cannot_decode_is_refused_in_our_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise cv2.error("(-215:Assertion failed) pixels <= CV_IO_MAX_IMAGE_PIXELS")
+
+    data = packed(np.full((4, 4), 7, np.uint16))
+    monkeypatch.setattr(cv2, "imdecode", fail)
+    with pytest.raises(EncodingError, match="expected '16UC1"):
+        unpack_depth(data, "16UC1; compressedDepth png")
 
 
 @given(st.binary(max_size=60), st.booleans())
