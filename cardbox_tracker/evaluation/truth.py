@@ -136,7 +136,8 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
         ) from None
     except (ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
         raise CardboxError(
-            f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of a session"
+            f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of "
+            "a session"
         ) from None
 
 

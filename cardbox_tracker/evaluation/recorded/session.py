@@ -182,7 +182,8 @@ def _mediapipe(path: Path, cameras: Sequence[str]) -> tuple[dict[str, float], fl
         return {n: float(v) for n, v in motions if _is_number(v)}, float(data["ms_median"])
     except (UnreadableFileError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise CardboxError(
-            f"{path} is not a file of MediaPipe's figures: {cut(repr(error))}; remove it, or make it again"
+            f"{path} is not a file of MediaPipe's figures: {cut(repr(error))}; remove it, or make "
+            "it again"
         ) from None
 
 
