@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.errors import EncodingError, quoted
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.encodings import MOST_PIXELS, image_parts
 from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
@@ -22,6 +22,8 @@ from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 DepthImage = NDArray[np.float32]
 
 _LONGEST_PX = 32_766
+# No camera that sees a person in metres measures this in half of its pixels.
+_FARTHEST_M = 100.0
 # Header before the PNG of a compressedDepth message: the number of the format and the two
 # parameters of the inverse depths in which 32FC1 is packed.
 _PACKED = struct.Struct("<iff")
@@ -94,15 +96,28 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
 def depth_from_image(message: Any) -> DepthImage:
     """Return the depth (H, W), metres, in a message of rclpy or of a recording.
 
+    If half of the known depths are beyond 100 m, their unit is not the metre.
+
     Args:
         message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
 
     Raises:
-        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`.
+        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`; or the depths are not in
+            metres.
     """
     if hasattr(message, "format"):
-        return unpack_depth(message.data, message.format)
-    return decode_depth(*image_parts(message))
+        depth_m, encoding = unpack_depth(message.data, message.format), message.format
+    else:
+        depth_m, encoding = decode_depth(*image_parts(message)), message.encoding
+    beyond = np.count_nonzero(depth_m > _FARTHEST_M)
+    if beyond and 2 * beyond >= np.count_nonzero(depth_m):
+        middle_m = float(np.median(depth_m[depth_m > 0.0]))
+        raise EncodingError(
+            f"half of the depths are {middle_m:.3g} m or more, so their unit cannot be that of "
+            f"{quoted(encoding)}, and they are not used; expected metres in 32FC1 and "
+            "millimetres in 16UC1: divide 32FC1 by 1000, or send the camera's 16UC1"
+        )
+    return depth_m
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:

@@ -99,6 +99,37 @@ def test_broken_bytes_are_refused(data: bytes, is_begun: bool) -> None:
         unpack_depth(begun + data, "16UC1; compressedDepth png")
 
 
+@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+@pytest.mark.parametrize("packing", ["32FC1", "32FC1; compressedDepth png"])
+def test_millimetres_for_metres_are_told(packing: str) -> None:
+    depth = np.full((4, 6), 2300.0, np.float32)
+    depth[0], depth[1, 0] = 0.0, np.nan
+    if ";" in packing:
+        # n = a / z + b with a = 2,300,000 is 1,000.
+        pixels = np.where(depth > 0, 1000, 0).astype(np.uint16)
+        message = SimpleNamespace(data=packed(pixels, 2.3e6), format=packing)
+    else:
+        message = raw_depth(depth)
+    with pytest.raises(EncodingError, match=r"2\.3e\+03 m.*divide 32FC1 by 1000"):
+        depth_from_image(message)
+
+
+def raw_depth(depth: np.ndarray) -> SimpleNamespace:
+    height, width = depth.shape
+    size = {"height": height, "width": width, "step": 4 * width}
+    data = depth.astype(np.float32).tobytes()
+    return SimpleNamespace(data=data, encoding="32FC1", is_bigendian=0, **size)
+
+
+def test_a_few_far_values_are_no_other_unit() -> None:
+    """Stereo measures almost the same place in both images as very far away."""
+    depth = np.full((4, 6), 2.0, np.float32)
+    depth[0], depth[1] = 5000.0, np.inf
+    assert np.array_equal(depth_from_image(raw_depth(depth)), np.where(depth < 1e9, depth, 0.0))
+    for nothing in (0.0, np.nan, np.inf, -1.0, -np.inf):
+        assert not depth_from_image(raw_depth(np.full((4, 6), nothing))).any()
+
+
 def test_the_median_is_of_what_is_known() -> None:
     depths = [np.array([[1.0, 0.0, 0.0]]), np.array([[3.0, 2.0, np.nan]]), np.array([[4.0, 0, 0]])]
     found = median_depth([depth.astype(np.float32) for depth in depths])

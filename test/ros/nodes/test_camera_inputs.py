@@ -201,6 +201,19 @@ def test_packed_depth_is_read_too() -> None:
     assert "/depth/camera_info" in watching.node.callbacks
 
 
+@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+def test_depth_in_millimetres_is_told_and_not_used(watching: Watching) -> None:
+    for number, depth_m in enumerate((2.0, 2000.0, 2.0), 1):
+        watching.show_depth(number * S, np.full((48, 64), depth_m))
+        for name in ("left", "right"):
+            watching.show(name, number * S)
+        texts = [text for text in watching.source.warnings().values() if "/depth" in text]
+        is_used = watching.views[-1].observations[0].depth_m is not None
+        assert is_used == (depth_m == 2.0) == (not texts)
+        if texts:
+            assert "2e+03 m" in texts[0] and "divide 32FC1 by 1000" in texts[0]
+
+
 def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:
     # The depth camera has twice the size, and its principal point is 10 px further to the right.
     own = Camera(128, 96, 120.0, 120.0, 73.5, 47.5)
