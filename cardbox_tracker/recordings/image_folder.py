@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -52,15 +51,19 @@ class ImageFolder(Film):
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
         self._files = image_files(self.path)
+        reason = ""
         for file in self._files:
-            with suppress(EncodingError):
+            try:
                 height, width = _image(file).shape[:2]
-                self._set_size(width, height)
-                break
+            except EncodingError as error:
+                reason = reason or f" ({error})"
+                continue
+            self._set_size(width, height)
+            break
         else:
             raise BagError(
-                f"{self.path} has no JPEG or PNG image that can be decoded; give a folder of the "
-                "images of one camera"
+                f"{self.path} has no JPEG or PNG image that can be decoded{reason}; give a folder "
+                "of the images of one camera"
             )
         self.duration_s = (len(self._files) - 1) / (self._given.fps or FPS)
         return self
