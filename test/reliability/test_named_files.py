@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.detection.model_files import install_models
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.settings_file import read_settings
@@ -53,6 +54,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "robot": load_robot,
     "points": lambda path: PointTable(path).read(None, CAMERA, SIZE),
     "truth": load_ground_truth,
+    "wheel": install_models,
     "video": read_video,
     "image": read_image,
 }
