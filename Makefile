@@ -7,6 +7,7 @@
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make people      track the films of real people in ../shared/data; writes docs/evaluation/real-people.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
+# make reliability-quick   the same in ten minutes, without running nodes; writes nothing
 # make bounds  tests of compiled code with bounds checks; the first run compiles for minutes
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
@@ -143,6 +144,10 @@ EXAMPLES ?= 100000
 .PHONY: reliability
 reliability: $(VENV)/package
 	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
+
+.PHONY: reliability-quick
+reliability-quick: $(VENV)/package
+	$(BIN)/python -m tools.reliability --quick
 
 # Code with bounds checks is slow, so it has a cache of its own. Only some: make bounds TESTS=test/vision
 TESTS ?= test/reliability test/vision test/body test/estimation

@@ -5,6 +5,7 @@ Both may be packed by the plugin ``compressedDepth`` of image_transport.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Sequence
 from typing import Any
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.encodings import image_parts
+from cardbox_tracker.vision.encodings import MOST_PIXELS, image_parts
 from cardbox_tracker.vision.given_arrays import depth_from
+from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 
 DepthImage = NDArray[np.float32]
 
@@ -34,12 +36,14 @@ def decode_depth(
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
     Raises:
-        EncodingError: the encoding is not that of a depth image, or the bytes do not fit it.
+        EncodingError: the encoding is not that of a depth image, the bytes do not fit it, or it is
+            too large.
     """
     if encoding not in _KINDS:
         raise EncodingError(
             f"encoding '{encoding}' is no depth; expected 16UC1 (millimetres) or 32FC1 (metres)"
         )
+    check_pixels(width, height, MOST_PIXELS)
     code, metres = _KINDS[encoding]
     kind = np.dtype(f"{'>' if is_bigendian else '<'}{code}")
     row_bytes = width * kind.itemsize
@@ -64,14 +68,16 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
         encoding: the ``format`` of the message, such as ``16UC1; compressedDepth png``.
 
     Raises:
-        EncodingError: the message is no depth image or not packed as PNG.
+        EncodingError: the message is no depth image, not packed as PNG, or too large.
     """
     kind, _, how = encoding.partition(";")
     raw = bytes(data)
     pixels = None
     if "compressedDepth" in how and raw[_PACKED.size :].startswith(_PNG):
+        check_pixels(*compressed_size(raw[_PACKED.size :]), MOST_PIXELS)
         packed = np.frombuffer(raw, np.uint8, offset=_PACKED.size)
-        pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
+        with contextlib.suppress(cv2.error):
+            pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
     if kind not in _KINDS or pixels is None or pixels.dtype != np.uint16 or pixels.ndim != 2:
         raise EncodingError(
             f"a compressed image of the format '{encoding}' is no depth that can be read; expected "
@@ -88,6 +94,8 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
 
 def depth_from_image(message: Any) -> DepthImage:
     """Return the depth (H, W), metres, in a message of rclpy or of a recording.
+
+    If half of the known depths are beyond 100 m, their unit is not the metre.
 
     Args:
         message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.

@@ -115,8 +115,8 @@ def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None
         (H, W), C-contiguous, metres; 0 where the depth is unknown.
 
     Raises:
-        ValueError: the array has another shape or type, or looks like millimetres, since all known
-            depths are above 100.
+        ValueError: the array has another shape or type, or looks like millimetres, since half of
+            the known depths are above 100.
     """
     depth = _array(given, name)
     if depth.ndim == 3 and depth.shape[2] == 1:
@@ -135,10 +135,10 @@ def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None
         depth = depth.astype(np.float32, order="C")
     depth = np.where((depth > 0) & (depth < np.inf), depth, np.float32(0))
     far = depth > _FARTHEST_M
-    if far.any() and np.array_equal(far, depth > 0):
-        nearest = depth[far].min()
+    if far.any() and 2 * np.count_nonzero(far) >= np.count_nonzero(depth):
+        middle = float(np.median(depth[depth > 0]))
         raise ValueError(
-            f"{name} is {nearest:g} or more everywhere, which looks like millimetres; expected "
+            f"half of {name} is {middle:.3g} or more, which looks like millimetres; expected "
             "metres: divide them by 1000"
         )
     return depth
