@@ -131,10 +131,10 @@ def test_what_is_no_image_is_refused_in_words(given: Any, words: str) -> None:
 
 
 def test_unknown_depths_are_zero() -> None:
-    given = np.array([[np.nan, np.inf, -np.inf, -1.0], [0.0, 2.5, 150.0, 1e300]])
+    given = np.array([[np.nan, np.inf, -np.inf, -1.0], [0.0, 2.5, 99.0, 1e300]])
     for array in (given, given[..., None], np.asfortranarray(given)):
         depth_m = depth_from(array, size=(2, 4))
-        np.testing.assert_array_equal(depth_m, [[0, 0, 0, 0], [0, 2.5, 150, 0]])
+        np.testing.assert_array_equal(depth_m, [[0, 0, 0, 0], [0, 2.5, 99, 0]])
         assert depth_m.dtype == np.float32 and depth_m.flags.c_contiguous
     assert not depth_from(np.full((2, 4), np.nan)).any()
 
@@ -143,12 +143,12 @@ def test_unknown_depths_are_zero() -> None:
     ("given", "words"),
     [
         (np.full((2, 4), 2500, np.uint16), "uint16, .* millimetres; .* divide them by 1000"),
-        (np.array([[0, 0, np.nan, 2500.0], [0, 0, 101, 101]]), "is 101 or more .*millimetres"),
+        (np.array([[0, 0, np.nan, 2500.0], [0, 0, 101, 101]]), "is 101 or more, .*millimetres"),
         (np.full((2, 4), True), "bool"),
         (np.zeros((4, 2)), r"shape \(4, 2\); the camera's is \(2, 4\)"),
         (np.zeros((2, 4, 2)), r"expected \(2, 4\)"),
     ],
 )
 def test_what_is_no_depth_is_refused_in_words(given: Any, words: str) -> None:
-    with pytest.raises(ValueError, match=f"^depth_m .*{words}"):
+    with pytest.raises(ValueError, match=f"depth_m .*{words}"):
         depth_from(given, size=(2, 4))
