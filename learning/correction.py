@@ -49,13 +49,15 @@ from learning.odds import calibrated
 from learning.samples import Samples, grouped, load_all, split
 
 FloatArray = NDArray[np.float64]
+Layer = tuple[FloatArray, FloatArray]
 
 # Rough standard deviations of the displacements, m: shoulders' middle, elbow, hand; x, y, z of
 # each. Log-odds have none.
 UNIT = np.ones(N_ANSWERS)
 UNIT[DISPLACEMENTS] = np.repeat([0.05, 0.05, 0.10], 3)
-# Numbers of nodes: the first layer, the hidden state, the last layer but one.
-INPUTS, NODES, LEFT = 160, 128, 96
+# Numbers of nodes: the first layer, the hidden state, and the last layer but one of displacements
+# and of log-odds.
+INPUTS, NODES, LEFT, OF_ODDS = 160, 128, 96, 48
 NETWORKS, EPOCHS = 3, 9
 # Images of a sequence, and sequences of a batch.
 LENGTH, BATCH = 120, 32
@@ -75,8 +77,6 @@ LOST_M = 0.35
 CALIBRATING = 10
 # A bone shorter than this has no reliable direction, m.
 LEAST_BONE_M = 0.01
-# Weight of the log loss of the log-odds, m.
-SURE_M = 0.05
 # Larger errors are clipped, as no correction mends a wrong posture; m and m/s^2.
 MOST_M, MOST_M_S2 = 2.0, 60.0
 
@@ -152,7 +152,7 @@ def _sequences(
 def _learned(
     sequences: list[NDArray[np.float32]], seed: int, epochs: int
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Train the modules (input_layer, recurrent, first, last) and return their layers."""
+    """Train the modules and return the layers of a :class:`RecurrentNetwork`."""
     import torch
     from torch import nn
 
@@ -165,7 +165,9 @@ def _learned(
             nn.Linear(features.shape[3], INPUTS),
             nn.GRU(INPUTS, NODES, batch_first=True),
             nn.Linear(NODES + INPUTS, LEFT),
-            nn.Linear(LEFT, N_ANSWERS),
+            nn.Linear(LEFT, LOG_ODDS.start),
+            nn.Linear(NODES + INPUTS, OF_ODDS),
+            nn.Linear(OF_ODDS, N_ANSWERS - LOG_ODDS.start),
         ]
     )
     batches = len(features) // BATCH
@@ -183,7 +185,7 @@ def _learned(
                 for points in (_moved(found[chosen], answers), found[chosen])
             )
             loss = _loss(off, before, followed[chosen], period[chosen])
-            loss = loss + SURE_M * _log_loss(log_odds, off, known[chosen])
+            loss = loss + _log_loss(log_odds, off, known[chosen])
             optimizer.zero_grad()
             loss.backward()
             nn.utils.clip_grad_norm_(modules.parameters(), 1.0)
@@ -196,16 +198,20 @@ def _answers(modules: Any, features: Any) -> tuple[Any, Any]:
     """Return displacements (B, L, 2, 9), m, and log-odds (B, L, 2, 3) for features (B, L, 2, F)."""
     import torch
 
-    input_layer, recurrent, first, last = modules
+    input_layer, recurrent, first, last, first_of_odds, last_of_odds = modules
     inputs = torch.relu(input_layer(features))
     batch, length = features.shape[:2]
     # Each arm is a sequence of its own.
     arms = inputs.permute(0, 2, 1, 3).reshape(2 * batch, length, -1)
     hidden = recurrent(arms)[0]
-    scaled = last(torch.relu(first(torch.cat([hidden, arms], dim=2))))
-    scaled = scaled.reshape(batch, 2, length, -1).permute(0, 2, 1, 3)
-    answers = scaled * torch.tensor(UNIT, dtype=torch.float32)
-    return answers[..., DISPLACEMENTS], answers[..., LOG_ODDS]
+    both = torch.cat([hidden, arms], dim=2)
+    scaled = last(torch.relu(first(both)))
+    # Log-odds must not change what the displacements are made from.
+    log_odds = last_of_odds(torch.relu(first_of_odds(both.detach())))
+    displacements, log_odds = (
+        one.reshape(batch, 2, length, -1).permute(0, 2, 1, 3) for one in (scaled, log_odds)
+    )
+    return displacements * torch.tensor(UNIT[DISPLACEMENTS], dtype=torch.float32), log_odds
 
 
 def _moved(found: Any, answers: Any) -> Any:
@@ -287,16 +293,30 @@ def _length(vectors: Any, least: float) -> Any:
 
 def _layers(modules: Any) -> list[tuple[FloatArray, FloatArray]]:
     """Return weights and biases of the five layers as :class:`RecurrentNetwork` has them."""
-    input_layer, gru, first, last = modules
+    input_layer, gru, *output_layers = modules
     pairs = [
         (input_layer.weight, input_layer.bias),
         (gru.weight_ih_l0, gru.bias_ih_l0),
         (gru.weight_hh_l0, gru.bias_hh_l0),
-        (first.weight, first.bias),
-        (last.weight, last.bias),
+        *((layer.weight, layer.bias) for layer in output_layers),
     ]
     # PyTorch has the same order of gates: reset, update, candidate.
-    return [networks.numbers_of(*pair) for pair in pairs]
+    *common, first, last, first_of_odds, last_of_odds = (
+        networks.numbers_of(*pair) for pair in pairs
+    )
+    return [*common, _beside(first, first_of_odds), _apart(last, last_of_odds)]
+
+
+def _beside(one: Layer, other: Layer) -> Layer:
+    """Return the layer that has the outputs of two layers with the same inputs."""
+    return np.hstack([one[0], other[0]]), np.hstack([one[1], other[1]])
+
+
+def _apart(one: Layer, other: Layer) -> Layer:
+    """Return the layer that has inputs and outputs of two layers, without connections between."""
+    upper = np.hstack([one[0], np.zeros((len(one[0]), other[0].shape[1]))])
+    lower = np.hstack([np.zeros((len(other[0]), one[0].shape[1])), other[0]])
+    return np.vstack([upper, lower]), np.hstack([one[1], other[1]])
 
 
 def corrected(network: RecurrentNetwork, samples: Samples, doubt: float = DOUBT) -> FloatArray:
