@@ -37,15 +37,12 @@ KINDS: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]
     "overhead": ((-0.05, -0.15, 0.42), (0.25, 0.30, 0.69), (0.2, 1.0, -0.2)),
     "across": ((0.15, -0.50, -0.35), (0.45, -0.20, 0.15), (-0.2, 0.6, -0.8)),
 }
-# The same for exercises, in the frontal plane.
-EXERCISES: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
+# Places of everyday gestures that the others lack; the first four are in the frontal plane.
+GESTURES: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
     "low": ((-0.03, 0.12, -0.68), (0.06, 0.40, -0.45), (-0.1, 1.0, 0.3)),
     "level": ((-0.03, 0.40, -0.25), (0.06, 0.69, 0.25), (-0.1, 0.1, -1.0)),
     "high": ((-0.03, 0.10, 0.25), (0.06, 0.50, 0.66), (0.0, 1.0, -0.4)),
     "waving": ((-0.03, 0.20, 0.05), (0.10, 0.45, 0.45), (0.0, 0.8, -0.8)),
-}
-# Places of everyday gestures that the others lack.
-GESTURES: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
     "apart": ((0.25, -0.10, -0.25), (0.50, 0.15, 0.00), (-0.3, 0.7, -0.8)),
     "together": ((0.25, -0.24, -0.25), (0.50, -0.19, 0.00), (-0.3, 0.7, -0.8)),
     "folded": ((0.10, -0.40, -0.36), (0.20, -0.25, -0.20), (-0.1, 0.6, -1.0)),
@@ -126,7 +123,7 @@ def is_way_free(start: Arm, end: Arm) -> bool:
 
 def drawn(kind: str, start: Arm, rng: np.random.Generator) -> Arm:
     """Return a random arm of a kind that ``start`` can reach; ``start`` itself if none is found."""
-    low, high, pole = (KINDS | EXERCISES | GESTURES)[kind]
+    low, high, pole = (KINDS | GESTURES)[kind]
     for _ in range(TRIES):
         arm = reaching(rng.uniform(low, high), unit(pole) + POLE_SPREAD * rng.normal(size=3))
         if is_way_free(start, arm):
@@ -134,9 +131,7 @@ def drawn(kind: str, start: Arm, rng: np.random.Generator) -> Arm:
     return start
 
 
-def random_kind(rng: np.random.Generator, is_exercise: bool = False) -> str:
+def random_kind(rng: np.random.Generator) -> str:
     """Return the name of a kind of posture at random."""
-    if is_exercise:
-        return str(rng.choice(list(EXERCISES)))
     shares = np.array([SHARES.get(kind, 1.0) for kind in KINDS])
     return str(rng.choice(list(KINDS), p=shares / shares.sum()))

@@ -1,13 +1,13 @@
 """Collect motions from folders of motion capture into compact files, one per clip.
 
     python -m learning.motions.collect FOLDER... --output FOLDER [--scripted MINUTES]
-                                       [--exercises MINUTES] [--gestures MINUTES] [--seed 0]
+                                       [--gestures MINUTES] [--seed 0]
 
 The folders are searched for ``.bvh``, ``.amc`` (with its ``.asf``) and ``.txt`` files; see
 learning.motions.readers. Sources are named so that people can be left out: "cmu-13" is subject 13
-of the CMU database, "cmu_text-basketball" a kind of motion by people who are not named, "scripted",
-"exercise" and "gesture" contain no capture. Clips that the recorded sessions contain, and copies of
-one clip, are left out.
+of the CMU database, "cmu_text-basketball" a kind of motion by people who are not named, "scripted"
+and "gesture" contain no capture. Clips that the recorded sessions contain, and copies of one clip,
+are left out.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import argparse
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -141,7 +140,6 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("folders", nargs="*", type=Path)
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--scripted", type=float, default=0.0, metavar="MINUTES")
-    parser.add_argument("--exercises", type=float, default=0.0, metavar="MINUTES")
     parser.add_argument("--gestures", type=float, default=0.0, metavar="MINUTES")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args(words)
@@ -157,7 +155,6 @@ def main(words: Sequence[str] | None = None) -> None:
         keep(with_wrists(motion, rng) if has_stiff_wrists(motion) else motion)
     kinds: tuple[tuple[float, Callable[..., Motion]], ...] = (
         (args.scripted, scripted),
-        (args.exercises, partial(scripted, is_exercise=True)),
         (args.gestures, gestures),
     )
     for kind, (minutes, draw) in enumerate(kinds):

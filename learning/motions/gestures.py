@@ -25,7 +25,7 @@ class Gesture:
     """Places between which hands go to and fro.
 
     Args:
-        places: names of ``arms.KINDS``, ``arms.EXERCISES`` or ``arms.GESTURES``, in their order.
+        places: names of ``arms.KINDS`` or ``arms.GESTURES``, in their order.
         move_s: least and largest duration of the way from one place to the next.
         times: least and largest number of rounds.
         both: share of people who do it with both arms.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,30 +77,10 @@ def random_trunk(is_seated: bool, rng: np.random.Generator) -> Trunk:
     )
 
 
-def exercise_trunk(rng: np.random.Generator) -> Trunk:
-    """Return the trunk of a person who faces the camera: upright, leaning aside or bowing."""
-    lean = np.array([rng.uniform(-30, 30), 0.0, 0.0])
-    bow = np.array([0.0, rng.uniform(0, 45), 0.0])
-    upright = np.zeros(3)
-    bend = (upright, upright, upright, lean, bow)[rng.integers(5)]
-    return Trunk(
-        hips=0.3 * bend + rng.normal(0, 2, 3),
-        bend=0.7 * bend + rng.normal(0, 2, 3),
-        head=rng.normal(0, 5, 3),
-        collars=rng.uniform((-3, -4), (4, 4), (2, 2)),
-        wrists=0.1 * rng.uniform(-1, 1, (2, 3)) * MOST_DEG,
-        thighs=rng.normal((0, 4), (1, 1), (2, 2)),
-        knees=np.zeros(2),
-        place=rng.normal(0, 0.02, 2),
-    )
-
-
-def random_arms(
-    before: tuple[Arm, Arm], rng: np.random.Generator, is_exercise: bool = False
-) -> tuple[Arm, Arm]:
+def random_arms(before: tuple[Arm, Arm], rng: np.random.Generator) -> tuple[Arm, Arm]:
     """Return new arms: both of one kind, one of them, or each of its own kind."""
     choice = rng.random()
-    kinds = [arms.random_kind(rng, is_exercise), arms.random_kind(rng, is_exercise)]
+    kinds = [arms.random_kind(rng), arms.random_kind(rng)]
     if choice < BOTH_SHARE:
         kinds[1] = kinds[0]
     left, right = (arms.drawn(kind, arm, rng) for kind, arm in zip(kinds, before, strict=True))
@@ -109,30 +89,20 @@ def random_arms(
     return left, right
 
 
-def scripted(
-    name: str, duration_s: float, rng: np.random.Generator, is_exercise: bool = False
-) -> Motion:
-    """Return a random motion of some duration, s, at 30 frames a second.
-
-    In an exercise the person faces the camera, and the arms stay in the frontal plane.
-    """
-
-    def trunk() -> Trunk:
-        return exercise_trunk(rng) if is_exercise else random_trunk(is_seated, rng)
-
+def scripted(name: str, duration_s: float, rng: np.random.Generator) -> Motion:
+    """Return a random motion of some duration, s, at 30 frames a second."""
     is_seated = bool(rng.random() < SEATED_SHARE)
     hanging = arms.reaching(arms.HANGING, (-1.0, 0.3, 0.0))
-    postures: list[Posture] = [(trunk(), hanging, hanging)]
+    postures: list[Posture] = [(random_trunk(is_seated, rng), hanging, hanging)]
     times = [0.0]
     # Every posture comes twice: the time between is a hold.
     while times[-1] < duration_s:
         is_seated ^= bool(rng.random() < CHANGE_SHARE)
-        following = trunk(), *random_arms(postures[-1][1:], rng, is_exercise)
+        following = random_trunk(is_seated, rng), *random_arms(postures[-1][1:], rng)
         postures += [following, following]
         arrival = times[-1] + rng.uniform(*MOVE_S)
         times += [arrival, arrival + rng.choice([0.0, 1.0]) * rng.uniform(*HOLD_S)]
-    motion = timed(name, postures, times, duration_s)
-    return replace(motion, source="exercise") if is_exercise else motion
+    return timed(name, postures, times, duration_s)
 
 
 def timed(name: str, postures: list[Posture], times: list[float], duration_s: float) -> Motion:

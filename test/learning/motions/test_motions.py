@@ -225,15 +225,6 @@ def test_collecting_writes_one_file_for_a_clip(
     assert "cmu-91" in capsys.readouterr().out
 
 
-def test_arms_of_exercises_stay_in_the_frontal_plane() -> None:
-    motion = scripted("0", 20.0, np.random.default_rng(3), is_exercise=True)
-    assert motion.source == "exercise"
-    hands = hands_in_chest(motion)
-    # Forward of the shoulders, in lengths of the leg; ways between postures may leave the plane.
-    assert np.median(np.abs(hands[:, :, 0])) < 0.12
-    assert np.abs(motion.headings_rad()).max() < np.radians(25)
-
-
 def test_a_person_who_gestures_faces_the_camera_and_uses_one_arm_or_both() -> None:
     motions = [gestures(str(seed), 20.0, np.random.default_rng(seed)) for seed in range(20)]
     assert {motion.source for motion in motions} == {"gesture"}
