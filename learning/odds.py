@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.estimation.filtering.correction import DATA as NETWORK
 from cardbox_tracker.estimation.filtering.correction import (
     DISPLACEMENTS,
@@ -32,7 +31,7 @@ from cardbox_tracker.estimation.filtering.correction import (
     limited,
     moved,
 )
-from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, states_of
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, states_of
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
 from cardbox_tracker.evaluation.recorded.keypoint_states import compared
 from cardbox_tracker.evaluation.results import write_json
@@ -89,7 +88,7 @@ def figures_of(network: RecurrentNetwork, samples: Sequence[Samples]) -> dict[st
     off_m = np.concatenate([one for _, one in both])
     seen = np.zeros(off_m.shape[1], dtype=np.bool_)
     states = np.array([states_of(one, seen) for one in chances])
-    is_tracking = (states[:, HANDS] == KeypointState.TRACKED).all(axis=1)
+    is_tracking = np.array([are_sure(one[HANDS]) for one in chances])
     return {
         "frames": len(off_m),
         "states": {"tracking": int(is_tracking.sum())},

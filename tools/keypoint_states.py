@@ -38,7 +38,7 @@ agree. Intervals with fewer than 50 keypoints are left out.*
 
 ## The state of the whole
 
-`tracking` needs both hands to be `tracked`. The last two columns are shares of all images: those
+`tracking` has no `uncertain` or `lost` hand. The last two columns are shares of all images: those
 that are called `tracking` with a mean error beyond 30 cm, and with a wrong hand.
 
 | recordings | images | `tracking`, % | and mean beyond 30 cm, % | and hand wrong, % |

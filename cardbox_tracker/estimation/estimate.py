@@ -30,7 +30,8 @@ class Estimate:
             optical frame.
         keypoint_states: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by
             more than 30 cm); ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of
-            the images). The hands of ``tracking`` are ``tracked``. None if the filter has none.
+            the images). ``tracking`` has no ``uncertain`` or ``lost`` hand. None if the filter has
+            none.
         keypoint_chances: probability of each keypoint to be off by more than 30 cm, (6,), or None.
         cost_px: cost of the posture (equation (2)), px.
         iou: intersection over union of model and silhouette, above the hips.

@@ -153,11 +153,12 @@ def main(words: Sequence[str] | None = None) -> None:
 
     for motion in without_copies(captured(args.folders)):
         keep(with_wrists(motion, rng) if has_stiff_wrists(motion) else motion)
-    kinds: tuple[tuple[float, Callable[..., Motion]], ...] = (
-        (args.scripted, scripted),
-        (args.gestures, gestures),
+    # The first number is part of the seed, so that motions stay the same.
+    kinds: tuple[tuple[int, float, Callable[..., Motion]], ...] = (
+        (0, args.scripted, scripted),
+        (2, args.gestures, gestures),
     )
-    for kind, (minutes, draw) in enumerate(kinds):
+    for kind, minutes, draw in kinds:
         for number in range(round(60 * minutes / CLIP_S)):
             chance = np.random.default_rng((args.seed, number, kind))
             keep(draw(f"{number:04d}", CLIP_S, chance))

@@ -106,6 +106,11 @@ def _are_hidden_before(cost: WholeBodyCost, state: FloatArray) -> BoolArray:
     return found
 
 
+def are_sure(chances: FloatArray) -> bool:
+    """Return whether no keypoint is uncertain by its probability of being wrong, (n,)."""
+    return bool((chances <= UNCERTAIN_FROM).all())
+
+
 def states_of(
     chances: FloatArray, hidden: BoolArray, is_doubtful: bool = False
 ) -> tuple[KeypointState, ...]:

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     PLACE,
@@ -47,6 +46,7 @@ from cardbox_tracker.estimation.filtering.keypoint_states import (
     SHARE_OF_CAMERAS,
     SHARE_OF_POINTS,
     are_hidden,
+    are_sure,
     chances_by_spread,
     states_of,
 )
@@ -296,7 +296,7 @@ class WholeBodyFilter:
             chances = chances_by_spread(cost.costs[0], result, share * deviations)
         is_doubtful = self._points.is_doubtful(result)
         states = states_of(chances, are_hidden(cost, result), is_doubtful)
-        is_sure = is_sure and all(states[hand] is KeypointState.TRACKED for hand in HANDS)
+        is_sure = is_sure and are_sure(chances[HANDS])
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
