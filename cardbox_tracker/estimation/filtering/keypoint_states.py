@@ -21,7 +21,7 @@ from cardbox_tracker.estimation.filtering.correction import FAR_M
 
 BoolArray = NDArray[np.bool_]
 
-UNCERTAIN_FROM = 0.2
+UNCERTAIN_FROM = 0.15
 """Probability of being wrong above which a keypoint is uncertain."""
 LOST_FROM = 0.5
 """Probability of being wrong above which a keypoint is lost: it is rather wrong than right."""

@@ -89,7 +89,7 @@ def test_a_hand_behind_the_trunk_is_hidden_and_one_before_it_is_not() -> None:
 
 
 def test_states_follow_the_chances_unless_nobody_sees_the_keypoint() -> None:
-    chances = np.array([0.0, 0.2, 0.21, 0.5, 0.51, 0.9])
+    chances = np.array([0.0, 0.15, 0.16, 0.5, 0.51, 0.9])
     hidden = np.array([False, False, False, False, False, True])
     tracked, uncertain = KeypointState.TRACKED, KeypointState.UNCERTAIN
     expected = tracked, tracked, uncertain, uncertain, KeypointState.LOST, KeypointState.HIDDEN
