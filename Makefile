@@ -7,6 +7,7 @@
 # make sessions    track the recorded sessions in ../shared/data; writes docs/evaluation/sessions.md
 # make people      track the films of real people in ../shared/data; writes docs/evaluation/real-people.md
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
+# make reliability-quick   the same in ten minutes, without running nodes; writes nothing
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove the results of the targets above
@@ -142,6 +143,10 @@ EXAMPLES ?= 100000
 .PHONY: reliability
 reliability: $(VENV)/package
 	$(BIN)/python -m tools.reliability --examples $(EXAMPLES)
+
+.PHONY: reliability-quick
+reliability-quick: $(VENV)/package
+	$(BIN)/python -m tools.reliability --quick
 
 # The build uses a copy, like a workspace of its own. 'make test' runs the slow tests.
 COLCON := build/colcon

@@ -1,4 +1,4 @@
-"""Atomic writing of files: a reader finds the complete file or none."""
+"""Atomic writing of files: a reader finds the complete file or none; reading within a limit."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from cardbox_tracker.errors import CardboxError
 
@@ -22,6 +23,10 @@ from cardbox_tracker.errors import CardboxError
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
 _MOST_LINKS = 40
+
+
+class UnreadableFileError(CardboxError):
+    """A file cannot be opened, is not regular or too large; the text does not name the file."""
 
 
 @contextmanager
@@ -105,6 +110,53 @@ def user_path(name: str) -> Path:
         return Path(name).expanduser()
     except RuntimeError:
         raise CardboxError(f"{name}: there is no such user; give the full path") from None
+
+
+@contextmanager
+def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[BinaryIO]:
+    """Open a regular file of at most ``most_bytes`` for reading; it never waits for a pipe.
+
+    Raises:
+        UnreadableFileError: the file cannot be opened, is not a regular file, or is larger.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe waits for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    except OSError as error:
+        raise UnreadableFileError(error.strerror or str(error)) from None
+    except ValueError as error:  # a NUL in the name
+        raise UnreadableFileError(str(error)) from None
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode):
+        os.close(descriptor)
+        what = "a directory" if stat.S_ISDIR(found.st_mode) else "a pipe or a device"
+        raise UnreadableFileError(f"it is {what}, not a file")
+    with os.fdopen(descriptor, "rb") as file:
+        _check_size(found.st_size, most_bytes)
+        yield file
+
+
+def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+    """Return the content of a regular file of at most ``most_bytes``.
+
+    Raises:
+        UnreadableFileError: see :func:`regular_file`.
+    """
+    with regular_file(path, most_bytes) as file:
+        try:
+            data = file.read(most_bytes + 1)
+        except OSError as error:
+            raise UnreadableFileError(error.strerror or str(error)) from None
+    # A file of /proc says that it is empty.
+    _check_size(len(data), most_bytes)
+    return data
+
+
+def _check_size(found: int, most_bytes: int) -> None:
+    if found > most_bytes:
+        kilobytes = most_bytes // 1024
+        most = f"{kilobytes} kB" if kilobytes < 1024 else f"{kilobytes // 1024} MB"
+        raise UnreadableFileError(f"it has more than {most}")
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

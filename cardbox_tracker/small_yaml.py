@@ -6,13 +6,13 @@ The safe loader alone accepts aliases, which can expand to gigabytes, and any de
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Hashable
 from typing import Any
 
 import yaml
 
 from cardbox_tracker.errors import CardboxError, cut, quoted
+from cardbox_tracker.files import UnreadableFileError, read_regular
 
 MOST_BYTES = 64 * 1024
 MOST_DEPTH = 8
@@ -79,20 +79,9 @@ def read_small_text(path: str | os.PathLike[str]) -> str:
         SmallYamlError: the file cannot be read, is too large, or is not a text file.
     """
     try:
-        # Without O_NONBLOCK, opening a pipe waits for a writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-        with os.fdopen(descriptor, "rb") as file:
-            mode = os.fstat(descriptor).st_mode
-            if not stat.S_ISREG(mode):
-                what = "a directory" if stat.S_ISDIR(mode) else "a pipe or a device"
-                raise SmallYamlError(f"it is {what}, not a file")
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise SmallYamlError(error.strerror or str(error)) from None
-    except ValueError as error:  # a NUL in the name
+        data = read_regular(path, MOST_BYTES)
+    except UnreadableFileError as error:
         raise SmallYamlError(str(error)) from None
-    if len(data) > MOST_BYTES:
-        raise SmallYamlError(f"it has more than {MOST_BYTES // 1024} kB; expected a few")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:

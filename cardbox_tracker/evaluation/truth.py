@@ -7,7 +7,6 @@ import os
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,15 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.evaluation.metrics import SHOULDERS
+from cardbox_tracker.files import UnreadableFileError, read_regular
 
 FloatArray = NDArray[np.float64]
 
 # A person who is about to move still stands where the recording began in this many frames.
 _FIRST_FRAMES = 10
+_MOST_BYTES = 256 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
         CardboxError: the file cannot be read or is not a ground truth.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_regular(path, _MOST_BYTES))
         if camera is not None:
             data = _seen_by(data, camera)
         frames = {}
@@ -128,14 +129,15 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
             data.get("depth_topic"),
             str(data.get("source", "")),
         )
-    except OSError as error:
+    except UnreadableFileError as error:
         raise CardboxError(
-            f"cannot read the ground truth {path}: {error.strerror}; expected the "
+            f"cannot read the ground truth {path}: {error}; expected the "
             "ground_truth.json of a session, such as 'cardbox synthesize' writes"
         ) from None
-    except (ValueError, KeyError, IndexError, TypeError) as error:
+    except (ValueError, KeyError, IndexError, TypeError, RecursionError) as error:
         raise CardboxError(
-            f"{path} is not a ground truth: {error!r}; expected the ground_truth.json of a session"
+            f"{path} is not a ground truth: {cut(repr(error))}; expected the ground_truth.json of "
+            "a session"
         ) from None
 
 

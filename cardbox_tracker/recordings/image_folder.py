@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -12,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import BagError, EncodingError
+from cardbox_tracker.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.film import Film
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.image_recording import RecordedImage
-from cardbox_tracker.vision.encodings import decode_compressed
+from cardbox_tracker.vision.encodings import MOST_PIXELS, decode_compressed
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
 """Endings of the images, in small or capital letters."""
 FPS = 30.0
 """Images a second unless another rate is given."""
+# More than the largest image needs without compression.
+_MOST_BYTES = 4 * MOST_PIXELS
 
 
 def image_files(folder: Path) -> list[Path]:
@@ -49,15 +51,19 @@ class ImageFolder(Film):
     def __enter__(self) -> ImageFolder:
         """Read the names of the images, and the size of the first one that can be decoded."""
         self._files = image_files(self.path)
+        reason = ""
         for file in self._files:
-            with suppress(EncodingError):
+            try:
                 height, width = _image(file).shape[:2]
-                self._set_size(width, height)
-                break
+            except EncodingError as error:
+                reason = reason or f" ({error})"
+                continue
+            self._set_size(width, height)
+            break
         else:
             raise BagError(
-                f"{self.path} has no JPEG or PNG image that can be decoded; give a folder of the "
-                "images of one camera"
+                f"{self.path} has no JPEG or PNG image that can be decoded{reason}; give a folder "
+                "of the images of one camera"
             )
         self.duration_s = (len(self._files) - 1) / (self._given.fps or FPS)
         return self
@@ -72,10 +78,8 @@ class ImageFolder(Film):
 def _image(file: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
     """Return an image (H, W) or (H, W, 3), which must have ``size`` (width, height), px."""
     try:
-        image = decode_compressed(file.read_bytes())
-    except OSError as error:
-        raise EncodingError(f"{file.name}: {error.strerror}") from None
-    except EncodingError as error:
+        image = decode_compressed(read_regular(file, _MOST_BYTES))
+    except (EncodingError, UnreadableFileError) as error:
         raise EncodingError(f"{file.name}: {error}") from None
     found = image.shape[1], image.shape[0]
     if size is not None and found != size:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.files import UnreadableFileError, regular_file
 from cardbox_tracker.recordings.detector import FindPoints
 from cardbox_tracker.vision.camera import Calibration
 
 COLUMNS = ("stamp_ns", "joint", "u", "v", "score")
 """Columns that a table needs."""
+# An hour of all points at 30 Hz has 100 MB.
+_MOST_BYTES = 256 * 1024 * 1024
 
 
 class PointTable(NamedTuple):
@@ -40,7 +44,10 @@ class PointTable(NamedTuple):
         found: dict[int, dict[str, tuple[float, float, float]]] = {}
         try:
             # Spreadsheets begin a file with a byte order mark.
-            with self.path.open(newline="", encoding="utf-8-sig") as file:
+            with (
+                regular_file(self.path, _MOST_BYTES) as data,
+                io.TextIOWrapper(data, newline="", encoding="utf-8-sig") as file,
+            ):
                 rows = csv.DictReader(file)
                 self._check(rows.fieldnames or (), camera)
                 for row in rows:
@@ -49,6 +56,8 @@ class PointTable(NamedTuple):
                     if row["joint"] in POINT_INDEX:
                         joints = found.setdefault(int(row["stamp_ns"]), {})
                         joints[row["joint"]] = float(row["u"]), float(row["v"]), float(row["score"])
+        except UnreadableFileError as error:
+            raise CardboxError(f"cannot read {self.path}: {error}; give a CSV file") from None
         except OSError as error:
             raise CardboxError(f"cannot read {self.path}: {error.strerror}") from None
         except (UnicodeDecodeError, csv.Error) as error:

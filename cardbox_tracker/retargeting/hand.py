@@ -25,6 +25,7 @@ _STEPS, _CLOSE_M = 12, 1e-3
 # Redundant joints are pulled to the middle of their range, so that the elbow does not drift.
 _REST_COST = 1e-2
 _LM_DAMPING, _DAMPING = 1e-3, 1e-6
+_SHORTEST_M, _LONGEST_M = 0.01, 100.0
 
 
 def hand_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
@@ -57,7 +58,7 @@ class HandFollower:
 
         Raises:
             CardboxError: the libraries are not installed, the robot has no such link, or the
-                link's chain has fewer than two joints.
+                link's chain has fewer than two joints or an impossible length.
         """
         pin, self._pink = _libraries()
         self.sources = tuple(f"{config.side}_{name}" for name in _ARM_JOINTS)
@@ -69,9 +70,7 @@ class HandFollower:
                 f"{hand_link} of the robot has {len(self.joints)} joints before it; expected at "
                 "least 2, and 6 for every position and direction"
             )
-        whole = _model(pin, robot.urdf)
-        fixed = [whole.getJointId(n) for n in whole.names[1:] if n not in self.joints]
-        model = pin.buildReducedModel(whole, fixed, pin.neutral(whole))
+        model = _model(pin, robot.urdf, self.joints)
         # Index of each of our joints in the library's configuration vector.
         order = [model.joints[model.getJointId(name)].idx_q for name in self.joints]
         self._order = np.array(order)
@@ -90,6 +89,11 @@ class HandFollower:
         shoulder = model.getJointId(self.joints[1])
         self._shoulder_m = np.array(self._configuration.data.oMi[shoulder].translation)
         self.reach_m = _length(model, self.joints[2:], hand_link)
+        if not _SHORTEST_M <= self.reach_m <= _LONGEST_M:
+            raise CardboxError(
+                f"the robot's arm is {self.reach_m:g} m long from its second joint to {hand_link}; "
+                f"expected {_SHORTEST_M:g} to {_LONGEST_M:g} m: a URDF has metres"
+            )
         self._scale_m = config.reach * self.reach_m
         angles = np.radians([config.mount_roll_deg, config.mount_pitch_deg, config.mount_yaw_deg])
         self._mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
@@ -137,9 +141,12 @@ def _length(model: Any, joints: tuple[str, ...], hand_link: str) -> float:
     return float(sum(np.linalg.norm(step) for step in steps))
 
 
-def _model(pin: Any, urdf: str) -> Any:
+def _model(pin: Any, urdf: str, joints: tuple[str, ...]) -> Any:
+    """Return the dynamic model in which only ``joints`` move."""
     try:
-        return pin.buildModelFromXML(urdf)
+        whole = pin.buildModelFromXML(urdf)
+        fixed = [whole.getJointId(name) for name in whole.names[1:] if name not in joints]
+        return pin.buildReducedModel(whole, fixed, pin.neutral(whole))
     except (RuntimeError, ValueError) as error:
         raise CardboxError(f"pinocchio cannot use the robot's URDF: {error}") from None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -83,6 +84,7 @@ class Retargeter:
         body: BodyModel | None = None,
         posture: FloatArray | None = None,
         stddev: FloatArray | None = None,
+        waited_s: float = math.inf,
     ) -> Command:
         """Return the command for an image.
 
@@ -92,10 +94,12 @@ class Retargeter:
             body: the person.
             posture: d1..d12, (12,), rad and metres.
             stddev: their standard deviations, (12,).
+            waited_s: time since the last command by the robot's clock, s. The robot moves for no
+                longer, whatever the stamps say.
         """
         before_ns, self._before_ns = self._before_ns, stamp_ns
         elapsed_s = 0.0 if before_ns is None else (stamp_ns - before_ns) / 1e9
-        duration_s = min(max(elapsed_s, 0.0), self._config.longest_step_s)
+        duration_s = max(min(elapsed_s, waited_s, self._config.longest_step_s), 0.0)
         reason = self._reason(state, posture, stddev)
         if reason or body is None or posture is None:
             return Command(self._motion.positions, f"frozen: {reason or 'nobody'}", duration_s)

@@ -6,16 +6,20 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from xml.etree import ElementTree as Xml
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CardboxError, cut, quoted
+from cardbox_tracker.files import UnreadableFileError, read_regular
+from cardbox_tracker.retargeting.urdf_limits import check_urdf_size
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
-_LARGEST_BYTES = 20_000_000
+# Some descriptions mean no limit by 1e16; differences of larger ones would not be finite.
+_WIDEST = 1e16
+_LARGEST_BYTES = 16 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -95,13 +99,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
         CardboxError: the file cannot be read, or is not a URDF with movable joints.
     """
     try:
-        if Path(path).stat().st_size > _LARGEST_BYTES:
-            raise CardboxError(f"{path} is larger than {_LARGEST_BYTES} bytes; is it a URDF?")
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise CardboxError(
-            f"cannot read the robot {path}: {error.strerror}; expected a URDF file"
-        ) from None
+        text = read_regular(path, _LARGEST_BYTES).decode("utf-8")
+    except UnreadableFileError as error:
+        raise CardboxError(f"cannot read the robot {path}: {error}; expected a URDF file") from None
     except UnicodeDecodeError:
         raise CardboxError(f"{path} is not a text file; expected the URDF of a robot") from None
     return parse_robot(text, str(path))
@@ -111,22 +111,23 @@ def parse_robot(text: str, source: str = "the description") -> Robot:
     """Parse a URDF; ``source`` names it in errors.
 
     Raises:
-        CardboxError: see :func:`load_robot`.
+        CardboxError: see :func:`load_robot`; or it has too many levels or joints.
     """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise CardboxError(f"{source} defines entities, which no URDF needs; remove them")
     if "xmlns:xacro" in text:
         raise CardboxError(f"{source} is xacro; convert it first: xacro FILE > robot.urdf")
     try:
+        check_urdf_size(text)
         root = Xml.fromstring(text)
-    except Xml.ParseError as error:
+    except ExpatError as error:
         raise CardboxError(f"{source} is not XML: {error}; expected the URDF of a robot") from None
+    except CardboxError as error:
+        raise CardboxError(f"{source} {error}") from None
     try:
         return _robot(root)
     except (AttributeError, KeyError, ValueError) as error:
         raise CardboxError(
-            f"{source} is not a URDF with movable joints: {error}; every joint needs name, type, "
-            "parent and child, and a revolute or prismatic joint finite limits"
+            f"{source} is not a URDF with movable joints: {cut(str(error))}; every joint needs "
+            "name, type, parent and child, and a revolute or prismatic joint finite limits"
         ) from None
 
 
@@ -173,6 +174,6 @@ def _joint(element: Xml.Element, name: str, kind: str) -> Joint:
         limit.set("upper", repr(math.pi))
     lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
     speed = float(limit.get("velocity", 0.0))
-    if not (math.isfinite(lower) and math.isfinite(upper) and lower <= upper and speed >= 0.0):
+    if not (-_WIDEST <= lower <= upper <= _WIDEST and speed >= 0.0):
         raise ValueError(f"the joint {name} has limits {lower} to {upper} and the speed {speed}")
     return Joint(name, lower, upper, speed or math.inf)

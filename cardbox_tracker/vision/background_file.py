@@ -7,19 +7,22 @@ checked against the expected working size before it is unpacked.
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import stat
+import struct
 import tempfile
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import BackgroundFileError, CardboxError
-from cardbox_tracker.files import atomic_path
+from cardbox_tracker.errors import BackgroundFileError, CameraError, CardboxError, quoted
+from cardbox_tracker.files import UnreadableFileError, atomic_path, regular_file
 from cardbox_tracker.vision.camera import Calibration
 from cardbox_tracker.vision.chroma import ChromaModel
 from cardbox_tracker.vision.empty_scene import BackgroundModel
@@ -31,8 +34,16 @@ _CHROMA_MEAN, _CHROMA_STDDEV = "chroma_mean", "chroma_stddev"
 _SIZE, _K, _DISTORTION, _DISTORTION_MODEL = "size", "k", "distortion", "distortion_model"
 _NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
 _COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
-# Longest text and longest list of numbers of an entry.
-_LONGEST_TEXT, _MOST_NUMBERS, _OVERHEAD = 64, 32, 4096
+# Longest list of numbers of an entry, and bytes of a number; a text may have as many bytes.
+_MOST_NUMBERS, _LARGEST_NUMBER = 32, 8
+# A background of 4096x4096, the largest working size, has 235 MB.
+_MOST_BYTES = 256 * 1024 * 1024
+_MAGIC, _HEADER = b"\x93NUMPY\x01\x00", struct.Struct("<8sH")
+_LONGEST_HEADER = 1024
+_WRITTEN = re.compile(
+    r"\{'descr': '(?P<kind><(?:[if][48]|U\d{1,6}))', 'fortran_order': (?P<order>True|False), "
+    r"'shape': \((?P<shape>(?:\d{1,12}, ?)*(?:\d{1,12})?)\), \} *\n"
+)
 _BRIGHTEST = 255.0
 
 
@@ -129,21 +140,24 @@ def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> Stor
     """
     name = os.fspath(path)
     try:
-        arrays = _read(Path(path), size)
+        with regular_file(path, _MOST_BYTES) as file:
+            arrays = _read(file, size)
         return _checked(arrays, size)
-    except OSError as error:
+    except UnreadableFileError as error:
         raise BackgroundFileError(
-            f"cannot read the background {name}: {error.strerror or error}; give the file that the "
-            "background node wrote"
+            f"cannot read the background {name}: {error}; give the file that the background node "
+            "wrote"
         ) from None
     # These are the errors of zipfile and numpy for damaged archives.
     except (
         ValueError,
-        KeyError,
+        LookupError,
         EOFError,
-        SyntaxError,
+        OSError,
         NotImplementedError,
         RuntimeError,
+        CameraError,
+        struct.error,
         zipfile.BadZipFile,
         zlib.error,
     ) as error:
@@ -154,31 +168,43 @@ def load_background(path: str | os.PathLike[str], size: tuple[int, int]) -> Stor
         ) from None
 
 
-def _read(path: Path, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
+def _read(file: BinaryIO, size: tuple[int, int]) -> dict[str, NDArray[Any]]:
     pixels = size[0] * size[1]
     most = {_MEAN: pixels, _STDDEV: pixels, _CHROMA_MEAN: 3 * pixels, _CHROMA_STDDEV: 3 * pixels}
     arrays: dict[str, NDArray[Any]] = {}
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(file) as archive:
         names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
         for key in _NEEDED:
             if key not in names:
                 raise ValueError(f"it has no entry '{key}'")
         for key in (*_NEEDED, *(k for k in _COLOR if k in names)):
-            with archive.open(names[key]) as file:
-                version = np.lib.format.read_magic(file)
-                if version != (1, 0):
-                    raise ValueError(f"'{key}' has version {version} of NumPy's format")
-                shape, _, kind = np.lib.format.read_array_header_1_0(file)
-            count = int(np.prod(shape, dtype=object))
-            limit = most.get(key, _LONGEST_TEXT if kind.kind == "U" else _MOST_NUMBERS)
-            if count > limit or kind.kind not in "fiU" or kind.itemsize > 4 * _LONGEST_TEXT:
-                raise ValueError(
-                    f"'{key}' has the shape {shape} and type {kind}, too much for a background of "
-                    f"{size[0]}x{size[1]}"
-                )
-            with archive.open(names[key]) as file:
-                arrays[key] = np.lib.format.read_array(file, allow_pickle=False)
+            if names[key].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"'{key}' is compressed in a way that NumPy does not use")
+            with archive.open(names[key]) as entry:
+                arrays[key] = _array(entry, key, most.get(key, _MOST_NUMBERS))
     return arrays
+
+
+def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
+    """Return the array of an entry with at most ``most`` numbers, which is checked first."""
+    begin = entry.read(_HEADER.size)
+    if len(begin) < _HEADER.size or not begin.startswith(_MAGIC):
+        raise ValueError(f"'{key}' is not in version 1.0 of NumPy's format")
+    text = entry.read(min(_HEADER.unpack(begin)[-1], _LONGEST_HEADER)).decode("latin-1")
+    # NumPy would evaluate the header as Python, with all errors of its parser.
+    header = _WRITTEN.fullmatch(text)
+    if header is None:
+        raise ValueError(f"'{key}' has the header {quoted(text)}, which NumPy does not write")
+    kind = np.dtype(header["kind"])
+    shape = tuple(int(side) for side in header["shape"].split(",") if side.strip())
+    count = math.prod(shape)
+    if count * kind.itemsize > _LARGEST_NUMBER * most:
+        raise ValueError(
+            f"'{key}' has the shape {shape} and type {kind}, too much for a background of this size"
+        )
+    data = entry.read(count * kind.itemsize)
+    order: Literal["C", "F"] = "F" if header["order"] == "True" else "C"
+    return np.frombuffer(data, kind, count).reshape(shape, order=order)
 
 
 def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBackground:
@@ -195,7 +221,9 @@ def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBa
     model = BackgroundModel(
         _plane(arrays, _MEAN, mean.shape), _plane(arrays, _STDDEV, mean.shape), chroma
     )
-    width, height = (int(value) for value in arrays[_SIZE])
+    if arrays[_SIZE].dtype.kind != "i":
+        raise ValueError("its size is not two whole numbers")
+    width, height = arrays[_SIZE].tolist()
     calibration = Calibration(
         width,
         height,
@@ -203,6 +231,7 @@ def _checked(arrays: dict[str, NDArray[Any]], size: tuple[int, int]) -> StoredBa
         np.asarray(arrays[_DISTORTION], np.float64).ravel(),
         str(arrays[_DISTORTION_MODEL]),
     )
+    calibration.camera(width, height)
     return StoredBackground(model, calibration)
 
 

@@ -5,6 +5,7 @@ Both may be packed by the plugin ``compressedDepth`` of image_transport.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Sequence
 from typing import Any
@@ -13,13 +14,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import EncodingError
+from cardbox_tracker.errors import EncodingError, quoted
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.encodings import image_parts
+from cardbox_tracker.vision.encodings import MOST_PIXELS, image_parts
+from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 
 DepthImage = NDArray[np.float32]
 
 _LONGEST_PX = 32_766
+# No camera that sees a person in metres measures this in half of its pixels.
+_FARTHEST_M = 100.0
 # Header before the PNG of a compressedDepth message: the number of the format and the two
 # parameters of the inverse depths in which 32FC1 is packed.
 _PACKED = struct.Struct("<iff")
@@ -33,12 +37,14 @@ def decode_depth(
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
     Raises:
-        EncodingError: the encoding is not that of a depth image, or the bytes do not fit it.
+        EncodingError: the encoding is not that of a depth image, the bytes do not fit it, or it is
+            too large.
     """
     if encoding not in _KINDS:
         raise EncodingError(
             f"encoding '{encoding}' is no depth; expected 16UC1 (millimetres) or 32FC1 (metres)"
         )
+    check_pixels(width, height, MOST_PIXELS)
     code, metres = _KINDS[encoding]
     kind = np.dtype(f"{'>' if is_bigendian else '<'}{code}")
     row_bytes = width * kind.itemsize
@@ -63,14 +69,16 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
         encoding: the ``format`` of the message, such as ``16UC1; compressedDepth png``.
 
     Raises:
-        EncodingError: the message is no depth image or not packed as PNG.
+        EncodingError: the message is no depth image, not packed as PNG, or too large.
     """
     kind, _, how = encoding.partition(";")
     raw = bytes(data)
     pixels = None
     if "compressedDepth" in how and raw[_PACKED.size :].startswith(_PNG):
+        check_pixels(*compressed_size(raw[_PACKED.size :]), MOST_PIXELS)
         packed = np.frombuffer(raw, np.uint8, offset=_PACKED.size)
-        pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
+        with contextlib.suppress(cv2.error):
+            pixels = cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
     if kind not in _KINDS or pixels is None or pixels.dtype != np.uint16 or pixels.ndim != 2:
         raise EncodingError(
             f"a compressed image of the format '{encoding}' is no depth that can be read; expected "
@@ -88,15 +96,28 @@ def unpack_depth(data: Any, encoding: str) -> DepthImage:
 def depth_from_image(message: Any) -> DepthImage:
     """Return the depth (H, W), metres, in a message of rclpy or of a recording.
 
+    If half of the known depths are beyond 100 m, their unit is not the metre.
+
     Args:
         message: a sensor_msgs/Image, or a sensor_msgs/CompressedImage of ``compressedDepth``.
 
     Raises:
-        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`.
+        EncodingError: as :func:`decode_depth` and :func:`unpack_depth`; or the depths are not in
+            metres.
     """
     if hasattr(message, "format"):
-        return unpack_depth(message.data, message.format)
-    return decode_depth(*image_parts(message))
+        depth_m, encoding = unpack_depth(message.data, message.format), message.format
+    else:
+        depth_m, encoding = decode_depth(*image_parts(message)), message.encoding
+    beyond = np.count_nonzero(depth_m > _FARTHEST_M)
+    if beyond and 2 * beyond >= np.count_nonzero(depth_m):
+        middle_m = float(np.median(depth_m[depth_m > 0.0]))
+        raise EncodingError(
+            f"half of the depths are {middle_m:.3g} m or more, so their unit cannot be that of "
+            f"{quoted(encoding)}, and they are not used; expected metres in 32FC1 and "
+            "millimetres in 16UC1: divide 32FC1 by 1000, or send the camera's 16UC1"
+        )
+    return depth_m
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:

@@ -12,6 +12,9 @@ from cardbox_tracker.errors import CameraError, quoted
 
 FloatArray = NDArray[np.float64]
 
+FARTHEST_M = 30.0
+"""Cameras that see one person are nearer to each other, metres."""
+
 # Tolerance for a rotation matrix in a file, which may be rounded to three digits.
 _ROTATION_TOLERANCE = 1e-2
 # Largest plausible length, even in millimetres; sums of such numbers stay finite.
@@ -53,6 +56,11 @@ class Extrinsics:
             raise CameraError(
                 f"{source}: expected a rigid transform of 4 x 4 finite numbers in metres, got "
                 f"{quoted(matrix)}"
+            )
+        if values.shape == (4, 4) and not np.array_equal(values[3], (0.0, 0.0, 0.0, 1.0)):
+            raise CameraError(
+                f"{source}: the last row of the matrix is {quoted(values[3].tolist())}; expected "
+                "0, 0, 0, 1: is it transposed?"
             )
         rotation = values[:3, :3]
         u, _, v = np.linalg.svd(rotation)

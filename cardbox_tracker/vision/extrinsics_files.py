@@ -14,12 +14,9 @@ from cardbox_tracker.errors import CameraError, cut
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.extrinsics import FARTHEST_M, Extrinsics
 
 _EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
-# aniposelib uses the unit of its board, usually millimetres; cameras that see one person are nearer
-# to each other than this, metres.
-_FARTHEST_M = 30.0
 
 
 def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
@@ -134,7 +131,8 @@ def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str
         if "rotation" in entry and "translation" in entry
     }
     centres = np.array([pose.centre_m for pose in poses.values()]).reshape(-1, 3)
-    if len(centres) and np.ptp(centres, axis=0).max() > _FARTHEST_M:
+    # aniposelib uses the unit of its board, usually millimetres.
+    if len(centres) and np.ptp(centres, axis=0).max() > FARTHEST_M:
         return {
             key: Extrinsics(pose.rotation, pose.translation_m / 1000.0, pose.source)
             for key, pose in poses.items()

@@ -6,15 +6,17 @@ a file. All sources that are present have to agree.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.errors import CameraError
-from cardbox_tracker.vision.extrinsics import Extrinsics
+from cardbox_tracker.vision.extrinsics import FARTHEST_M, Extrinsics
 
 # Two sources that differ by more do not belong to the same calibration.
 _AGREE_DEG, _AGREE_M = 1.0, 0.02
@@ -87,25 +89,25 @@ def of_transforms(
 
 
 def transforms_of(message: Any) -> list[FrameTransform]:
-    """Return the transforms in a tf2_msgs/TFMessage of rclpy or of a recording."""
-    return [
-        FrameTransform(
-            stamped.header.frame_id.lstrip("/"),
-            stamped.child_frame_id.lstrip("/"),
-            Extrinsics(
-                _rotation(stamped.transform.rotation),
-                np.array([getattr(stamped.transform.translation, axis) for axis in "xyz"]),
-                "/tf_static",
-            ),
-        )
-        for stamped in message.transforms
-    ]
+    """Return the transforms in a tf2_msgs/TFMessage of rclpy or of a recording.
+
+    Transforms that are not rigid or not finite are left out, as tf2 does.
+    """
+    found = []
+    for stamped in message.transforms:
+        place, turn = stamped.transform.translation, stamped.transform.rotation
+        matrix = np.column_stack([_rotation(turn), [getattr(place, axis) for axis in "xyz"]])
+        with suppress(CameraError):
+            ends = (stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/"))
+            found.append(FrameTransform(*ends, Extrinsics.of(matrix, "/tf_static")))
+    return found
 
 
 def _rotation(quaternion: Any) -> NDArray[np.float64]:
     x, y, z, w = (float(getattr(quaternion, axis)) for axis in "xyzw")
-    norm = float(np.sqrt(x * x + y * y + z * z + w * w)) or 1.0
-    x, y, z, w = x / norm, y / norm, z / norm, w / norm
+    norm = math.hypot(x, y, z, w)
+    # A quaternion that is all zero stands for no rotation at all; its matrix is refused.
+    x, y, z, w = (value / norm if norm > 0.0 else math.nan for value in (x, y, z, w))
     return np.array(
         [
             (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
@@ -156,15 +158,22 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
         other: name of the other camera.
 
     Raises:
-        CameraError: all are None, or two differ by more than a degree or two centimetres.
+        CameraError: all are None, two differ by more than a degree or two centimetres, or the
+            cameras are more than 30 m apart.
     """
     there = [extrinsics for extrinsics in found if extrinsics is not None]
     if not there:
         raise CameraError(
             f"the extrinsics of camera {other} relative to {first} are unknown: expected a "
-            "rectified pair (P[0,3] of CameraInfo), a transform between their optical frames on "
-            "/tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
+            "rectified pair (P[0,3] of CameraInfo), a rigid transform between their optical frames "
+            "on /tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
             "nodes extrinsics_file"
+        )
+    apart_m = float(np.linalg.norm(there[0].centre_m))
+    if not apart_m <= FARTHEST_M:
+        raise CameraError(
+            f"camera {other} stands {apart_m:.3g} m from {first} ({there[0].source}); expected "
+            f"metres, at most {FARTHEST_M:g}: are they millimetres?"
         )
     for one in there[1:]:
         angle_rad, distance_m = there[0].difference(one)

@@ -20,6 +20,7 @@ NEAREST_M = 0.8
 
 # Recommended by OpenCV: penalties of 8 and 32 times the pixels of a block. Disparities are in
 # sixteenths of a pixel, and their number is a multiple of 16.
+_MOST_DISPARITIES = 4096
 _BLOCK, _STEP, _PARTS = 5, 16, 16.0
 _SMALL_STEP, _LARGE_STEP = 8 * _BLOCK**2, 32 * _BLOCK**2
 _UNIQUE_PERCENT, _LEFT_RIGHT = 5, 1
@@ -38,13 +39,20 @@ class StereoDepth:
             nearest_m: smallest measured distance, metres; a smaller one takes more time.
 
         Raises:
-            CameraError: focal length or baseline is not positive.
+            CameraError: focal length or baseline is not positive, or the cameras are too far apart
+                for a person so near.
         """
         if not (fx > 0 and baseline_m > 0 and nearest_m > 0):
             raise CameraError(
                 f"stereo with a focal length of {fx:g} px and a baseline of {baseline_m:g} m; "
                 "expected a rectified pair, whose right camera has P[0,3] = -fx B below 0: is the "
                 "left camera the first one?"
+            )
+        if not fx * baseline_m / nearest_m <= _MOST_DISPARITIES:
+            raise CameraError(
+                f"stereo with a focal length of {fx:g} px and a baseline of {baseline_m:g} m would "
+                f"need more than {_MOST_DISPARITIES} disparities; expected metres, such as 0.12: "
+                "are they millimetres?"
             )
         self._scale = fx * baseline_m
         most = _STEP * math.ceil(self._scale / nearest_m / _STEP)

@@ -101,6 +101,97 @@ def test_what_is_no_background_is_refused(path: Path, entries: Any, words: str) 
     assert str(path) in str(error.value)
 
 
+@pytest.mark.promise("No crafted background is used: its headers, sizes and lens are checked")
+@pytest.mark.parametrize(
+    ("entries", "words"),
+    [
+        ({"size": np.array([-320, -240])}, "-320x-240"),
+        ({"size": np.array([0, 0])}, "0x0"),
+        ({"size": np.array([320.0, 240.0])}, "whole numbers"),
+        ({"size": np.array([2**62, 2**62])}, "at most"),
+        ({"k": K * np.nan}, "not finite"),
+        ({"k": -K}, "focal length"),
+        ({"distortion": np.full(5, np.inf)}, "not finite"),
+        ({"distortion": np.ones(5), "distortion_model": np.array("mirror")}, "mirror"),
+        ({"format": np.array(["cardbox_background_1"] * 2)}, "format"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused(path: Path, entries: Any, words: str) -> None:
+    with_entry(path, **entries)
+    with pytest.raises(BackgroundFileError, match=words):
+        load_background(path, SIZE)
+
+
+def entry_of(header: str, data: bytes = b"") -> bytes:
+    """Return an entry of an archive with any header."""
+    text = header.encode()
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
+
+
+def crafted(path: Path, name: str, content: bytes, kind: int = zipfile.ZIP_STORED) -> None:
+    """Replace an entry of the background."""
+    with_entry(path, **{name: None})
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(f"{name}.npy", content, kind)
+
+
+@pytest.mark.promise("No crafted background is used: its headers, sizes and lens are checked")
+@pytest.mark.parametrize("name", ["mean", "size", "format"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "(" * 9000,
+        "{'descr': " + "[" * 3000,
+        "{'descr': '<f4', 'shape': (",
+        '"""',
+        "{'descr': '<f4', 'fortran_order': False, 'shape': 7, }\n",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (-12, -16), }\n",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (12, None), }\n",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (1000000, 1000000), }\n",
+        "{'descr': '<U999999999', 'fortran_order': False, 'shape': (), }\n",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (12, 16), }\n",
+        "{'descr': [['x', {}]], 'fortran_order': False, 'shape': (12, 16), }\n",
+        "{1: 2}",
+        "",
+    ],
+)
+def test_no_header_is_evaluated(path: Path, name: str, header: str) -> None:
+    whole = path.read_bytes()
+    for rest in (b"", bytes(1000)):
+        path.write_bytes(whole)
+        crafted(path, name, entry_of(header, rest))
+        with pytest.raises(BackgroundFileError, match="background that can be used"):
+            load_background(path, SIZE)
+
+
+def test_a_bomb_and_rare_compressions_are_refused(path: Path) -> None:
+    begun = "{'descr': '<f4', 'fortran_order': False, 'shape': (12, 16), }\n"
+    crafted(path, "mean", entry_of(begun, bytes(10**8)), zipfile.ZIP_DEFLATED)
+    assert load_background(path, SIZE).model.mean.max() == 0.0
+    for kind in (zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2):
+        save_background(stored(), path)
+        crafted(path, "mean", entry_of(begun, bytes(1000)), kind)
+        with pytest.raises(BackgroundFileError, match="compressed"):
+            load_background(path, SIZE)
+
+
+@pytest.mark.promise("No pipe or endless device holds up the reading of a file")
+def test_only_a_file_of_some_size_is_opened(path: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "huge").open("wb") as file:
+        file.truncate(10**10)
+    (tmp_path / "link").symlink_to("/dev/zero")
+    for name, words in (
+        ("pipe", "pipe or a device"),
+        ("link", "pipe or a device"),
+        ("huge", "more than 256 MB"),
+        (".", "directory"),
+        ("none", "No such file"),
+    ):
+        with pytest.raises(BackgroundFileError, match=f"{words}.*give the file"):
+            load_background(tmp_path / name, SIZE)
+
+
 def test_pickled_objects_are_never_loaded(path: Path) -> None:
     with np.load(path) as archive:
         arrays = dict(archive)

@@ -12,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.errors import EncodingError
-from cardbox_tracker.vision.depth_image import depth_from_image, median_depth, unpack_depth
+from cardbox_tracker.vision.depth_image import (
+    decode_depth,
+    depth_from_image,
+    median_depth,
+    unpack_depth,
+)
 
 
 def packed(pixels: np.ndarray, a: float = 0.0, b: float = 0.0) -> bytes:
@@ -61,11 +66,68 @@ def test_what_is_no_depth_is_refused(encoding: str, pixels: np.ndarray | None) -
         unpack_depth(data, encoding)
 
 
+@pytest.mark.promise("An image that is too large is refused before it is decoded")
+@pytest.mark.parametrize(("width", "height"), [(20_000, 15_000), (60_000, 60_000), (2**31, 1)])
+@pytest.mark.parametrize("kind", ["16UC1", "32FC1"])
+def test_a_depth_image_too_large_is_refused_before_memory_is_taken(
+    kind: str, width: int, height: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = bytearray(packed(np.full((4, 4), 7, np.uint16)))
+    # The size follows the message's header, the magic number and the name of the first chunk.
+    data[12 + 16 : 12 + 24] = struct.pack(">II", width, height)
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
+        unpack_depth(bytes(data), f"{kind}; compressedDepth png")
+    with pytest.raises(EncodingError, match=rf"{width}x{height} .*33\.6 million"):
+        decode_depth(b"", height, width, 4 * width, kind, is_bigendian=False)
+
+
+def test_what_opencv_cannot_decode_is_refused_in_our_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise cv2.error("(-215:Assertion failed) pixels <= CV_IO_MAX_IMAGE_PIXELS")
+
+    data = packed(np.full((4, 4), 7, np.uint16))
+    monkeypatch.setattr(cv2, "imdecode", fail)
+    with pytest.raises(EncodingError, match="expected '16UC1"):
+        unpack_depth(data, "16UC1; compressedDepth png")
+
+
 @given(st.binary(max_size=60), st.booleans())
 def test_broken_bytes_are_refused(data: bytes, is_begun: bool) -> None:
     begun = packed(np.full((4, 4), 7, np.uint16))[:24] if is_begun else b""
     with pytest.raises(EncodingError):
         unpack_depth(begun + data, "16UC1; compressedDepth png")
+
+
+@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+@pytest.mark.parametrize("packing", ["32FC1", "32FC1; compressedDepth png"])
+def test_millimetres_for_metres_are_told(packing: str) -> None:
+    depth = np.full((4, 6), 2300.0, np.float32)
+    depth[0], depth[1, 0] = 0.0, np.nan
+    if ";" in packing:
+        # n = a / z + b with a = 2,300,000 is 1,000.
+        pixels = np.where(depth > 0, 1000, 0).astype(np.uint16)
+        message = SimpleNamespace(data=packed(pixels, 2.3e6), format=packing)
+    else:
+        message = raw_depth(depth)
+    with pytest.raises(EncodingError, match=r"2\.3e\+03 m.*divide 32FC1 by 1000"):
+        depth_from_image(message)
+
+
+def raw_depth(depth: np.ndarray) -> SimpleNamespace:
+    height, width = depth.shape
+    size = {"height": height, "width": width, "step": 4 * width}
+    data = depth.astype(np.float32).tobytes()
+    return SimpleNamespace(data=data, encoding="32FC1", is_bigendian=0, **size)
+
+
+def test_a_few_far_values_are_no_other_unit() -> None:
+    """Stereo measures almost the same place in both images as very far away."""
+    depth = np.full((4, 6), 2.0, np.float32)
+    depth[0], depth[1] = 5000.0, np.inf
+    assert np.array_equal(depth_from_image(raw_depth(depth)), np.where(depth < 1e9, depth, 0.0))
+    for nothing in (0.0, np.nan, np.inf, -1.0, -np.inf):
+        assert not depth_from_image(raw_depth(np.full((4, 6), nothing))).any()
 
 
 def test_the_median_is_of_what_is_known() -> None:

@@ -84,12 +84,25 @@ def test_a_group_of_aniposelib_may_be_in_millimetres(
     assert_same(load_extrinsics(file, ["a", "b"])["b"], poses[1].after(poses[0].inverse()))
 
 
+MOVED = np.array(matrix(Extrinsics(np.eye(3), np.array([-0.12, 0.0, 0.0]))))
+
+
+def chain_of(step: np.ndarray) -> str:
+    """Return a camchain of two cameras with any matrix between them."""
+    return f"cam0: {{}}\ncam1: {{T_cn_cnm1: {step.tolist()}}}\n".replace("nan", ".nan")
+
+
+@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
         ("x.yaml", "cam0: {}\ncam1: {}\n", "cam1 .*T_cn_cnm1"),
         ("x.yaml", "cam0: {}\ncam1: {T_cn_cnm1: [[1, 2], [3, 4]]}\n", "4 x 4"),
-        ("x.yaml", f"cam0: {{}}\ncam1: {{T_cn_cnm1: {np.ones((4, 4)).tolist()}}}\n", "rotation"),
+        ("x.yaml", f"cam0: {{}}\ncam1: {{T_cn_cnm1: {np.ones((3, 4)).tolist()}}}\n", "rotation"),
+        ("x.yaml", chain_of(np.diag([1.0, 1.0, -1.0, 1.0])), "rotation"),
+        ("x.yaml", chain_of(np.diag([2.0, 2.0, 2.0, 1.0])), "rotation"),
+        ("x.yaml", chain_of(MOVED.T), "transposed"),
+        ("x.yaml", chain_of(np.eye(4) * np.nan), "finite"),
         ("x.yaml", "cam0: [", "pars"),
         ("x.yaml", "- 1", "none"),
         ("x.toml", "cam = 1", "none"),
@@ -161,6 +174,47 @@ def test_sources_have_an_order_and_have_to_agree() -> None:
         choose([one, None, far], "left", "right")
     with pytest.raises(CameraError, match="--extrinsics FILE"):
         choose([None, None, None], "left", "right")
+
+
+@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.parametrize("source", ["P", "/tf_static", "file"])
+def test_cameras_in_millimetres_are_told(source: str) -> None:
+    there = Extrinsics(np.eye(3), np.array([-120.0, 0.0, 0.0]), source)
+    found = [there if name == source else None for name in ("P", "/tf_static", "file")]
+    with pytest.raises(CameraError, match=rf"120 m from left \({source}\).*millimetres"):
+        choose(found, "left", "right")
+
+
+@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.parametrize(
+    ("part", "values"),
+    [
+        ("rotation", {"x": np.nan}),
+        ("rotation", {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}),
+        ("rotation", {"w": np.inf}),
+        ("translation", {"x": np.nan}),
+        ("translation", {"z": 1e300}),
+    ],
+)
+def test_a_transform_that_is_not_rigid_is_left_out(
+    part: str, values: dict[str, float], rng: np.random.Generator
+) -> None:
+    good, bad = (stamped("left", name, random_pose(rng)) for name in ("right", "third"))
+    for axis, value in values.items():
+        setattr(getattr(bad.transform, part), axis, value)
+    found = transforms_of(SimpleNamespace(transforms=[bad, good]))
+    assert [one.child for one in found] == ["right"]
+    assert of_transforms(found, "left", "third") is None
+
+
+@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.timeout(30)
+def test_cycles_of_transforms_end(rng: np.random.Generator) -> None:
+    pose = random_pose(rng)
+    ring = [stamped(f"f{i}", f"f{(i + 1) % 1000}", pose) for i in range(1000)]
+    found = transforms_of(SimpleNamespace(transforms=[*ring, stamped("f0", "f0", pose)]))
+    assert of_transforms(found, "f0", "f1") is not None
+    assert of_transforms(found, "f0", "elsewhere") is None
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,16 @@ def test_what_is_no_depth_is_refused() -> None:
         decode_depth(b"12", 2, 2, 4, "16UC1", False)
 
 
+@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.parametrize(
+    ("baseline_m", "words"),
+    [(-0.12, "left camera the first"), (0.0, "left camera"), (np.nan, "left"), (120.0, "millim")],
+)
+def test_a_baseline_that_cannot_be_is_refused(baseline_m: float, words: str) -> None:
+    with pytest.raises(CameraError, match=words):
+        StereoDepth(250.0, baseline_m)
+
+
 def test_a_wall_is_found_at_its_distance(rng: np.random.Generator) -> None:
     fx, baseline_m, shift = 200.0, 0.1, 10
     wall = rng.integers(0, 255, (60, 160)).astype(np.uint8)

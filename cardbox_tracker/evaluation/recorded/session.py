@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.evaluation.truth import GroundTruth, load_ground_truth
+from cardbox_tracker.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.silhouettes import TimeSpan
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,7 @@ MARGIN_S = 0.2
 
 PROTOCOL = ("empty", "enter", "front", "side", "arms", "transition")
 """Segments before the motions; they are not scored."""
+_MOST_BYTES = 16 * 1024 * 1024
 
 REFERENCES = ("front", "side", "arms")
 """Segments in which the person is measured."""
@@ -173,14 +175,15 @@ def _mediapipe(path: Path, cameras: Sequence[str]) -> tuple[dict[str, float], fl
     if not path.is_file():
         return {}, None
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_regular(path, _MOST_BYTES))
         if "mean" not in data and "aligned" in data:
             return _of_camera(data["aligned"], cameras), None
         motions = data["mean"]["motions"].items()
         return {n: float(v) for n, v in motions if _is_number(v)}, float(data["ms_median"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (UnreadableFileError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise CardboxError(
-            f"{path} is not a file of MediaPipe's figures: {error!r}; remove it, or make it again"
+            f"{path} is not a file of MediaPipe's figures: {cut(repr(error))}; remove it, or make "
+            "it again"
         ) from None
 
 

@@ -129,9 +129,13 @@ class RetargetNode(CardboxNode):
         stamp_ns = conversions.stamp_ns(message.header.stamp)
         if not self.diagnostics.input.add(stamp_ns).is_usable:
             return
-        self._heard_s = time.monotonic()
+        now_s = time.monotonic()
+        # Stamps may run faster than the robot's own time, which its speed is about.
+        waited_s, self._heard_s = now_s - self._heard_s, now_s
         posture, stddev = posture_of(self._joints), posture_of(message)
-        command = self._retargeter.update(stamp_ns, self._state, self._body, posture, stddev)
+        command = self._retargeter.update(
+            stamp_ns, self._state, self._body, posture, stddev, waited_s
+        )
         self._send(command, message.header)
         self.diagnostics.working(sent_ns)
 

@@ -201,6 +201,19 @@ def test_packed_depth_is_read_too() -> None:
     assert "/depth/camera_info" in watching.node.callbacks
 
 
+@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+def test_depth_in_millimetres_is_told_and_not_used(watching: Watching) -> None:
+    for number, depth_m in enumerate((2.0, 2000.0, 2.0), 1):
+        watching.show_depth(number * S, np.full((48, 64), depth_m))
+        for name in ("left", "right"):
+            watching.show(name, number * S)
+        texts = [text for text in watching.source.warnings().values() if "/depth" in text]
+        is_used = watching.views[-1].observations[0].depth_m is not None
+        assert is_used == (depth_m == 2.0) == (not texts)
+        if texts:
+            assert "2e+03 m" in texts[0] and "divide 32FC1 by 1000" in texts[0]
+
+
 def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:
     # The depth camera has twice the size, and its principal point is 10 px further to the right.
     own = Camera(128, 96, 120.0, 120.0, 73.5, 47.5)
@@ -267,6 +280,46 @@ def test_silence_and_other_clocks_are_said(
     assert values["right iou"] == "sees nobody"
     assert (values["left age (s)"], values["right age (s)"]) == ("0.0", "5.0")
     assert values["right rate (Hz)"] == "0.2"
+
+
+CLOCKS = "Cameras with different clocks, or that come and go, are told; the others go on"
+
+
+@pytest.mark.promise(CLOCKS)
+@pytest.mark.parametrize("apart_s", [2, -2, 1000])
+def test_clocks_that_are_apart_are_told(watching: Watching, apart_s: int) -> None:
+    for number in range(2000, 2020):
+        for name, stamp_s in (("left", 0), ("right", apart_s)):
+            watching.show(name, number * S // 10 + (stamp_s + 2000) * S)
+        watching.show_depth(number * S // 10 + 2000 * S, np.ones((48, 64)))
+    (text,) = watching.source.warnings().values()
+    assert f"{abs(apart_s)}.0 s apart" in text
+    # One camera goes on alone: the one whose clock is ahead.
+    ahead = int(apart_s > 0)
+    assert sum(view.headers[ahead] is not None for view in watching.views) == 20
+    assert all(None in view.headers for view in watching.views)
+
+
+@pytest.mark.promise(CLOCKS)
+def test_a_camera_that_dies_and_returns_with_another_size(watching: Watching) -> None:
+    def go_on(begin: int, names: tuple[str, ...], size: tuple[int, int] = (48, 64)) -> list[bool]:
+        count = len(watching.views)
+        for number in range(begin, begin + 20):
+            for name in names:
+                watching.show(name, number * S // 10, size if name == "right" else (48, 64))
+            watching.show_depth(number * S // 10, np.ones((48, 64)))
+        seen = [view.observations for view in watching.views[count:]]
+        assert all(left.silhouette is not None for left, _ in seen)
+        return [right.silhouette is not None for _, right in seen]
+
+    both = ("left", "right")
+    assert all(go_on(10, both))
+    assert not any(go_on(30, ("left",)))
+    assert go_on(50, both)[-10:] == [True] * 10
+    assert not any(go_on(70, both, (24, 32))[2:])
+    assert "32x24" in " ".join(watching.source.warnings().values())
+    assert go_on(90, both)[-10:] == [True] * 10
+    assert not watching.source.warnings()
 
 
 def test_a_camera_that_pauses_has_no_other_clock(

@@ -24,8 +24,24 @@ MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0))
 COMMANDS, SAID = "/retarget/commands", "/retarget/status"
 
 
+class Clock:
+    """Replaces the monotonic clock."""
+
+    now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
 @pytest.fixture
-def robot(bus: Any) -> Any:
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr(time, "monotonic", made.monotonic)
+    return made
+
+
+@pytest.fixture
+def robot(bus: Any, clock: Clock) -> Any:
     """Return the bus of a node that moves an arm."""
     joint_map = str(CONFIG / "example_joint_map.yaml")
     bus.start(RetargetNode, robot_file=str(CONFIG / "example_arm.urdf"), joint_map_file=joint_map)
@@ -34,10 +50,13 @@ def robot(bus: Any) -> Any:
 
 
 @pytest.fixture
-def send(robot: Any, joints: Any) -> Callable[..., None]:
-    """Return a function that sends the tracker's messages of one image."""
+def send(robot: Any, joints: Any, clock: Clock) -> Callable[..., None]:
+    """Return a function that sends the tracker's messages of one image, after some time."""
 
-    def hand_over(tenth: int, state: str = "tracking", deviation: float = 0.1) -> None:
+    def hand_over(
+        tenth: int, state: str = "tracking", deviation: float = 0.1, after_s: float = 0.1
+    ) -> None:
+        clock.now_s += after_s
         robot.send("/tracking_state", String(data=state))
         robot.send("/joint_states", joints(tenth, {"right_shoulder_abduction": 1.0}))
         robot.send("/joint_states_stddev", joints(tenth, {}, other=deviation))
@@ -69,14 +88,65 @@ def test_an_uncertain_posture_moves_nothing(robot: Any, send: Any) -> None:
     assert robot.texts(SAID) == ["moving", "frozen: too uncertain", "frozen: uncertain"]
 
 
-def test_silence_is_a_dead_man_too(robot: Any, send: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silence_is_a_dead_man_too(robot: Any, send: Any, clock: Clock) -> None:
     send(0)
     robot.tick()
     assert robot.texts(SAID) == ["moving"]
-    later = time.monotonic() + 1.0
-    monkeypatch.setattr(time, "monotonic", lambda: later)
+    clock.now_s += 1.0
     robot.tick()
     assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
+
+
+STAYS = "An arm stops with its input and stays where it is; no stamp makes it faster"
+
+
+def positions(robot: Any) -> np.ndarray:
+    """Return all commanded positions (n, 3)."""
+    return np.array([data.tolist() for data in robot.texts(COMMANDS)])
+
+
+@pytest.mark.promise(STAYS)
+@pytest.mark.parametrize("is_repeated", [False, True])
+def test_an_arm_stops_with_its_input_and_stays(
+    robot: Any, send: Any, clock: Clock, is_repeated: bool
+) -> None:
+    for tenth in range(4):
+        send(tenth)
+    (point,) = robot.sent["/retarget/joint_trajectory"][-1].points
+    reached_s = point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec
+    assert reached_s <= 0.1 + 1e-9
+    stopped = positions(robot)[-1]
+    assert stopped[0] == pytest.approx(-0.3)
+    for _ in range(600):
+        if is_repeated:
+            send(3)  # the last image again and again
+        else:
+            clock.now_s += 0.1
+        robot.tick()
+    assert (positions(robot)[4:] == stopped).all()
+    assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
+    send(700)  # the first image after silence moves nothing
+    assert (positions(robot)[-1] == stopped).all()
+
+
+@pytest.mark.promise(STAYS)
+@pytest.mark.parametrize(
+    "tenths",
+    [
+        [0, *range(10, 1000, 10)],  # each stamp is a second later
+        [10_000 * (i % 2) + i for i in range(100)],  # two clocks, 1,000 s apart
+        [10_000 - i for i in range(100)],
+        [2 * i for i in range(100)],  # a clock that is 60 times too fast
+        [5] * 100,
+    ],
+)
+def test_no_stamp_makes_an_arm_faster(
+    robot: Any, send: Any, clock: Clock, tenths: list[int]
+) -> None:
+    began_s = clock.now_s
+    for tenth in tenths:
+        send(tenth, after_s=1 / 300)
+        assert np.abs(positions(robot)[-1]).max() <= clock.now_s - began_s + 1e-9
 
 
 def test_a_node_without_a_robot_does_not_start(bus: Any, tmp_path: Path) -> None:
