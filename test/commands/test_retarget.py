@@ -48,13 +48,20 @@ def test_the_robot_follows_and_stands_still(
     assert "frozen: lost: 1 of 5 images" in done.out
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [row["status"] for row in rows] == ["moving"] * 2 + ["frozen: lost"] + ["moving"] * 2
+    assert [row["status"] for row in rows] == (
+        ["moving"] * 10 + ["frozen: lost"] * 5 + ["moving"] * 11
+    )
+    assert np.diff([int(row["stamp_ns"]) for row in rows]).tolist() == [20_000_000] * 25
+    # 0.5 rad/s from the second image on, which comes after 0.1 s; no way to the third is left.
     roll = [float(row["shoulder_roll"]) for row in rows]
-    assert roll == pytest.approx([0.0, -0.05, -0.05, -0.1, -0.15])
+    ways = [*np.arange(0, -0.05, -0.01), *[-0.05] * 5, *np.arange(-0.05, -0.151, -0.01)]
+    assert roll == pytest.approx([0.0] * 5 + ways, abs=1e-6)
+    assert float(rows[7]["shoulder_roll_velocity"]) == pytest.approx(-0.5)
     with BagReader(bag) as read, BagReader(results) as before:
         kinds = read.topics
         assert kinds["/retarget/joint_trajectory"] == "trajectory_msgs/msg/JointTrajectory"
-        assert read.count(["/retarget/joint_states"]) == 5
+        assert read.count(["/retarget/joint_states"]) == 26
+        assert read.count(["/retarget/joint_trajectory"]) == 5
         assert kinds.keys() - before.topics.keys() == {
             f"/retarget/{name}"
             for name in ("joint_states", "joint_trajectory", "robot_description", "status")
