@@ -67,6 +67,7 @@ setup(
     package_data={
         NAME: ["py.typed"],
         f"{NAME}.estimation.cost": ["*.json"],
+        f"{NAME}.ros": ["*.csv"],
         f"{NAME}.estimation.filtering": ["*.npz"],
     },
     zip_safe=False,

@@ -38,9 +38,7 @@ def test_the_example_map_has_every_joint_of_the_example_arm() -> None:
 
 
 @given(
-    st.tuples(
-        st.floats(-0.7, 3.1), st.floats(-1.0, 1.5), st.floats(-1.5, 1.5), st.floats(0.2, 1.6)
-    )
+    st.tuples(st.floats(-0.7, 3.1), st.floats(-1.0, 1.5), st.floats(-1.5, 1.5), st.floats(0.2, 1.6))
 )
 def test_the_robots_segments_point_as_the_persons(angles_rad: tuple[float, ...]) -> None:
     """The joints of the URDF turn by Rx Ry to the elbow, then by Rz Ry to the wrist."""

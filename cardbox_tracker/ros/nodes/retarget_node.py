@@ -193,7 +193,7 @@ def _now_ns() -> int:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(RetargetNode, plain_command_line("retarget", _DOES, args))
+    return run_node(RetargetNode, plain_command_line("retarget", _DOES, RetargetParameters, args))
 
 
 if __name__ == "__main__":
