@@ -187,16 +187,6 @@ def neck_from(joints: JointValues) -> FloatArray | None:
     return np.array([by_name[name] for name in NECK_NAMES])
 
 
-def posture_and_neck_from(joints: JointValues) -> FloatArray:
-    """Return the posture, and the neck if it is there, (12,) or (14,).
-
-    Raises:
-        ValueError: a joint of the posture is missing.
-    """
-    posture, neck = posture_from(joints), neck_from(joints)
-    return posture if neck is None else np.concatenate([posture, neck])
-
-
 def positions_of(joints: JointValues) -> dict[str, float]:
     """Return the joint values by name."""
     return dict(zip(joints.names, np.asarray(joints.values).tolist(), strict=True))
