@@ -7,6 +7,7 @@ pages, which is that of the tables in README.md, and addresses of files outside 
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,14 +16,27 @@ HERE = Path(__file__).resolve().parent
 _PACKAGE = ElementTree.parse(HERE.parent / "package.xml").getroot()
 HOME = f"{_PACKAGE.findtext('url')}/blob/main"
 
+
+def is_installed(module: str) -> bool:
+    """Return whether a module can be imported."""
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
 project = "cardbox_tracker"
 author = "cardbox_tracker maintainers"
 release = _PACKAGE.findtext("version") or ""
 root_doc = "README"
-extensions = ["myst_parser", "sphinxcontrib.mermaid"]
+extensions = ["myst_parser"]
 myst_heading_anchors = 4
-myst_fence_as_directive = ["mermaid"]
-html_theme = "furo"
+# rosdoc2 brings neither of these two.
+if is_installed("sphinxcontrib.mermaid"):
+    extensions.append("sphinxcontrib.mermaid")
+    myst_fence_as_directive = ["mermaid"]
+if is_installed("furo"):
+    html_theme = "furo"
 html_title = "cardbox_tracker"
 # A generated report may still be empty.
 suppress_warnings = ["toc.no_title"]
