@@ -9,6 +9,8 @@
 # make reliability   hours of faults and hostile input; writes docs/reliability.md
 # make reliability-quick   the same in ten minutes, without running nodes; writes nothing
 # make bounds  tests of compiled code with bounds checks; the first run compiles for minutes
+# make docs    the documents as a site, with their links checked; in build/docs
+# make links   check the addresses of other sites in the documents
 # make lint    ruff and mypy alone
 # make colcon  proof that colcon builds and tests the package as a ROS workspace would
 # make clean   remove the results of the targets above
@@ -80,7 +82,7 @@ lint: $(VENV)/package
 # 'retarget' and 60 for 'detector', whose network files may be missing. They are installed by name, because '.[view]' would install the package once more.
 NEEDED = import importlib.metadata, re; print(*(line.split(";")[0] for line in \
 	importlib.metadata.requires("cardbox_tracker") \
-	if re.search("extra == .(view|retarget|detector|parquet)", line)), sep="\n")
+	if re.search("extra == .(view|retarget|detector|parquet|docs)", line)), sep="\n")
 $(VENV)/extras: setup.py | $(VENV)/package
 	$(BIN)/python -I -c '$(NEEDED)' > $@.txt
 	$(PIP) install --quiet --requirement $@.txt
@@ -90,6 +92,17 @@ $(VENV)/extras: setup.py | $(VENV)/package
 .PHONY: test
 test: lint $(VENV)/extras
 	XDG_DATA_HOME=$(CURDIR)/$(VENV)/data $(BIN)/python -m pytest
+
+# A warning is an error, so every link inside the documents leads somewhere.
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --nitpicky --keep-going --quiet docs
+.PHONY: docs
+docs: $(VENV)/extras
+	$(SPHINX) build/docs
+	@echo "wrote build/docs/README.html"
+
+.PHONY: links
+links: $(VENV)/extras
+	$(SPHINX) -b linkcheck build/links
 
 .PHONY: demo
 demo: setup

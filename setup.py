@@ -38,6 +38,8 @@ RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
 PARQUET = ["pyarrow>=15,<30"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
+# Builds the site of the documents.
+DOCS = ["furo>=2024.5", "myst-parser>=3,<6", "sphinx>=7.3,<10", "sphinxcontrib-mermaid>=0.9,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
 
@@ -67,6 +69,7 @@ setup(
     package_data={
         NAME: ["py.typed"],
         f"{NAME}.estimation.cost": ["*.json"],
+        f"{NAME}.ros": ["*.csv"],
         f"{NAME}.estimation.filtering": ["*.npz"],
     },
     zip_safe=False,
@@ -99,6 +102,7 @@ setup(
         "experiments": EXPERIMENTS,
         "detector": DETECTOR,
         "parquet": PARQUET,
+        "docs": DOCS,
     },
     entry_points={
         "console_scripts": [

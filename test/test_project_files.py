@@ -116,3 +116,29 @@ def test_the_example_is_made_by_commands_that_there_are() -> None:
     for words in commands:
         build_parser().parse_args(shlex.split(words))
     assert "/example/" in (ROOT / ".gitignore").read_text(encoding="utf-8").split()
+
+
+def test_the_citation_is_of_this_version() -> None:
+    cited = read_yaml("CITATION.cff")
+    xml = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert cited["cff-version"] == "1.2.0"
+    assert {"message", "title", "authors"} <= set(cited)
+    assert cited["version"] == xml.findtext("version")
+    assert cited["license"] == xml.findtext("license")
+    block = (ROOT / "README.md").read_text(encoding="utf-8").split("## Citation")[1]
+    bibtex = dict(re.findall(r"(?m)^  (\w+)\s+= \{(.*?)\},?$", block))
+    assert bibtex["title"] == cited["title"] == xml.findtext("name")
+    assert bibtex["author"] == f"{{{cited['authors'][0]['name']}}}"
+    assert bibtex["version"] == cited["version"]
+    assert bibtex["license"] == cited["license"]
+    assert bibtex["url"] == cited["repository-code"] == xml.findtext("url[@type='repository']")
+
+
+def test_make_docs_builds_with_the_extra() -> None:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "--fail-on-warning --nitpicky" in text
+    (names,) = re.findall(r"extra == \.\(([a-z|]+)\)", text)
+    assert "docs" in names.split("|")
+    setup = (ROOT / "setup.py").read_text(encoding="utf-8")
+    for name in names.split("|"):
+        assert f'"{name}": ' in setup

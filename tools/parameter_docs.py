@@ -23,7 +23,8 @@ from cardbox_tracker.ros.nodes.retarget_node import RetargetParameters
 from cardbox_tracker.ros.nodes.rula_node import RulaParameters
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthParameters
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
-from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters, ParameterSpec
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters
+from cardbox_tracker.ros.runtime.parameter_text import default_of, details, type_name, yaml_value
 from cardbox_tracker.settings import settings_below
 
 _GENERATED = (
@@ -43,35 +44,6 @@ NODES: dict[str, type[NodeParameters]] = {
 """Node name to its parameters."""
 APART = ("detector", "rula", "retarget")
 """Nodes that are no part of ``cardbox_nodes``."""
-
-_TYPE_NAMES = {list[str]: "list of str", list[float]: "list of float"}
-
-
-def yaml_value(value: Any) -> str:
-    """Return a parameter's value as YAML that the ROS parser reads as the right type."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        text = repr(value)
-        # YAML 1.1 takes 1e-05 for a text.
-        return f"{value:.10f}".rstrip("0") if "e" in text else text
-    if isinstance(value, str):
-        return f'"{value}"'
-    return str(value)
-
-
-def default_of(kind: type[NodeParameters], name: str) -> Any:
-    """Return the default of the parameter ``name``; lists are empty."""
-    return getattr(kind, name, [])
-
-
-def _details(spec: ParameterSpec) -> str:
-    parts = [
-        spec.unit,
-        spec.range_text,
-        spec.effect if spec.read_only else f"live: {spec.effect}",
-    ]
-    return "; ".join(part for part in parts if part)
 
 
 def config_text(kind: type[NodeParameters]) -> str:
@@ -93,7 +65,7 @@ def _section(kind: type[NodeParameters]) -> list[str]:
     lines = ["  ros__parameters:"]
     for name, spec in kind.specs().items():
         value = default_of(kind, name)
-        lines.append(f"    # {spec.description} ({_details(spec)})")
+        lines.append(f"    # {spec.description} ({details(spec)})")
         # The ROS parser does not take an empty list, so it is shown as a comment.
         lines.append(f"    # {name}: []" if value == [] else f"    {name}: {yaml_value(value)}")
     return lines
@@ -119,14 +91,14 @@ def markdown_text() -> str:
         lines += ["|---|---|---|---|---|---|---|"]
         types = kind.types()
         for name, spec in kind.specs().items():
-            type_name = _TYPE_NAMES.get(types[name]) or types[name].__name__
             live = "no" if spec.read_only else spec.effect
             description = spec.description
             if spec.was:
                 description += f" (was `{spec.was}`, which works in this version too)"
             allowed = spec.range_text.replace("|", "\\|")
+            default = yaml_value(default_of(kind, name))
             lines.append(
-                f"| `{name}` | {type_name} | `{yaml_value(default_of(kind, name))}` | {spec.unit} "
+                f"| `{name}` | {type_name(types[name])} | `{default}` | {spec.unit} "
                 f"| {allowed} | {live} | {description} |"
             )
     return "\n".join([*lines, *_settings_section()]) + "\n"

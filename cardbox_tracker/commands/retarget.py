@@ -36,7 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the robot's hand; without it, the link with the most joints before it",
     )
     parser.add_argument(
-        "--csv", type=Path, default=None, metavar="OUT.csv", help="table of the robot's joints"
+        "--csv",
+        type=Path,
+        default=None,
+        metavar="OUT.csv",
+        help="table of the robot's joints and their velocities",
     )
     parser.add_argument(
         "--bag",
@@ -69,14 +73,14 @@ def run(options: argparse.Namespace) -> None:
     config = settings_from(options, RetargetConfig)
     robot, retargeter = make_retargeter(options.robot, options.map, options.hand or "", config)
     with BagReader(options.results) as bag:
-        steps = retarget_bag(bag, retargeter)
+        motion = retarget_bag(bag, retargeter, config.rate_hz)
         if options.csv is not None:
-            write_csv(steps, retargeter.joints, options.csv)
+            write_csv(motion.way, retargeter.joints, options.csv)
         if options.bag is not None:
             joints = retargeter.joints
-            write_bag(bag, steps, joints, robot.urdf, options.bag, options.force)
-    for status, count in Counter(step.command.status for step in steps).most_common():
-        print(f"{status}: {count} of {len(steps)} images")
+            write_bag(bag, motion, joints, robot.urdf, options.bag, options.force)
+    for status, count in Counter(step.command.status for step in motion.commands).most_common():
+        print(f"{status}: {count} of {len(motion.commands)} images")
     for path in (options.csv, options.bag):
         if path is not None:
             print(f"wrote {path}")

@@ -12,7 +12,7 @@ from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN
-from cardbox_tracker.outputs import JointValues, posture_from
+from cardbox_tracker.outputs import JointValues, neck_from, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 
 MODEL = "/body_model"
@@ -26,8 +26,10 @@ class Result(NamedTuple):
         stamp_ns: stamp of the image.
         state: tracking state.
         body: the measured person; None before it was published.
-        posture: d1..d12, (12,), rad and metres; None if there is no estimate.
-        stddev: standard deviations (12,); None if they are not known.
+        posture: d1..d12, rad and metres, and the neck if the bag has it, (12,) or (14,); None if
+            there is no estimate.
+        stddev: standard deviations, without the neck where it is not known, (12,) or (14,); None
+            if they are not known.
     """
 
     stamp_ns: int
@@ -102,8 +104,15 @@ class _Results:
             if self._state not in (TRACKING, UNCERTAIN):
                 return Result(time_ns, self._state, self._body)
         elif name == _JOINTS:
-            posture = posture_from(joints_of(message))
+            posture = _posture_and_neck(message)
             self._joints = Result(stamp_ns_of(message), self._state, self._body, posture)
         elif self._joints is not None and self._joints.stamp_ns == stamp_ns_of(message):
-            return self._joints._replace(stddev=posture_from(joints_of(message)))
+            return self._joints._replace(stddev=_posture_and_neck(message))
         return None
+
+
+def _posture_and_neck(message: Any) -> FloatArray:
+    """Return the joints of the posture, and of the neck if they are there, (12,) or (14,)."""
+    joints = joints_of(message)
+    posture, neck = posture_from(joints), neck_from(joints)
+    return posture if neck is None else np.concatenate([posture, neck])

@@ -29,6 +29,12 @@ class RetargetConfig(Settings):
         unit="rad",
         limits=(0.05, 3.2),
     )
+    rate_hz: float = setting(
+        50.0,
+        "positions and velocities a second, between those of two images",
+        unit="Hz",
+        limits=(10.0, 1000.0),
+    )
     longest_step_s: float = setting(
         0.2,
         "after a longer gap between two images the robot moves as if it had been this long",

@@ -2,9 +2,11 @@
 
     joints:
       - {from: right_shoulder_flexion, to: shoulder_pitch, scale: -1.0, offset_deg: 0.0}
-      - {from: right_elbow_flexion, to: elbow_pitch}
+      - {from: right_elbow_bend, to: elbow_pitch}
+      - {to: wrist_pitch, offset_deg: 10.0}
 
-Each row sets ``to = scale * from + offset``; the default scale is 1, the default offset 0.
+Each row sets ``to = scale * from + offset``; the default scale is 1, the default offset 0. A row
+without ``from`` keeps a joint at its offset, because a controller may want all joints of an arm.
 """
 
 from __future__ import annotations
@@ -16,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CardboxError, quoted
+from cardbox_tracker.retargeting.followed import ANGLES, angles_of, joints_behind
 from cardbox_tracker.small_yaml import SmallYamlError, parse_small_yaml, read_small_text
 
 _KEYS = {"from", "to", "scale", "offset_deg"}
@@ -26,24 +28,30 @@ _KEYS = {"from", "to", "scale", "offset_deg"}
 
 @dataclass(frozen=True)
 class JointMap:
-    """A :class:`~.retargeter.Method`: ``joints`` of the robot follow ``sources`` of the person.
+    """A :class:`~.retargeter.Method`: each of ``joints`` follows an angle of the person.
 
     Attributes:
-        sources: the person's joint for each joint of the robot.
+        angles: one of :data:`~.followed.ANGLES` for each joint; None for a joint that stays.
         joints: the robot's joints without repetition.
         scale: (n,).
         offset_rad: (n,).
     """
 
-    sources: tuple[str, ...]
+    angles: tuple[str | None, ...]
     joints: tuple[str, ...]
     scale: FloatArray
     offset_rad: FloatArray
 
-    def target(self, _: BodyModel, posture: FloatArray, __: FloatArray) -> FloatArray:
+    @property
+    def sources(self) -> tuple[str, ...]:
         """See :class:`~.retargeter.Method`."""
-        chosen = posture[[JOINT_NAMES.index(name) for name in self.sources]]
-        return self.scale * chosen + self.offset_rad
+        return tuple(dict.fromkeys(j for a in self.angles if a for j in joints_behind(a)))
+
+    def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+        """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""
+        known = angles_of(posture)
+        chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])
+        return np.where(np.isnan(chosen), now, self.scale * chosen + self.offset_rad)
 
 
 def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
@@ -57,12 +65,12 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
         if not isinstance(rows, list) or not rows:
             raise ValueError("'joints' is an empty list, or not a list")
         for row in rows:
-            if not isinstance(row, dict) or not {"from", "to"} <= set(row) <= _KEYS:
+            if not isinstance(row, dict) or not {"to"} <= set(row) <= _KEYS:
                 raise ValueError(
-                    f"{quoted(row)} needs 'from' and 'to', and may have 'scale' and 'offset_deg'"
+                    f"{quoted(row)} needs 'to', and may have 'from', 'scale' and 'offset_deg'"
                 )
-            if row["from"] not in JOINT_NAMES:
-                raise ValueError(f"{quoted(row['from'])} is not one of {', '.join(JOINT_NAMES)}")
+            if row.get("from", ANGLES[0]) not in ANGLES:
+                raise ValueError(f"{quoted(row['from'])} is not one of {', '.join(ANGLES)}")
         targets = tuple(str(row["to"]) for row in rows)
         if len(set(targets)) < len(targets):
             raise ValueError("a joint of the robot is in two rows")
@@ -75,4 +83,4 @@ def load_joint_map(path: str | os.PathLike[str]) -> JointMap:
         raise CardboxError(
             f"{path} is not a joint map: {reason}; see the example config/example_joint_map.yaml"
         ) from None
-    return JointMap(tuple(str(row["from"]) for row in rows), targets, scale, offset)
+    return JointMap(tuple(row.get("from") for row in rows), targets, scale, offset)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.retargeting.config import RetargetConfig
-from cardbox_tracker.retargeting.motion import Limits, SafeMotion
+from cardbox_tracker.retargeting.followed import with_neck
+from cardbox_tracker.retargeting.motion import Limits, Moment, SafeMotion
 from cardbox_tracker.retargeting.robot import Robot
 
 MOVING = "moving"
@@ -30,10 +30,10 @@ class Method(Protocol):
         """Names of the robot's joints that are moved."""
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
-        """Return target positions (n,) of the robot's joints for a posture (12,).
+        """Return target positions (n,) of the robot's joints for a posture with the head, (14,).
 
-        ``now`` (n,) are the current positions. The target may be beyond the joint limits; it is
-        nan if there is no solution.
+        ``now`` (n,) are the current positions. The angles of the head are nan while unknown. The
+        target may be beyond the joint limits; it is nan if there is no solution.
         """
 
 
@@ -43,7 +43,7 @@ class Command(NamedTuple):
     Attributes:
         positions: positions (n,) of ``Retargeter.joints``, rad or m.
         status: ``moving``, or ``frozen:`` with the reason.
-        duration_s: time in which the robot reaches the positions.
+        duration_s: time in which the robot reaches the positions, s.
     """
 
     positions: FloatArray
@@ -57,7 +57,10 @@ class Command(NamedTuple):
 
 
 class Retargeter:
-    """Makes one robot command an image, always within the limits of position and speed."""
+    """Makes one robot command an image, always within the limits of position and speed.
+
+    Between two images :meth:`at` has positions and velocities for any time of the robot's clock.
+    """
 
     def __init__(self, robot: Robot, method: Method, config: RetargetConfig) -> None:
         """Begin at 0, or at the limit nearest to 0, for each joint.
@@ -71,11 +74,16 @@ class Retargeter:
         self._method, self._config = method, config
         self._sources = [JOINT_NAMES.index(name) for name in method.sources]
         self._before_ns: int | None = None
+        self._commanded_ns: int | None = None
 
-    def hold(self, reason: str) -> Command:
-        """Return the command to stand still; the next image counts as the first."""
+    def at(self, now_ns: int) -> Moment:
+        """Return positions and velocities of ``joints`` at a time of the robot's clock, ns."""
+        return self._motion.at(now_ns)
+
+    def hold(self, reason: str, now_ns: int) -> Command:
+        """Return the command to stand still from now on; the next image counts as the first."""
         self._before_ns = None
-        return Command(self._motion.positions, f"frozen: {reason.replace('_', ' ')}", 0.0)
+        return self._stop(reason, now_ns)
 
     def update(
         self,
@@ -84,7 +92,7 @@ class Retargeter:
         body: BodyModel | None = None,
         posture: FloatArray | None = None,
         stddev: FloatArray | None = None,
-        waited_s: float = math.inf,
+        now_ns: int | None = None,
     ) -> Command:
         """Return the command for an image.
 
@@ -92,21 +100,29 @@ class Retargeter:
             stamp_ns: stamp of the image.
             state: tracking state; the robot moves only in the state ``tracking``.
             body: the person.
-            posture: d1..d12, (12,), rad and metres.
-            stddev: their standard deviations, (12,).
-            waited_s: time since the last command by the robot's clock, s. The robot moves for no
-                longer, whatever the stamps say.
+            posture: d1..d12, rad and metres, and the angles of the neck if known; (12,) or (14,).
+            stddev: their standard deviations, (12,) or (14,).
+            now_ns: time of the robot's clock; None if that is the stamp. The robot moves for no
+                longer than since the command before, whatever the stamps say.
         """
+        now_ns = stamp_ns if now_ns is None else now_ns
         before_ns, self._before_ns = self._before_ns, stamp_ns
-        elapsed_s = 0.0 if before_ns is None else (stamp_ns - before_ns) / 1e9
-        duration_s = max(min(elapsed_s, waited_s, self._config.longest_step_s), 0.0)
+        commanded_ns, self._commanded_ns = self._commanded_ns, now_ns
         reason = self._reason(state, posture, stddev)
-        if reason or body is None or posture is None:
-            return Command(self._motion.positions, f"frozen: {reason or 'nobody'}", duration_s)
-        target = self._method.target(body, posture, self._motion.positions)
+        if reason or body is None or posture is None or stddev is None:
+            return self._stop(reason or "nobody", now_ns)
+        whole = with_neck(posture, stddev, self._config.max_stddev_rad)
+        target = self._method.target(body, whole, self.at(now_ns).positions)
         if not np.isfinite(target).all():
-            return Command(self._motion.positions, "frozen: no solution", duration_s)
-        return Command(self._motion.move(target, duration_s), MOVING, duration_s)
+            return self._stop("no solution", now_ns)
+        elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
+        waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
+        longest_ns = round(self._config.longest_step_s * 1e9)
+        duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
+        return Command(self._motion.move(target, now_ns, duration_ns), MOVING, duration_ns / 1e9)
+
+    def _stop(self, reason: str, now_ns: int) -> Command:
+        return Command(self._motion.stop(now_ns), f"frozen: {reason.replace('_', ' ')}", 0.0)
 
     def _reason(self, state: str, posture: FloatArray | None, stddev: FloatArray | None) -> str:
         """Return why the robot must not move; empty if it may."""
@@ -115,6 +131,8 @@ class Retargeter:
         if posture is None or stddev is None:
             return "no posture"
         worst = stddev[self._sources]
-        if not (np.isfinite(posture).all() and (worst <= self._config.max_stddev_rad).all()):
+        if not (
+            np.isfinite(posture[:N_JOINTS]).all() and (worst <= self._config.max_stddev_rad).all()
+        ):
             return "too uncertain"
         return ""

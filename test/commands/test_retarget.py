@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -48,18 +49,56 @@ def test_the_robot_follows_and_stands_still(
     assert "frozen: lost: 1 of 5 images" in done.out
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [row["status"] for row in rows] == ["moving"] * 2 + ["frozen: lost"] + ["moving"] * 2
+    assert [row["status"] for row in rows] == (
+        ["moving"] * 10 + ["frozen: lost"] * 5 + ["moving"] * 11
+    )
+    assert np.diff([int(row["stamp_ns"]) for row in rows]).tolist() == [20_000_000] * 25
+    # 0.5 rad/s from the second image on, which comes after 0.1 s; no way to the third is left.
     roll = [float(row["shoulder_roll"]) for row in rows]
-    assert roll == pytest.approx([0.0, -0.05, -0.05, -0.1, -0.15])
+    ways = [*np.arange(0, -0.05, -0.01), *[-0.05] * 5, *np.arange(-0.05, -0.151, -0.01)]
+    assert roll == pytest.approx([0.0] * 5 + ways, abs=1e-6)
+    assert float(rows[7]["shoulder_roll_velocity"]) == pytest.approx(-0.5)
     with BagReader(bag) as read, BagReader(results) as before:
         kinds = read.topics
         assert kinds["/retarget/joint_trajectory"] == "trajectory_msgs/msg/JointTrajectory"
-        assert read.count(["/retarget/joint_states"]) == 5
+        assert read.count(["/retarget/joint_states"]) == 26
+        assert read.count(["/retarget/joint_trajectory"]) == 5
         assert kinds.keys() - before.topics.keys() == {
             f"/retarget/{name}"
             for name in ("joint_states", "joint_trajectory", "robot_description", "status")
         }
         assert read.count(list(before.topics)) == before.count()
+
+
+HEAD = """<robot name="head"><link name="neck"/><link name="face"/>
+<joint name="head_yaw" type="revolute"><parent link="neck"/><child link="face"/>
+<limit lower="-1" upper="1" velocity="0" effort="1"/></joint></robot>"""
+
+
+def test_a_head_in_a_bag_is_followed_while_the_face_is_known(
+    tmp_path: Path, cardbox: Callable
+) -> None:
+    """The face is seen in the first three of five images, turned by 0.3 rad."""
+    results, robot, joint_map = (tmp_path / name for name in ("results", "head.urdf", "map.yaml"))
+    robot.write_text(HEAD)
+    joint_map.write_text("joints:\n  - {from: neck_yaw, to: head_yaw}\n")
+    tracker = Tracker(BodyModel.of(hip_height_m=-0.51), Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
+    grey = np.zeros((48, 64), np.uint8)
+    hidden = Estimate(TRACKING, np.zeros(12), np.full(12, 0.1), np.zeros((6, 3)), 10, 0.9)
+    seen = replace(hidden, neck=np.array([0.3, 0.0]), neck_stddev=np.array([0.1, 0.1]))
+    with result_bag(results, "camera") as bag:
+        for i, estimate in enumerate((seen, seen, seen, hidden, hidden)):
+            bag(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
+    table = tmp_path / "head.csv"
+    done = cardbox(
+        *("retarget", results, "--robot", robot, "--map", joint_map, "--max-speed", "2"),
+        *("--csv", table),
+    )
+    assert done.code == 0, done.err
+    with table.open(encoding="utf-8") as file:
+        yaw = [float(row["head_yaw"]) for row in csv.DictReader(file)]
+    # 0.2 rad from the second image on, the rest from the third, and no way back to 0.
+    assert [yaw[10], yaw[15], yaw[-1]] == pytest.approx([0.2, 0.3, 0.3])
 
 
 @pytest.mark.parametrize(

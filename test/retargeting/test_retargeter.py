@@ -45,40 +45,72 @@ settings = st.builds(
 )
 
 
-@given(images, settings)
+@given(images, st.lists(st.integers(0, 10**9), min_size=12, max_size=12), settings)
 def test_limits_and_speeds_hold_for_any_input(
-    sequence: list[tuple[int, str, np.ndarray | None, np.ndarray | None]], config: RetargetConfig
+    sequence: list[tuple[int, str, np.ndarray | None, np.ndarray | None]],
+    waits_ns: list[int],
+    config: RetargetConfig,
 ) -> None:
     robot = Retargeter(ROBOT, MAP, config)
     lower, upper, speed = ROBOT.limits_of(MAP.joints)
-    before, stamp_ns = np.clip(np.zeros(3), lower, upper), 0
-    for step_ns, state, posture, stddev in sequence:
-        command = robot.update(stamp_ns := stamp_ns + step_ns, state, BODY, posture, stddev)
-        moved = np.abs(command.positions - before)
-        assert (command.positions >= lower).all() and (command.positions <= upper).all()
-        # Never more than in the time that really passed, nor than in the longest step.
-        step_s = min(max(step_ns / 1e9, 0.0), config.longest_step_s)
-        assert (moved <= np.minimum(speed, config.max_speed) * step_s + 1e-9).all()
+    most = np.minimum(speed, config.max_speed)
+    before, stamp_ns, now_ns = robot.at(0).positions, 0, 0
+    for (step_ns, state, posture, stddev), wait_ns in zip(sequence, waits_ns, strict=False):
+        stamp_ns, now_ns = stamp_ns + step_ns, now_ns + wait_ns
+        found = robot.at(now_ns)
+        assert (np.abs(found.positions - before) <= most * wait_ns / 1e9 + 1e-9).all()
+        command = robot.update(stamp_ns, state, BODY, posture, stddev, now_ns)
+        assert robot.at(now_ns).positions == pytest.approx(found.positions, abs=1e-12)
+        for positions, velocities in (robot.at(now_ns), robot.at(now_ns + 10**7)):
+            assert (positions >= lower).all() and (positions <= upper).all()
+            assert (np.abs(velocities) <= most * (1 + 1e-6)).all()
+        # Never for longer than the time that really passed, nor than the longest step.
+        assert command.duration_s <= min(wait_ns / 1e9, config.longest_step_s) + 1e-9
         if state != "tracking" or posture is None or stddev is None:
             assert not command.is_moving
         if not command.is_moving:
-            assert not moved.any()
-        before = command.positions
+            assert (robot.at(now_ns + 10**9).positions == command.positions).all()
+            assert not robot.at(now_ns).velocities.any()
+        before = found.positions
 
 
 @given(
     st.lists(st.lists(numbers, min_size=2, max_size=2), max_size=10),
-    st.lists(numbers, min_size=10, max_size=10),
+    st.lists(st.integers(-(10**9), 10**11), min_size=10, max_size=10),
 )
-def test_the_last_step_holds_for_any_target(targets: list[list[float]], times: list[float]) -> None:
+def test_the_last_step_holds_for_any_target(
+    targets: list[list[float]], times_ns: list[int]
+) -> None:
     limits = Limits(np.array([-1.0, 0.5]), np.array([2.0, 0.75]), np.array([1.0, math.inf]))
     motion = SafeMotion(limits)
-    for target, time_s in zip(targets, times, strict=False):
-        before = motion.positions
-        after = motion.move(np.array(target), time_s)
+    for target, time_ns in zip(targets, times_ns, strict=False):
+        before = motion.goal
+        after = motion.move(np.array(target), 0, time_ns)
         assert (after >= limits.lower).all() and (after <= limits.upper).all()
-        longest = max(time_s, 0.0) if math.isfinite(time_s) else 0.0
-        assert abs(after[0] - before[0]) <= longest + 1e-12
+        assert abs(after[0] - before[0]) <= max(time_ns / 1e9, 0.0) + 1e-12
+        motion.stop(max(time_ns, 0))
+
+
+def test_between_two_images_the_arm_moves_evenly() -> None:
+    """From -0.1 to -0.2 rad in 100 ms, at 1 rad/s; a stop on the way is at once."""
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
+    for tenth in range(3):
+        robot.update(tenth * 10**8, "tracking", BODY, reference_posture("arms"), SURE)
+    way = [robot.at(200_000_000 + 20_000_000 * step) for step in range(7)]
+    roll = [moment.positions[0] for moment in way]
+    assert roll == pytest.approx([-0.1, -0.12, -0.14, -0.16, -0.18, -0.2, -0.2])
+    assert [moment.velocities[0] for moment in way] == pytest.approx([-1.0] * 5 + [0.0] * 2)
+    stopped = robot.hold("lost", 250_000_000)
+    assert stopped.positions[0] == pytest.approx(-0.15)
+    assert robot.at(10**9).positions[0] == pytest.approx(-0.15)
+
+
+def test_an_early_image_goes_on_from_where_the_arm_is() -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(max_speed=1.0))
+    for stamp_ns in (0, 10**8, 15 * 10**7):
+        command = robot.update(stamp_ns, "tracking", BODY, reference_posture("arms"), SURE)
+    assert robot.at(15 * 10**7).positions[0] == pytest.approx(-0.05)
+    assert command.positions[0] == pytest.approx(-0.1)
 
 
 def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
@@ -87,9 +119,9 @@ def test_an_arm_gets_where_it_is_wanted_at_its_speed() -> None:
     positions = [
         robot.update(i * 10**8, "tracking", BODY, posture, SURE).positions for i in range(20)
     ]
-    assert positions[0] == pytest.approx([0.0, 0.0, 0.0])
-    assert positions[5] == pytest.approx([-0.5, 0.0, 0.0])
-    assert positions[-1] == pytest.approx([-math.radians(80), 0.0, 0.0])
+    assert positions[0] == pytest.approx([0.0] * 7)
+    assert positions[5] == pytest.approx([-0.5, *[0.0] * 6])
+    assert positions[-1] == pytest.approx([-math.radians(80), *[0.0] * 6])
 
 
 @pytest.mark.parametrize(
@@ -127,7 +159,7 @@ def test_after_holding_nothing_is_made_up_for() -> None:
     robot = Retargeter(ROBOT, MAP, RetargetConfig())
     posture = reference_posture("arms")
     before = robot.update(0, "tracking", BODY, posture, SURE).positions
-    assert robot.hold("no posture").status == "frozen: no posture"
+    assert robot.hold("no posture", 10**8).status == "frozen: no posture"
     assert (robot.update(10**9, "tracking", BODY, posture, SURE).positions == before).all()
 
 
@@ -183,7 +215,7 @@ def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
     [
         ("joints: []", "empty list"),
         ("arms: 1", "'joints'"),
-        ("joints: [{from: left_elbow_flexion}]", "needs 'from' and 'to'"),
+        ("joints: [{from: left_elbow_flexion}]", "needs 'to'"),
         ("joints: [{from: knee, to: a}]", "'knee'.* torso_y"),
         ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite number"),
         (

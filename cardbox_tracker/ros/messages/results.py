@@ -75,6 +75,17 @@ def neck_of(message: JointState) -> FloatArray | None:
     return None if found is None else _finite(found, "joint states")
 
 
+def posture_and_neck_of(message: JointState) -> FloatArray:
+    """Return the posture, and the neck if it is there, or their deviations; (12,) or (14,).
+
+    Raises:
+        NotFiniteError: a value is not a finite number.
+        CardboxError: a joint is missing, or the numbers of names and values differ.
+    """
+    posture, neck = posture_of(message), neck_of(message)
+    return posture if neck is None else np.concatenate([posture, neck])
+
+
 def points_message(header: Header, points: Points) -> PoseArray:
     """Return points, metres in the frame of ``header``, as poses without rotation.
 

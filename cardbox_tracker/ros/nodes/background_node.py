@@ -243,7 +243,9 @@ class BackgroundNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(BackgroundNode, plain_command_line("background", _DOES, args))
+    return run_node(
+        BackgroundNode, plain_command_line("background", _DOES, BackgroundParameters, args)
+    )
 
 
 if __name__ == "__main__":

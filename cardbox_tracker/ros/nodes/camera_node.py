@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.files import user_path
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import node_help
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run_node
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
@@ -224,7 +225,9 @@ def main(args: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="camera",
         description="Publish a V4L2 device or a video file.",
-        epilog="Everything else is a parameter: camera --ros-args -p device:=/dev/video0.",
+        **node_help(
+            "camera", CameraParameters, "Everything else is a ROS argument: -p device:=/dev/video0."
+        ),
     )
     parser.add_argument("--list", action="store_true", help="list devices and modes, and exit")
     if parser.parse_args(own_arguments(command_line)).list:

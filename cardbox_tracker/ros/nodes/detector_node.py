@@ -174,7 +174,7 @@ class DetectorNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(DetectorNode, plain_command_line("detector", _DOES, args))
+    return run_node(DetectorNode, plain_command_line("detector", _DOES, DetectorParameters, args))
 
 
 if __name__ == "__main__":

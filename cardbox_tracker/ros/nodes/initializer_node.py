@@ -290,7 +290,7 @@ class GuideOutputs:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    command_line = plain_command_line("initializer", _DOES, args)
+    command_line = plain_command_line("initializer", _DOES, InitializerParameters, args)
     # The tracker, which gets the same silhouettes, has priority.
     os.nice(5)
     return run_node(InitializerNode, command_line)

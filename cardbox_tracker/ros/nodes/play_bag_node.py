@@ -31,6 +31,7 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_topics import find_topics
 from cardbox_tracker.ros.messages.types import message_classes
 from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.command_line import node_help
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
 from cardbox_tracker.ros.runtime.parameter_fields import AT_START, NodeParameters, parameter
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
@@ -255,8 +256,9 @@ def overrides_from(arguments: list[str]) -> list[Parameter]:
     parser = argparse.ArgumentParser(
         prog="play_bag",
         description="Play a rosbag2 recording (sqlite3 or mcap) with its original stamps.",
-        epilog="Every option is also a parameter: play_bag --ros-args -p bag:=BAG. Topics are "
-        "renamed with --ros-args -r /old:=/new.",
+        **node_help(
+            "play_bag", PlayBagParameters, "Every option is also a parameter: -p bag:=BAG."
+        ),
     )
     parser.add_argument("bag", nargs="?", help="rosbag2 folder or file")
     parser.add_argument("--rate", type=float, help="speed, 1 by default")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from builtin_interfaces.msg import Duration
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -18,10 +19,10 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.files import user_path
 from cardbox_tracker.retargeting.config import RetargetConfig
-from cardbox_tracker.retargeting.retargeter import Command
+from cardbox_tracker.retargeting.retargeter import MOVING, Command
 from cardbox_tracker.retargeting.setup import make_retargeter
 from cardbox_tracker.ros.messages import conversions
-from cardbox_tracker.ros.messages.results import posture_of
+from cardbox_tracker.ros.messages.results import posture_and_neck_of
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
@@ -62,6 +63,7 @@ class RetargetParameters(NodeParameters):
     side: str = _fixed("side")
     max_speed: float = _fixed("max_speed")
     max_stddev_rad: float = _fixed("max_stddev_rad")
+    rate_hz: float = _fixed("rate_hz")
     longest_step_s: float = _fixed("longest_step_s")
     reach: float = _fixed("reach")
     mount_roll_deg: float = _fixed("mount_roll_deg")
@@ -94,7 +96,7 @@ class RetargetNode(CardboxNode):
         self._body: BodyModel | None = None
         self._state, self._status = "", ""
         self._joints = JointState()
-        self._heard_s = time.monotonic()
+        self._heard_ns, self._stamp_ns = _now_ns(), 0
         self._trajectory = self.advertise(JointTrajectory, "retarget/joint_trajectory", qos.RESULT)
         self._commands = self.advertise(Float64MultiArray, "retarget/commands", qos.RESULT)
         self._robot_joints = self.advertise(JointState, "retarget/joint_states", qos.RESULT)
@@ -107,6 +109,7 @@ class RetargetNode(CardboxNode):
         self.subscribe(JointState, "joint_states", self._on_joints, qos.RESULT)
         self.subscribe(JointState, "joint_states_stddev", self._on_stddev, qos.RESULT)
         self.create_timer(_CHECK_S, self._check)
+        self.create_timer(1.0 / settings.rate_hz, self._stream)
         self.diagnostics.source = f"postures on {self._joints_topic}"
         self.diagnostics.wait_for(f"postures on {self._joints_topic} (is the tracker running?)")
 
@@ -129,43 +132,68 @@ class RetargetNode(CardboxNode):
         stamp_ns = conversions.stamp_ns(message.header.stamp)
         if not self.diagnostics.input.add(stamp_ns).is_usable:
             return
-        now_s = time.monotonic()
         # Stamps may run faster than the robot's own time, which its speed is about.
-        waited_s, self._heard_s = now_s - self._heard_s, now_s
-        posture, stddev = posture_of(self._joints), posture_of(message)
+        self._heard_ns, self._stamp_ns = _now_ns(), stamp_ns
+        posture, stddev = posture_and_neck_of(self._joints), posture_and_neck_of(message)
         command = self._retargeter.update(
-            stamp_ns, self._state, self._body, posture, stddev, waited_s
+            stamp_ns, self._state, self._body, posture, stddev, self._heard_ns
         )
-        self._send(command, message.header)
+        self._send(command)
         self.diagnostics.working(sent_ns)
 
     def _check(self) -> None:
-        if time.monotonic() > self._heard_s + self._timeout_s:
+        if _now_ns() > self._heard_ns + self._timeout_s * 1e9:
             self._hold(f"no posture for {self._timeout_s:g} s")
 
     def _hold(self, reason: str) -> None:
-        """Send the current positions once, so that the robot stands still."""
-        command = self._retargeter.hold(reason)
+        """Let the robot stand still where it is, and say so once."""
+        command = self._retargeter.hold(reason, _now_ns())
         if command.status != self._status:
-            self._send(command, Header())
+            self._send(command)
 
-    def _send(self, command: Command, header: Header) -> None:
-        names, positions = list(self._retargeter.joints), command.positions.tolist()
+    def _send(self, command: Command) -> None:
+        """Send the goal of an image, and once that the robot stands still."""
         nanoseconds = round(command.duration_s * 1e9)
         duration = Duration(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
-        point = JointTrajectoryPoint(positions=positions, time_from_start=duration)
+        # A velocity at the end would be refused by joint_trajectory_controller.
+        point = JointTrajectoryPoint(positions=command.positions.tolist(), time_from_start=duration)
         # A trajectory without a stamp begins at once; the stamp of the image has passed.
+        names = list(self._retargeter.joints)
         self._trajectory.publish(JointTrajectory(joint_names=names, points=[point]))
-        self._commands.publish(Float64MultiArray(data=positions))
-        self._robot_joints.publish(JointState(header=header, name=names, position=positions))
         if command.status != self._status:
             self._status = command.status
             self._says.publish(String(data=command.status))
+        if not command.is_moving:
+            self._send_moment()
+
+    def _stream(self) -> None:
+        if self._status == MOVING:
+            self._send_moment()
+
+    def _send_moment(self) -> None:
+        """Send where the robot is on its way, and how fast."""
+        now_ns = _now_ns()
+        positions, velocities = (part.tolist() for part in self._retargeter.at(now_ns))
+        header = Header()
+        if self._stamp_ns:
+            # The recording's time goes on from the image.
+            stamp = Time(nanoseconds=self._stamp_ns + now_ns - self._heard_ns)
+            header.stamp = stamp.to_msg()
+        self._commands.publish(Float64MultiArray(data=positions))
+        names = list(self._retargeter.joints)
+        self._robot_joints.publish(
+            JointState(header=header, name=names, position=positions, velocity=velocities)
+        )
+
+
+def _now_ns() -> int:
+    """Return the time of the robot's clock, ns."""
+    return round(time.monotonic() * 1e9)
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(RetargetNode, plain_command_line("retarget", _DOES, args))
+    return run_node(RetargetNode, plain_command_line("retarget", _DOES, RetargetParameters, args))
 
 
 if __name__ == "__main__":

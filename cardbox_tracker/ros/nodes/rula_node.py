@@ -149,7 +149,7 @@ def _report_message(message: JointState, scores: ScoreDistribution, name: str) -
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(RulaNode, plain_command_line("rula", _DOES, args))
+    return run_node(RulaNode, plain_command_line("rula", _DOES, RulaParameters, args))
 
 
 if __name__ == "__main__":

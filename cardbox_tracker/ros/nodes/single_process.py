@@ -115,7 +115,8 @@ def source_from(arguments: Sequence[str]) -> str | None:
         prog="cardbox_nodes",
         description="background, initializer and tracker in one process.",
         epilog="Parameters of one node: --ros-args -p tracker:preset:=paper, or a YAML file with "
-        "--params-file; the bag of play_bag: -p play_bag:bag:=BAG.",
+        "--params-file; the bag of play_bag: -p play_bag:bag:=BAG. The help of each node, such as "
+        "'tracker --help', lists its parameters and topics.",
     )
     parser.add_argument(
         "--with", dest="source", choices=SOURCES, help="also the source of the images"

@@ -182,7 +182,9 @@ class StereoDepthNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(StereoDepthNode, plain_command_line("stereo_depth", _DOES, args))
+    return run_node(
+        StereoDepthNode, plain_command_line("stereo_depth", _DOES, StereoDepthParameters, args)
+    )
 
 
 if __name__ == "__main__":

@@ -168,7 +168,7 @@ class TrackerNode(CardboxNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node; the exit code is 0 unless it could not start."""
-    return run_node(TrackerNode, plain_command_line("tracker", _DOES, args))
+    return run_node(TrackerNode, plain_command_line("tracker", _DOES, TrackerParameters, args))
 
 
 if __name__ == "__main__":

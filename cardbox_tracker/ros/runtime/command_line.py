@@ -1,30 +1,86 @@
-"""Command line of a node that has only parameters: it prints help and refuses other arguments."""
+"""Command lines of the nodes, and help with all parameters, topics and services of a node."""
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
+import textwrap
+from collections.abc import Iterator
+from typing import Any
 
+from cardbox_tracker.ros.runtime.interface import SERVICE, Entry, entries
 from cardbox_tracker.ros.runtime.node import own_arguments
+from cardbox_tracker.ros.runtime.parameter_fields import NodeParameters
+from cardbox_tracker.ros.runtime.parameter_text import default_of, details, type_name, yaml_value
+
+_WIDTH = 96
+_LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 
 
-def plain_command_line(name: str, does: str, args: list[str] | None) -> list[str]:
+def plain_command_line(
+    name: str, does: str, parameters: type[NodeParameters], args: list[str] | None
+) -> list[str]:
     """Return the complete command line of the node ``name``, which has only ROS arguments.
 
     Args:
         name: name of the executable.
         does: sentence for the help.
+        parameters: the node's parameters, for the help.
         args: arguments after the name; None for those of this process.
 
     Raises:
         SystemExit: there are other arguments (code 2), or help was requested (code 0).
     """
     command_line = list(sys.argv) if args is None else [name, *args]
+    words = f"Everything else is a ROS argument: {name} --ros-args -p PARAMETER:=VALUE."
     parser = argparse.ArgumentParser(
-        prog=name,
-        description=does,
-        epilog=f"Everything else is a ROS argument: {name} --ros-args -p PARAMETER:=VALUE, with "
-        "the parameters of docs/parameters.md, and -r TOPIC:=ANOTHER.",
+        prog=name, description=does, **node_help(name, parameters, words)
     )
     parser.parse_args(own_arguments(command_line))
     return command_line
+
+
+def node_help(name: str, parameters: type[NodeParameters], words: str) -> dict[str, Any]:
+    """Return arguments of an ArgumentParser whose help ends with what the node has.
+
+    Args:
+        name: name of the node.
+        parameters: its parameters.
+        words: sentence before the lists.
+    """
+    lines = [*textwrap.wrap(words, _WIDTH), *_parameters(parameters), *_topics(entries(name))]
+    # The parser takes a percent sign for a place of its own.
+    text = "\n".join(lines).replace("%", "%%")
+    return {"epilog": text, "formatter_class": argparse.RawDescriptionHelpFormatter}
+
+
+def _parameters(kind: type[NodeParameters]) -> Iterator[str]:
+    yield from ("", "parameters (type = default; unit; allowed values; effect of a change):")
+    types = kind.types()
+    for name, spec in kind.specs().items():
+        default = yaml_value(default_of(kind, name))
+        yield f"  {name} ({type_name(types[name])} = {default}; {details(spec)})"
+        yield from _indented(spec.description)
+
+
+def _topics(found: list[Entry]) -> Iterator[str]:
+    topics = [entry for entry in found if entry.direction != SERVICE]
+    services = [entry for entry in found if entry.direction == SERVICE]
+    yield from ("", "topics (direction, name, type, quality of service):")
+    for entry in topics:
+        case = f" [{entry.case}]" if entry.case else ""
+        yield f"  {entry.direction:3} {entry.name} ({entry.type}; {entry.qos}){case}"
+        yield from _indented(entry.content)
+    if services:
+        yield from ("", "services:")
+    for entry in services:
+        yield f"  {entry.name} ({entry.type})"
+        yield from _indented(entry.content)
+
+
+def _indented(text: str) -> list[str]:
+    """Return lines of a phrase without the marks of Markdown."""
+    plain = _LINK.sub(r"\1", text).replace("`", "")
+    margin = " " * 6
+    return textwrap.wrap(plain, _WIDTH, initial_indent=margin, subsequent_indent=margin)

@@ -17,10 +17,12 @@ from std_msgs.msg import String  # noqa: E402
 from cardbox_tracker.body.model_file import dumps_body_model  # noqa: E402
 from cardbox_tracker.body.proportions import body_from_proportions  # noqa: E402
 from cardbox_tracker.errors import CardboxError  # noqa: E402
+from cardbox_tracker.retargeting.robot import load_robot  # noqa: E402
 from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 
 CONFIG = Path(__file__).parents[3] / "config"
 MODEL = String(data=dumps_body_model(body_from_proportions(1.75, 2.0, 0.4, 0.0)))
+ARM = CONFIG / "example_arm.urdf"
 COMMANDS, SAID = "/retarget/commands", "/retarget/status"
 
 
@@ -44,7 +46,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 def robot(bus: Any, clock: Clock) -> Any:
     """Return the bus of a node that moves an arm."""
     joint_map = str(CONFIG / "example_joint_map.yaml")
-    bus.start(RetargetNode, robot_file=str(CONFIG / "example_arm.urdf"), joint_map_file=joint_map)
+    bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map)
     bus.send("/body_model", MODEL)
     return bus
 
@@ -60,23 +62,28 @@ def send(robot: Any, joints: Any, clock: Clock) -> Callable[..., None]:
         robot.send("/tracking_state", String(data=state))
         robot.send("/joint_states", joints(tenth, {"right_shoulder_abduction": 1.0}))
         robot.send("/joint_states_stddev", joints(tenth, {}, other=deviation))
+        robot.tick()
 
     return hand_over
 
 
-def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(robot: Any, send: Any) -> None:
+def test_an_arm_moves_at_its_speed_and_stops_when_the_person_is_lost(
+    robot: Any, send: Any, clock: Clock
+) -> None:
     for tenth in range(3):
         send(tenth)
     moved = np.array([data.tolist() for data in robot.texts(COMMANDS)])
-    np.testing.assert_allclose(moved, [[0, 0, 0], [-0.1, 0, 0], [-0.2, 0, 0]], atol=1e-12)
+    # The way of each image begins when it comes.
+    np.testing.assert_allclose(moved[:, 0], [0, 0, -0.1], atol=1e-9)
+    clock.now_s += 0.05
     robot.send("/tracking_state", String(data="lost"))
     robot.send("/tracking_state", String(data="lost"))
     assert robot.texts(SAID) == ["moving", "frozen: lost"]
     assert len(robot.sent[COMMANDS]) == 4  # the command to stand still is sent once
-    assert robot.texts(COMMANDS)[-1].tolist() == pytest.approx([-0.2, 0, 0])
+    assert robot.texts(COMMANDS)[-1].tolist() == pytest.approx([-0.15, *[0] * 6])
     last = robot.sent["/retarget/joint_trajectory"][-1]
-    assert last.joint_names == ["shoulder_roll", "shoulder_pitch", "elbow_pitch"]
-    assert last.points[0].positions.tolist() == pytest.approx([-0.2, 0, 0])
+    assert last.joint_names == list(load_robot(ARM).chain("hand_link"))
+    assert last.points[0].positions.tolist() == pytest.approx([-0.15, *[0] * 6])
     assert (last.header.stamp.sec, last.header.stamp.nanosec) == (0, 0)
 
 
@@ -84,7 +91,7 @@ def test_an_uncertain_posture_moves_nothing(robot: Any, send: Any) -> None:
     send(0)
     send(1, deviation=2.0)
     send(2, state="uncertain")
-    assert {tuple(data) for data in robot.texts(COMMANDS)} == {(0.0, 0.0, 0.0)}
+    assert {tuple(data) for data in robot.texts(COMMANDS)} == {(0.0,) * 7}
     assert robot.texts(SAID) == ["moving", "frozen: too uncertain", "frozen: uncertain"]
 
 
@@ -97,11 +104,40 @@ def test_silence_is_a_dead_man_too(robot: Any, send: Any, clock: Clock) -> None:
     assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
 
 
+def test_the_way_between_two_images_has_the_rate_of_the_robot(
+    robot: Any, send: Any, clock: Clock
+) -> None:
+    for tenth in range(2):
+        send(tenth)
+    robot.sent["/retarget/joint_states"].clear()
+    for _ in range(6):
+        clock.now_s += 0.02
+        robot.tick()
+    sent = robot.sent["/retarget/joint_states"]
+    assert [message.position[0] for message in sent] == pytest.approx(
+        [-0.02, -0.04, -0.06, -0.08, -0.1, -0.1]
+    )
+    assert [message.velocity[0] for message in sent] == pytest.approx([-1.0] * 4 + [0.0] * 2)
+    # The stamps go on from that of the image.
+    seconds = [m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for m in sent]
+    assert np.diff(seconds) == pytest.approx([0.02] * 5)
+
+
+def test_the_rate_is_a_parameter(bus: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    periods: list[float] = []
+    monkeypatch.setattr(
+        RetargetNode, "create_timer", lambda _, period_s, *__, **___: periods.append(period_s)
+    )
+    joint_map = str(CONFIG / "example_joint_map.yaml")
+    bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map, rate_hz=200.0)
+    assert 1 / 200 in periods
+
+
 STAYS = "An arm stops with its input and stays where it is; no stamp makes it faster"
 
 
 def positions(robot: Any) -> np.ndarray:
-    """Return all commanded positions (n, 3)."""
+    """Return all commanded positions (n, 7)."""
     return np.array([data.tolist() for data in robot.texts(COMMANDS)])
 
 
@@ -115,6 +151,8 @@ def test_an_arm_stops_with_its_input_and_stays(
     (point,) = robot.sent["/retarget/joint_trajectory"][-1].points
     reached_s = point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec
     assert reached_s <= 0.1 + 1e-9
+    clock.now_s += 0.1
+    robot.tick()
     stopped = positions(robot)[-1]
     assert stopped[0] == pytest.approx(-0.3)
     for _ in range(600):
@@ -123,7 +161,7 @@ def test_an_arm_stops_with_its_input_and_stays(
         else:
             clock.now_s += 0.1
         robot.tick()
-    assert (positions(robot)[4:] == stopped).all()
+    assert (positions(robot)[5:] == stopped).all()
     assert robot.texts(SAID) == ["moving", "frozen: no posture for 0.5 s"]
     send(700)  # the first image after silence moves nothing
     assert (positions(robot)[-1] == stopped).all()

@@ -9,6 +9,8 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from cardbox_tracker.ros.runtime.command_line import plain_command_line
+from cardbox_tracker.ros.runtime.interface import entries
+from tools.parameter_docs import NODES as PARAMETERS
 
 NODES = ("background", "initializer", "tracker")
 
@@ -28,6 +30,39 @@ def test_a_node_explains_or_refuses_what_it_was_given(
     assert ("--ros-args -p" if code == 0 else word) in text
 
 
+def help_of(name: str, capsys: pytest.CaptureFixture[str]) -> str:
+    module = importlib.import_module(f"cardbox_tracker.ros.nodes.{name}_node")
+    with pytest.raises(SystemExit) as ended:
+        module.main(["--help"])
+    assert ended.value.code == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_the_help_has_every_parameter_topic_and_service(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = help_of(name, capsys)
+    words = " ".join(text.split())
+    kind = PARAMETERS[name]
+    for parameter, spec in kind.specs().items():
+        (line,) = (line for line in text.splitlines() if line.startswith(f"  {parameter} ("))
+        assert spec.unit in line and spec.range_text in line
+        assert " ".join(spec.description.split()) in words
+    assert entries(name)
+    for entry in entries(name):
+        assert f" {entry.name} ({entry.type}" in text
+    assert "](" not in text and max(map(len, text.splitlines())) <= 200
+
+
+def test_the_help_of_the_tracker_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    text = help_of("tracker", capsys)
+    assert "  lost_iou (float = 0.4; 0 to 1; live: next image)\n      least IoU of" in text
+    assert "  in  silhouette (sensor_msgs/Image; reliable, 5)\n      of the background node" in text
+    assert "  out joint_states_stddev (sensor_msgs/JointState; reliable, 10)\n" in text
+    assert "  tracker/reset (std_srvs/Trigger)\n      start again from" in text
+
+
 def test_arguments_of_ros_are_passed_on() -> None:
-    given = ["--ros-args", "-p", "seed:=1"]
-    assert plain_command_line("tracker", "It tracks.", given) == ["tracker", *given]
+    given, kind = ["--ros-args", "-p", "seed:=1"], PARAMETERS["tracker"]
+    assert plain_command_line("tracker", "It tracks.", kind, given) == ["tracker", *given]
