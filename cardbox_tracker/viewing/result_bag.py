@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
 from cardbox_tracker.recordings.result_reader import (
     MODEL,
     joints_of,
     namespace_of,
+    points_of,
 )
 from cardbox_tracker.viewing.feed import Feed
 from cardbox_tracker.vision.encodings import decode_bgr, image_parts
@@ -60,7 +59,7 @@ def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
         space + "/tracking_state": lambda m, c: feed.state(m.time_ns, str(c.data)),
         space + _JOINTS: lambda _, c: feed.joints(stamp_ns_of(c), joints_of(c)),
         space + "/joint_states_stddev": lambda _, c: feed.deviations(stamp_ns_of(c), joints_of(c)),
-        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
+        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), points_of(c)),
         space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
     }
 
@@ -78,8 +77,3 @@ def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
             stamp_ns_of(c), name, joints_of(c)
         )
     return handlers
-
-
-def _points(message: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
-    return np.array(points, np.float64).reshape(-1, 3)
