@@ -57,6 +57,7 @@ def run(options: argparse.Namespace) -> None:
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.estimation.estimate import UNCERTAIN
     from cardbox_tracker.exporting.formats import FORMATS
+    from cardbox_tracker.exporting.placed import images_of_body
     from cardbox_tracker.recordings.motion_reader import read_motion
 
     chosen = FORMATS[options.to]
@@ -66,12 +67,17 @@ def run(options: argparse.Namespace) -> None:
     given = None if options.model is None else load_body_model(options.model)
     motion, recorded = read_motion(options.results)
     body = given or recorded
-    chosen.write(output, motion, body)
     images, seen = len(motion.state), int(motion.is_seen.sum())
+    if body is not None and chosen.has_places:
+        motion = images_of_body(motion, body)
+    chosen.write(output, motion, body)
     print(
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
         f"{images - seen} without a posture are gaps"
     )
+    others = seen - int(motion.is_seen.sum())
+    if others:
+        print(f"{others} of these images were tracked with another body and are gaps, too")
     if body is None and chosen.has_places:
         print("the camera is taken as level; --model gives its pitch")
     print(f"wrote {output}")

@@ -90,9 +90,6 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
 
     Each has the shape (n, number of channels), metres and degrees. A gap repeats the posture
     before it, or the first one.
-
-    Raises:
-        CardboxError: the motion is not that of ``body``.
     """
     frames = frames_of(motion, body)
     parts = body_parts(body.sizes)
@@ -135,8 +132,7 @@ def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
     """Write the skeleton and its motion at a constant rate.
 
     Raises:
-        CardboxError: the body is not known, the file cannot be written, or the motion is not that
-            of ``body``.
+        CardboxError: the body is not known, or the file cannot be written.
     """
     if body is None:
         raise CardboxError(

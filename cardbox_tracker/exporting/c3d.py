@@ -39,8 +39,7 @@ def write_c3d(path: Path, motion: Motion, body: BodyModel | None) -> None:
     Points in gaps have the residual -1, which the format defines as invalid.
 
     Raises:
-        CardboxError: ezc3d is missing, the file cannot be written, or the motion is not that of
-            ``body``.
+        CardboxError: ezc3d is missing, or the file cannot be written.
     """
     even = motion.evenly()
     names, points_m = markers_of(even, body)

@@ -40,9 +40,6 @@ def markers_of(motion: Motion, body: BodyModel | None) -> Markers:
     Args:
         motion: the results.
         body: the person that was tracked; without it the camera is taken as level.
-
-    Raises:
-        CardboxError: the motion is not that of ``body``.
     """
     names: tuple[str, ...] = KEYPOINT_MARKERS
     points_m = keypoints_in_reference(motion, body)
@@ -57,7 +54,7 @@ def write_trc(path: Path, motion: Motion, body: BodyModel | None) -> None:
     """Write the markers as TRC in metres, with a row for each image; gaps are empty.
 
     Raises:
-        CardboxError: the file cannot be written, or the motion is not that of ``body``.
+        CardboxError: the file cannot be written.
     """
     names, points_m = markers_of(motion, body)
     rate, count = f"{motion.rate_hz:g}", str(len(points_m))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cardbox_tracker.body.kinematics import (
@@ -38,34 +40,52 @@ def keypoints_in_reference(motion: Motion, body: BodyModel | None) -> FloatArray
 
 
 def frames_of(motion: Motion, body: BodyModel) -> BodyFrames:
-    """Return the frames of the body's parts in each image, with the shoulders of the motion.
+    """Return the frames of the body's parts in each image, with the shoulders of the motion."""
+    frames = _modelled(motion, body)
+    return with_shoulders(frames, keypoints_in_reference(motion, body)[:, SHOULDERS])
+
+
+def images_of_body(motion: Motion, body: BodyModel) -> Motion:
+    """Return the motion with gaps where an image was tracked with another body.
+
+    A tracker that fits guessed sizes to the person begins with others, and may fit them again.
 
     Raises:
-        CardboxError: the motion is not that of ``body``.
+        CardboxError: most images were tracked with another body.
     """
     keypoints_m = keypoints_in_reference(motion, body)
+    modelled = _modelled(motion, body)
+    frames = frames_of(motion, body)
+    ends_m = np.stack([*frames.left[1:3], *frames.right[1:3]], axis=1)
+    apart_m = _largest(ends_m - keypoints_m[:, _ENDS])
+    shoulders_m = np.stack([modelled.left.shoulder, modelled.right.shoulder], axis=1)
+    lift_m = _largest(shoulders_m - keypoints_m[:, SHOULDERS])
+    is_other = motion.is_seen & ((apart_m > _MOST_APART_M) | (lift_m > _MOST_LIFT_M))
+    if 2 * is_other.sum() > motion.is_seen.sum():
+        raise CardboxError(
+            f"the results are not those of the given body: joints differ by {max(apart_m):.3f} m, "
+            f"shoulders by {max(lift_m):.3f} m; give the model with which they were tracked (with "
+            "--stature that is OUT.body.yaml), or a bag of results, which contains it"
+        )
+    return replace(
+        motion,
+        states=np.where(is_other[:, None], np.nan, motion.states),
+        keypoints_m=np.where(is_other[:, None, None], np.nan, motion.keypoints_m),
+    )
+
+
+def _modelled(motion: Motion, body: BodyModel) -> BodyFrames:
+    """Return the frames of the body's parts with the shoulders of hanging arms."""
     frames = forward_kinematics(body, motion.states[:, POSTURE])
     moved = np.zeros((len(motion.states), 3))
     moved[:, 0], moved[:, 2] = motion.states[:, TORSO_X], motion.states[:, TORSO_Z]
-    frames = frames._replace(
+    shoulders_m = np.stack([frames.left.shoulder, frames.right.shoulder], axis=1)
+    return with_shoulders(frames, shoulders_m + moved[:, None])._replace(
         hip=frames.hip + moved, neck=frames.neck + moved, head=frames.head + moved
     )
-    modelled_m = np.stack([frames.left.shoulder, frames.right.shoulder], 1) + moved[:, None]
-    frames = with_shoulders(frames, keypoints_m[:, SHOULDERS])
-    ends_m = np.stack([*frames.left[1:3], *frames.right[1:3]], axis=1)
-    apart_m = _largest(ends_m - keypoints_m[:, _ENDS])
-    lift_m = _largest(modelled_m - keypoints_m[:, SHOULDERS])
-    if apart_m > _MOST_APART_M or lift_m > _MOST_LIFT_M:
-        raise CardboxError(
-            f"the results are not those of the given body: joints differ by {apart_m:.3f} m, "
-            f"shoulders by {lift_m:.3f} m; give the model with which they were tracked (with "
-            "--stature that is OUT.body.yaml), or a bag of results, which contains it"
-        )
-    return frames
 
 
-def _largest(differences_m: FloatArray) -> float:
-    """Return the largest length of vectors (n, k, 3) that are known, or 0."""
-    lengths = np.linalg.norm(differences_m, axis=-1)
-    known = lengths[np.isfinite(lengths)]
-    return float(known.max(initial=0.0))
+def _largest(differences_m: FloatArray) -> FloatArray:
+    """Return the largest length of the vectors (n, k, 3) of each image, (n,); 0 in gaps."""
+    lengths: FloatArray = np.nan_to_num(np.linalg.norm(differences_m, axis=-1))
+    return np.asarray(lengths.max(axis=1))

@@ -25,6 +25,7 @@ from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace
 from cardbox_tracker.recordings.result_table import PARQUET, pyarrow_or_error
 
 _STATE, _JOINTS, _KEYPOINTS = "/tracking_state", "/joint_states", "/keypoints"
+_STDDEV = "/joint_states_stddev"
 _STATES = tuple(f"{name}_{unit_of(name)}" for name in (*JOINT_NAMES, *PLACE_NAMES))
 _POINTS = tuple(f"{name}_{axis}_m" for name in KEYPOINT_NAMES for axis in "xyz")
 _NECK = tuple(f"{name}_rad" for name in NECK_NAMES)
@@ -153,7 +154,7 @@ def _check(path: Path, names: Sequence[str]) -> None:
 def _bag_rows(path: Path) -> tuple[list[_Row], BodyModel | None]:
     with BagReader(path) as bag:
         space = namespace_of(bag)
-        topics = [space + name for name in (MODEL, _STATE, _JOINTS, _KEYPOINTS)]
+        topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS)]
         read = _Results()
         for message in bag.messages([topic for topic in topics if topic in bag.topics]):
             content = bag.deserialize(message)
@@ -192,7 +193,11 @@ class _Results:
             self._found[stamp_ns_of(message)] = self._state, values
         elif stamp_ns_of(message) in self._found:
             values = self._found[stamp_ns_of(message)][1]
-            values[N_STATE + 2 :] = points_of(message).reshape(len(_POINTS))
+            if topic == _KEYPOINTS:
+                values[N_STATE + 2 :] = points_of(message).reshape(len(_POINTS))
+            elif neck_from(joints_of(message)) is None:
+                # The joint states have a straight neck where the face is not seen.
+                values[N_STATE : N_STATE + 2] = np.nan
 
     def rows(self) -> list[_Row]:
         """Return the rows in order of time; their seconds count from the first one."""
