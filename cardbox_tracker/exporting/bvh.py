@@ -148,7 +148,7 @@ def write_bvh(path: Path, motion: Motion, body: BodyModel | None) -> None:
     ]
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write("HIERARCHY\n" + "\n".join(_hierarchy(root, 0)) + "\n")
-        file.write(f"MOTION\nFrames: {len(even.states)}\nFrame Time: {1 / even.rate_hz:.7f}\n")
+        file.write(f"MOTION\nFrames: {len(even.states)}\nFrame Time: {1 / even.rate_hz:.10f}\n")
         for row in np.hstack(columns):
             file.write(" ".join(f"{value:.6f}" for value in row) + "\n")
 

@@ -47,6 +47,22 @@ def test_joints_are_where_the_table_has_them(
     assert found["Hips"] @ TO_LABORATORY.T == pytest.approx(expected_m[:, 6], abs=1e-3)
 
 
+def test_a_lifted_shoulder_does_not_turn_the_arm(
+    motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
+) -> None:
+    write_bvh(tmp_path / "a.bvh", motion_of(np.zeros(14), body, (0.3, 0.2)), body)
+    found = joints_of_bvh(tmp_path / "a.bvh")
+    inner_m = (0.5 - 0.43) * body.size("shoulder_breadth")
+    for side, sign, lift in (("Left", 1, 0.3), ("Right", -1, 0.2)):
+        clavicle_m = 0.43 * body.size("shoulder_breadth")
+        raised = found[f"{side}Arm"] - found[f"{side}Shoulder"]
+        expected = sign * clavicle_m * np.cos(lift), clavicle_m * np.sin(lift), 0.0
+        assert raised[0] == pytest.approx(np.array(expected), abs=1e-5)
+        assert found[f"{side}Shoulder"][0, 0] == pytest.approx(sign * inner_m, abs=1e-5)
+        down = found[f"{side}ForeArm"] - found[f"{side}Arm"]
+        assert down[0] == pytest.approx([0, -body.size("upper_arm_length"), 0], abs=1e-5)
+
+
 def test_bones_are_those_of_the_body_and_angles_those_of_the_table(
     motion_of: Callable, joints_of_bvh: Callable, body: BodyModel, tmp_path: Path
 ) -> None:
