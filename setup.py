@@ -16,6 +16,7 @@ LEARN = ["scikit-learn>=1.4,<2", "torch>=2.2,<3"]
 EXPERIMENTS = ["joblib>=1.3,<2"]
 TEST = [
     *EXPERIMENTS,
+    "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
     "hypothesis>=6.100",
     "mcap>=1.2",
@@ -36,6 +37,8 @@ VIEW = ["rerun-sdk>=0.41,<0.42"]
 RETARGET = ["daqp>=0.5,<1", "pin>=3.4,<5", "pin-pink>=4,<5"]
 # Writes tables of results in Parquet; what is used of it has not changed for many versions.
 PARQUET = ["pyarrow>=15,<30"]
+# Writes results as C3D; the other formats of 'cardbox export' need no library.
+EXPORT = ["ezc3d>=1.5,<2"]
 # Runs the networks of the person detector; 'cardbox detector --install' gets their files.
 DETECTOR = ["ai-edge-litert>=1.4,<3"]
 # Builds the site of the documents.
@@ -103,6 +106,7 @@ setup(
         "detector": DETECTOR,
         "parquet": PARQUET,
         "docs": DOCS,
+        "export": EXPORT,
     },
     entry_points={
         "console_scripts": [

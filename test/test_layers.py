@@ -21,7 +21,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("vision", "description"),
     ("detection",),
     ("estimation",),
-    ("ergonomics", "retargeting"),
+    ("ergonomics", "exporting", "retargeting"),
     ("drawing",),
     ("keypoint_status",),
     ("outputs",),

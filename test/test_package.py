@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
 CORE = (
     *("body", "vision", "detection", "estimation", "description", "ergonomics", "retargeting"),
-    "drawing",
+    *("drawing", "exporting"),
 )
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))
 OUTER = (

@@ -64,6 +64,12 @@ def joints_of(message: Any) -> JointValues:
     return JointValues(tuple(message.name), np.array(message.position, np.float64))
 
 
+def points_of(message: Any) -> FloatArray:
+    """Return the positions (n, 3), metres, of a PoseArray."""
+    points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
+    return np.array(points, np.float64).reshape(-1, 3)
+
+
 def read_results(bag: BagReader) -> Iterator[Result]:
     """Yield the result of each image in order.
 

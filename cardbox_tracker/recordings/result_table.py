@@ -89,7 +89,7 @@ def check_table(path: Path) -> None:
         CardboxError: ``path`` ends in .parquet, and pyarrow is missing.
     """
     if path.suffix == PARQUET:
-        _pyarrow()
+        pyarrow_or_error()
 
 
 @contextmanager
@@ -107,7 +107,7 @@ def result_table(
     """
     names = columns(has_points)
     if path.suffix == PARQUET:
-        arrow, parquet = _pyarrow()
+        arrow, parquet = pyarrow_or_error()
         rows: list[list[Cell]] = []
         with atomic_path(path) as temporary:
             yield lambda frame, estimate: rows.append(
@@ -133,7 +133,12 @@ def _text(cell: Cell) -> str:
     return f"{cell:.6f}" if isinstance(cell, float) else str(cell)
 
 
-def _pyarrow() -> tuple[Any, Any]:
+def pyarrow_or_error() -> tuple[Any, Any]:
+    """Return the modules pyarrow and pyarrow.parquet.
+
+    Raises:
+        CardboxError: they are not installed.
+    """
     try:
         import pyarrow
         import pyarrow.parquet

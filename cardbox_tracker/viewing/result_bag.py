@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.recordings.bag_reader import BagMessage, BagReader, stamp_ns_of
 from cardbox_tracker.recordings.result_reader import (
     MODEL,
     joints_of,
     namespace_of,
+    points_of,
 )
 from cardbox_tracker.viewing.feed import Feed
 from cardbox_tracker.vision.encodings import decode_bgr, image_parts
@@ -63,7 +62,7 @@ def _handlers(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
         space + "/keypoint_states": lambda _, c: feed.keypoint_states(
             stamp_ns_of(c), [str(one.message) for one in c.status]
         ),
-        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), _points(c)),
+        space + "/keypoints": lambda _, c: feed.keypoints(stamp_ns_of(c), points_of(c)),
         space + "/overlay": lambda _, c: feed.image(stamp_ns_of(c), decode_bgr(*image_parts(c))),
     }
 
@@ -81,8 +80,3 @@ def _robots(bag: BagReader, feed: Feed, space: str) -> dict[str, Handler]:
             stamp_ns_of(c), name, joints_of(c)
         )
     return handlers
-
-
-def _points(message: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    points = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
-    return np.array(points, np.float64).reshape(-1, 3)

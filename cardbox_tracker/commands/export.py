@@ -1,0 +1,83 @@
+"""``cardbox export``: results as files of other programs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from cardbox_tracker.commands.output_paths import add_force, check_outputs
+
+NAME = "export"
+HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``cardbox export``."""
+    from cardbox_tracker.exporting.formats import FORMATS
+
+    parser.add_argument(
+        "results",
+        type=Path,
+        metavar="RESULTS",
+        help="table of 'cardbox track' (CSV or Parquet), or its bag",
+    )
+    parser.add_argument(
+        "--to",
+        choices=FORMATS,
+        required=True,
+        help="trc: markers for OpenSim and Pose2Sim; bvh: skeleton for Blender; c3d: markers, with "
+        "ezc3d; isb: CSV with joint angles by the recommendations of the ISB (docs/export.md)",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help="file to write; by default it has the name of the results and is in the current "
+        "folder",
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        default=None,
+        metavar="MODEL.yaml",
+        help="the person with whom the results were tracked, which bvh needs; trc and c3d take "
+        "the pitch of the camera from it, and get markers at hips and neck. A bag contains it",
+    )
+    add_force(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read the results and write the file.
+
+    Raises:
+        CardboxError: the results or the model cannot be read or do not belong together, a library
+            is missing, or the file cannot be written.
+    """
+    from cardbox_tracker.body.model_file import load_body_model
+    from cardbox_tracker.estimation.estimate import UNCERTAIN
+    from cardbox_tracker.exporting.formats import FORMATS
+    from cardbox_tracker.exporting.placed import images_of_body
+    from cardbox_tracker.recordings.motion_reader import read_motion
+
+    chosen = FORMATS[options.to]
+    output = options.output or Path(options.results.resolve().stem + chosen.suffix)
+    check_outputs((output,), options.force, inputs=(options.results, options.model))
+    chosen.check()
+    given = None if options.model is None else load_body_model(options.model)
+    motion, recorded = read_motion(options.results)
+    body = given or recorded
+    images, seen = len(motion.state), int(motion.is_seen.sum())
+    if body is not None and chosen.has_places:
+        motion = images_of_body(motion, body)
+    chosen.write(output, motion, body)
+    print(
+        f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "
+        f"{images - seen} without a posture are gaps"
+    )
+    others = seen - int(motion.is_seen.sum())
+    if others:
+        print(f"{others} of these images were tracked with another body and are gaps, too")
+    if body is None and chosen.has_places:
+        print("the camera is taken as level; --model gives its pitch")
+    print(f"wrote {output}")

@@ -1,0 +1,1 @@
+"""Files of a tracked motion for other programs (``docs/export.md``)."""

@@ -1,0 +1,38 @@
+"""The formats of ``cardbox export`` by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.exporting import c3d
+from cardbox_tracker.exporting.bvh import write_bvh
+from cardbox_tracker.exporting.isb import write_isb
+from cardbox_tracker.exporting.markers import write_trc
+from cardbox_tracker.exporting.motion import Motion
+
+
+class Format(NamedTuple):
+    """One format.
+
+    Attributes:
+        suffix: end of the names of its files.
+        write: writes a motion of a body to a file; the body may be unknown.
+        check: raises CardboxError if a library is missing.
+        has_places: whether it depends on the pitch of the camera.
+    """
+
+    suffix: str
+    write: Callable[[Path, Motion, BodyModel | None], None]
+    check: Callable[[], object] = lambda: None
+    has_places: bool = True
+
+
+FORMATS: dict[str, Format] = {
+    "trc": Format(".trc", write_trc),
+    "bvh": Format(".bvh", write_bvh),
+    "c3d": Format(".c3d", c3d.write_c3d, c3d.library),
+    "isb": Format(".isb.csv", write_isb, has_places=False),
+}

@@ -1,0 +1,205 @@
+"""Reads results as a motion: the table of ``cardbox track``, or a bag of results."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import loads_body_model
+from cardbox_tracker.body.neck import NECK_NAMES
+from cardbox_tracker.body.posture import JOINT_NAMES, N_STATE, PLACE_NAMES
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.errors import BagError, CardboxError, quoted
+from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
+from cardbox_tracker.exporting.motion import Motion
+from cardbox_tracker.outputs import neck_from, place_from, posture_from, unit_of
+from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
+from cardbox_tracker.recordings.open_images import is_bag
+from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
+from cardbox_tracker.recordings.result_table import PARQUET, pyarrow_or_error
+
+_STATE, _JOINTS, _KEYPOINTS = "/tracking_state", "/joint_states", "/keypoints"
+_STDDEV = "/joint_states_stddev"
+_STATES = tuple(f"{name}_{unit_of(name)}" for name in (*JOINT_NAMES, *PLACE_NAMES))
+_POINTS = tuple(f"{name}_{axis}_m" for name in KEYPOINT_NAMES for axis in "xyz")
+_NECK = tuple(f"{name}_rad" for name in NECK_NAMES)
+_NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *_POINTS)
+_VALUES = N_STATE + len(NECK_NAMES) + len(_POINTS)
+_GAP: FloatArray = np.full(_VALUES, np.nan)
+
+
+class _Row(NamedTuple):
+    """State, neck and keypoints of an image in one array (34,); nan where they are unknown."""
+
+    stamp_ns: int
+    time_s: float
+    state: str
+    values: FloatArray
+
+
+def read_motion(path: Path) -> tuple[Motion, BodyModel | None]:
+    """Return the results of a recording, and the body that a bag contains.
+
+    Images with the states ``tracking`` and ``uncertain`` have a posture, all others are gaps.
+
+    Args:
+        path: table of ``cardbox track``, or bag of ``cardbox track --bag`` or of nodes.
+
+    Raises:
+        CardboxError: the file cannot be read, or contains no results or no posture.
+    """
+    body = None
+    if not path.exists():
+        raise CardboxError(
+            f"there are no results {path}; give a table or a bag that 'cardbox track' has written"
+        )
+    if is_bag(path):
+        rows, body = _bag_rows(path)
+    elif path.is_file():
+        rows = sorted(_table_rows(path), key=lambda row: row.stamp_ns)
+    else:
+        raise CardboxError(f"{path} is no table and no bag; give the results of 'cardbox track'")
+    motion = _motion(rows)
+    if not motion.is_seen.any():
+        raise CardboxError(f"{path} has no image with a posture; track a recording of a person")
+    return motion, body
+
+
+def _motion(rows: Sequence[_Row]) -> Motion:
+    # Two results with one stamp occur in bags of several runs; the last one counts.
+    rows = list({row.stamp_ns: row for row in rows}.values())
+    values = np.array([row.values for row in rows]).reshape(-1, _VALUES)
+    states, neck, points = np.split(values, (N_STATE, N_STATE + len(NECK_NAMES)), axis=1)
+    return Motion(
+        np.array([row.stamp_ns for row in rows], np.int64),
+        np.array([row.time_s for row in rows]),
+        tuple(row.state for row in rows),
+        states,
+        neck,
+        points.reshape(-1, len(KEYPOINT_NAMES), 3),
+    )
+
+
+def _table_rows(path: Path) -> Iterator[_Row]:
+    cells = _parquet_cells(path) if path.suffix == PARQUET else _csv_cells(path)
+    for number, row in enumerate(cells, 1):
+        try:
+            yield _row_of(row)
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise CardboxError(
+                f"{path}, image {number}: {quoted(str(error))}; expected the columns of "
+                "docs/results.md with numbers: export the table as 'cardbox track' wrote it"
+            ) from None
+
+
+def _row_of(row: Mapping[str, Any]) -> _Row:
+    state = str(row["state"])
+    values = _GAP
+    if state in (TRACKING, UNCERTAIN):
+        # The face is not seen in every image, and not sought without a detector.
+        neck = ["nan" if row.get(name) in (None, "") else row[name] for name in _NECK]
+        known = [float(row[name]) for name in (*_STATES, *_POINTS)]
+        if not np.isfinite(known).all():
+            raise ValueError("a value is not finite")
+        values = np.array([*known[:N_STATE], *map(float, neck), *known[N_STATE:]])
+    elif state not in (LOST, NO_PERSON):
+        raise ValueError(f"the state is {quoted(state)}")
+    return _Row(int(row["stamp_ns"]), float(row["time_s"]), state, values)
+
+
+def _csv_cells(path: Path) -> Iterator[Mapping[str, Any]]:
+    try:
+        # Spreadsheets begin a file with a byte order mark.
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = csv.DictReader(file)
+            _check(path, rows.fieldnames or ())
+            yield from rows
+    except OSError as error:
+        raise CardboxError(f"cannot read {path}: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise CardboxError(
+            f"{path} is not a table in UTF-8 ({quoted(str(error))}); give a table or a bag that "
+            "'cardbox track' has written"
+        ) from None
+
+
+def _parquet_cells(path: Path) -> list[Mapping[str, Any]]:
+    arrow, parquet = pyarrow_or_error()
+    try:
+        table = parquet.read_table(path)
+    except (OSError, arrow.ArrowException) as error:
+        raise CardboxError(
+            f"cannot read {path}: {quoted(str(error))}; give a table that 'cardbox track' wrote"
+        ) from None
+    _check(path, table.column_names)
+    rows: list[Mapping[str, Any]] = table.to_pylist()
+    return rows
+
+
+def _check(path: Path, names: Sequence[str]) -> None:
+    missing = [name for name in _NEEDED if name not in names]
+    if missing:
+        raise CardboxError(
+            f"{path} has no column {missing[0]}; give a table that 'cardbox track' has written "
+            "(docs/results.md)"
+        )
+
+
+def _bag_rows(path: Path) -> tuple[list[_Row], BodyModel | None]:
+    with BagReader(path) as bag:
+        space = namespace_of(bag)
+        topics = [space + name for name in (MODEL, _STATE, _JOINTS, _STDDEV, _KEYPOINTS)]
+        read = _Results()
+        for message in bag.messages([topic for topic in topics if topic in bag.topics]):
+            content = bag.deserialize(message)
+            try:
+                read.take(message.topic.removeprefix(space), message.time_ns, content)
+            except (AttributeError, TypeError, ValueError) as error:
+                # The message type is defined by the recording and may lack fields.
+                raise BagError(
+                    f"{message.topic} of {path} has a damaged message: {error}; record it again"
+                ) from None
+    return read.rows(), read.body
+
+
+class _Results:
+    """Joins the messages of each image by its stamp."""
+
+    def __init__(self) -> None:
+        self.body: BodyModel | None = None
+        self._state = NO_PERSON
+        self._found: dict[int, tuple[str, FloatArray]] = {}
+
+    def take(self, topic: str, time_ns: int, message: Any) -> None:
+        """Take in one message; only the posture and the keypoints have the stamp of the image."""
+        if topic == MODEL:
+            self.body = loads_body_model(str(message.data), source=topic)
+        elif topic == _STATE:
+            self._state = str(message.data)
+            if self._state not in (TRACKING, UNCERTAIN):
+                self._found[time_ns] = self._state, _GAP
+        elif topic == _JOINTS:
+            joints = joints_of(message)
+            posture, place, neck = posture_from(joints), place_from(joints), neck_from(joints)
+            values = _GAP.copy()
+            values[:N_STATE] = [*posture, *(np.zeros(2) if place is None else place)]
+            values[N_STATE : N_STATE + 2] = np.nan if neck is None else neck
+            self._found[stamp_ns_of(message)] = self._state, values
+        elif stamp_ns_of(message) in self._found:
+            values = self._found[stamp_ns_of(message)][1]
+            if topic == _KEYPOINTS:
+                values[N_STATE + 2 :] = points_of(message).reshape(len(_POINTS))
+            elif neck_from(joints_of(message)) is None:
+                # The joint states have a straight neck where the face is not seen.
+                values[N_STATE : N_STATE + 2] = np.nan
+
+    def rows(self) -> list[_Row]:
+        """Return the rows in order of time; their seconds count from the first one."""
+        stamps = sorted(self._found)
+        return [_Row(t, (t - stamps[0]) / 1e9, *self._found[t]) for t in stamps]

@@ -1,0 +1,131 @@
+"""'cardbox export': each format from a table and a bag, and mistakes in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import save_body_model
+from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.exporting.formats import FORMATS
+from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_table import result_table
+from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.vision.camera import Camera
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table, a bag and the model of a person of whom two of four images are sure."""
+    folder = tmp_path_factory.mktemp("results")
+    body = BodyModel.of(hip_height_m=-0.51)
+    tracker = Tracker(body, Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
+    grey, posture = np.zeros((48, 64), np.uint8), np.full(12, 0.2)
+    points = tracker.camera.reference_to_optical(keypoints_m(body, posture))
+    sure, unsure = (
+        Estimate(state, posture, np.full(12, 0.1), points, 10, 0.9)
+        for state in ("tracking", "uncertain")
+    )
+    with (
+        result_bag(folder / "person", "camera") as bag,
+        result_table(folder / "person.csv", has_points=False) as table,
+    ):
+        for i, estimate in enumerate((sure, unsure, Estimate("lost"), sure)):
+            frame = RecordedFrame(i * 10**8, i / 10, grey, grey)
+            bag(frame, estimate, tracker)
+            table(frame, estimate)
+    save_body_model(body, folder / "person.yaml")
+    save_body_model(body.with_values(sizes=body.sizes * 1.1), folder / "other.yaml")
+    return folder
+
+
+def words_and_numbers(path: Path) -> tuple[list[str], list[float]]:
+    """Return a file's texts and its decimal fractions, which tables round."""
+    words = re.split(r"[\s,]", path.read_text(encoding="utf-8"))
+    is_fraction = [re.fullmatch(r"-?\d+\.\d+", word) is not None for word in words]
+    numbers = [float(word) for word, found in zip(words, is_fraction, strict=True) if found]
+    return [word for word, found in zip(words, is_fraction, strict=True) if not found], numbers
+
+
+@pytest.mark.filterwarnings("ignore:builtin type:DeprecationWarning")
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_table_and_a_bag_give_the_same_file(
+    name: str, results: Path, tmp_path: Path, cardbox: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if name == "c3d":
+        pytest.importorskip("ezc3d", reason="ezc3d is not installed")
+    monkeypatch.chdir(tmp_path)
+    done = cardbox(
+        "export", results / "person.csv", "--to", name, "--model", results / "person.yaml"
+    )
+    assert done.code == 0, done.err
+    made = tmp_path / f"person{FORMATS[name].suffix}"
+    assert done.out.splitlines() == [
+        "exported 3 of 4 images, 1 of them uncertain; 1 without a posture are gaps",
+        f"wrote {made.name}",
+    ]
+    (tmp_path / "bag").mkdir()
+    other = tmp_path / "bag" / made.name
+    assert cardbox("export", results / "person", "--to", name, "--output", other).code == 0
+    if name != "c3d":
+        (words, numbers), (other_words, other_numbers) = map(words_and_numbers, (made, other))
+        assert words == other_words
+        assert numbers == pytest.approx(other_numbers, abs=1e-3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", made.name]
+
+
+def test_without_a_model_the_camera_is_taken_as_level(
+    results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    done = cardbox("export", results / "person.csv", "--to", "trc", "--output", tmp_path / "a.trc")
+    assert "the camera is taken as level; --model gives its pitch" in done.out
+    done = cardbox("export", results / "person.csv", "--to", "isb", "--output", tmp_path / "a.csv")
+    assert "level" not in done.out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("person.csv", "--to", "bvh"), "BVH needs the bones of the person: give --model"),
+        (("person.csv", "--to", "fbx"), "--to: invalid choice: 'fbx'"),
+        (("person.csv",), "the following arguments are required: --to"),
+        (("person.csv", "--to", "trc", "--model", "FOLDER/other.yaml"), "not those of the given"),
+        (
+            ("person.csv", "--to", "trc", "--model", "FOLDER/none.yaml"),
+            "cannot read the body model",
+        ),
+        (("person.yaml", "--to", "trc"), "has no column"),
+        (("nothing.csv", "--to", "trc"), "there are no results"),
+    ],
+)
+def test_mistakes_of_export(
+    words: tuple[str, ...], expected: str, results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    rest = [word.replace("FOLDER", str(results)) for word in words[1:]]
+    done = cardbox("export", results / words[0], *rest, "--output", tmp_path / "made")
+    done.assert_refused("export", expected)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_are_not_replaced_without_force(
+    results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    output = tmp_path / "a.trc"
+    output.write_text("mine")
+    words = ("export", results / "person.csv", "--to", "trc", "--output", output)
+    cardbox(*words).assert_refused("export", "exists; choose another name, or give --force")
+    assert output.read_text() == "mine"
+    assert cardbox(*words, "--force").code == 0
+    assert output.read_text().startswith("PathFileType")
+
+
+def test_images_alone_are_no_results(files: Path, tmp_path: Path, cardbox: Callable) -> None:
+    done = cardbox("export", files / "session", "--to", "isb", "--output", tmp_path / "a.csv")
+    done.assert_refused("export", "has no results of the tracker", "cardbox track BAG")
