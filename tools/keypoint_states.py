@@ -53,7 +53,6 @@ Share of the keypoints in each state, and in parentheses how many of these are w
 |---|---|---|---|---|---|---|
 """
 _LEAST = 50
-_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
 def groups_of(folder: Path) -> dict[str, list[Mapping[str, Any]]]:
@@ -119,23 +118,24 @@ def plot(tables: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(1, 3, figsize=(11, 4), dpi=90, sharey=True, layout="constrained")
+    figure, axes = pyplot.subplots(
+        1, 3, figsize=(11, 4.6), dpi=90, sharey=True, layout="constrained"
+    )
     for axis, kind in zip(axes, KINDS, strict=True):
         axis.plot([0, 1], [0, 1], color="0.7", linewidth=1)
-        for (name, table), colour in zip(tables.items(), _COLOURS * 2, strict=False):
+        for name, table in tables.items():
             count, said, wrong = np.array(table[kind]["bins"], float).T
             shown = count >= _LEAST
             axis.plot(
                 said[shown] / count[shown],
                 wrong[shown] / count[shown],
-                *("o-",),
-                color=colour,
+                "o-",
                 markersize=4,
                 label=name,
             )
         axis.set(title=kind, xlabel="probability", xlim=(0, 1), ylim=(0, 1))
     axes[0].set_ylabel("share of wrong ones")
-    axes[0].legend(fontsize=8)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png")
     pyplot.close(figure)

@@ -38,6 +38,29 @@ _STEP = 1e-3
 _NEAREST_M = 1e-3
 
 
+def judged(
+    cost: MultiViewCost,
+    state: FloatArray,
+    stddev: FloatArray,
+    learned: FloatArray | None,
+    is_doubtful: bool,
+) -> tuple[FloatArray, tuple[KeypointState, ...]]:
+    """Return probabilities (6,) and states of the keypoints of a result.
+
+    Args:
+        cost: of all cameras.
+        state: the result, (14,), rad and m.
+        stddev: its standard deviations, (14,).
+        learned: the corrector's probabilities, (6,); None for those by the standard deviations.
+        is_doubtful: whether the points of a detector cast doubt on the result.
+    """
+    chances = learned
+    if chances is None:
+        share = SHARE_OF_POINTS if len(cost.seeing) == 1 else SHARE_OF_CAMERAS
+        chances = chances_by_spread(cost.costs[0], state, share * stddev)
+    return chances, states_of(chances, are_hidden(cost, state), is_doubtful)
+
+
 def chances_by_spread(cost: WholeBodyCost, state: FloatArray, stddev: FloatArray) -> FloatArray:
     """Return the probabilities (6,) that keypoints are wrong, from standard deviations.
 

@@ -7,13 +7,15 @@ from collections.abc import Callable
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from tokenize import TokenError
+from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.files import UnreadableFileError, regular_file
 
 Layer = tuple[FloatArray, FloatArray]
 """Weights (networks, inputs, outputs) and biases (networks, 1, outputs)."""
@@ -22,6 +24,8 @@ Read = TypeVar("Read")
 
 # Limit of a file's size; the package's networks have 1 MB.
 _MOST_BYTES = 64 * 2**20
+# Errors of numpy about headers that were made up.
+_DAMAGED = ValueError, TypeError, MemoryError, EOFError, SyntaxError, TokenError
 _MADE_BY = "as learning/correction.py writes them"
 
 
@@ -197,13 +201,15 @@ def read_recurrent_network(path: Path) -> RecurrentNetwork:
         CardboxError: the file cannot be read or is no such network; the text names the wrong array.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
-                raise CardboxError(f"{path} has over {_MOST_BYTES // 2**20} MB; expected a few")
-        data = _arrays(path, np.float32)
-    except OSError as error:
-        raise CardboxError(f"{path}: {error.strerror or error}; give a network's file") from None
-    except (ValueError, TypeError, zipfile.BadZipFile) as error:
+        with regular_file(path, _MOST_BYTES) as file:
+            with zipfile.ZipFile(file) as archive:
+                if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
+                    raise CardboxError(f"{path} has over {_MOST_BYTES // 2**20} MB; expected a few")
+            file.seek(0)
+            data = _arrays(file, np.float32)
+    except UnreadableFileError as error:
+        raise CardboxError(f"{path}: {error}; give a network's file") from None
+    except (*_DAMAGED, zipfile.BadZipFile) as error:
         raise CardboxError(f"{path} is no network: {error}; {_MADE_BY}") from None
     try:
         input_layer, gru_input, gru_hidden, first, last = (
@@ -251,7 +257,7 @@ def _check_shapes(path: Path, network: RecurrentNetwork, data: dict[str, FloatAr
         raise CardboxError(f"{path}: scale has values of 0 or less; {_MADE_BY}")
 
 
-def _arrays(path: Path, kind: type[np.floating[Any]]) -> dict[str, FloatArray]:
-    with np.load(path) as stored:
+def _arrays(file: Path | BinaryIO, kind: type[np.floating[Any]]) -> dict[str, FloatArray]:
+    with np.load(file) as stored:
         names = [name for name in stored.files if name != "about"]
         return {name: np.asarray(stored[name], kind) for name in names}

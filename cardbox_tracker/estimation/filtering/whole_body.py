@@ -41,15 +41,7 @@ from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.evidence import evidence_in
-from cardbox_tracker.estimation.filtering.keypoint_states import (
-    HANDS,
-    SHARE_OF_CAMERAS,
-    SHARE_OF_POINTS,
-    are_hidden,
-    are_sure,
-    chances_by_spread,
-    states_of,
-)
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, judged
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
@@ -290,12 +282,9 @@ class WholeBodyFilter:
         deviations = spread if is_by_points else self.refine.deviations(*last)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
         is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
-        chances = None if is_by_points else self.refine.chances_of_error()
-        if chances is None:
-            share = SHARE_OF_POINTS if len(self._seeing) == 1 else SHARE_OF_CAMERAS
-            chances = chances_by_spread(cost.costs[0], result, share * deviations)
+        learned = None if is_by_points else self.refine.chances_of_error()
         is_doubtful = self._points.is_doubtful(result)
-        states = states_of(chances, are_hidden(cost, result), is_doubtful)
+        chances, states = judged(cost, result, deviations, learned, is_doubtful)
         is_sure = is_sure and are_sure(chances[HANDS])
         return Fit(
             posture=result[POSTURE],

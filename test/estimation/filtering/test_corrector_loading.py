@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
@@ -16,6 +17,7 @@ from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.correction import (
     DATA,
+    N_ANSWERS,
     N_FEATURES,
     NetworkCorrector,
     learned,
@@ -72,13 +74,13 @@ def of_shape(name: str, shape: tuple[int, ...]) -> Change:
     ("change", "words"),
     [
         (without("weights3"), ["weights3"]),
-        (of_shape("weights3", (3, 288, 7)), ["weights4", "(3, 7, 9)"]),
+        (of_shape("weights3", (3, 288, 7)), ["weights4", f"(3, 7, {N_ANSWERS})"]),
         (of_shape("weights2", (3, 100, 384)), ["weights1", "300"]),
         (of_shape("weights0", (111, 192)), ["three axes"]),
         (of_shape("mean", (110,)), ["mean", f"({N_FEATURES},)"]),
         (of_shape("most", (3,)), ["network"]),
         (of_shape("scale", (N_FEATURES,)), ["scale"]),
-        (lambda stored: stored | {"unit": np.full(9, np.nan)}, ["unit", "finite"]),
+        (lambda stored: stored | {"unit": np.full(N_ANSWERS, np.nan)}, ["unit", "finite"]),
         (lambda stored: stored | {"mean": np.array([None])}, ["no network"]),
         (lambda stored: {"huge": np.zeros(2**24)}, ["MB"]),
     ],
@@ -99,7 +101,8 @@ def test_a_network_of_other_features_is_refused(tmp_path: Path) -> None:
     stored["weights0"] = stored["weights0"][:, :50]
     np.savez(tmp_path / "network.npz", **stored)
     with pytest.raises(
-        CardboxError, match=f"50 features and 9 answers; expected {N_FEATURES} and 9"
+        CardboxError,
+        match=f"50 features and {N_ANSWERS} answers; expected {N_FEATURES} and {N_ANSWERS}",
     ):
         load_corrector(f"{tmp_path / 'network.npz'}")
 
@@ -115,3 +118,10 @@ def test_a_network_of_other_features_is_refused(tmp_path: Path) -> None:
 def test_what_is_no_corrector_is_refused(name: str, word: str) -> None:
     with pytest.raises(CardboxError, match=word):
         load_corrector(name)
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.npz"
+    os.mkfifo(pipe)
+    with pytest.raises(CardboxError, match=r"pipe\.npz: it is a pipe .*; give a network's file"):
+        load_corrector(str(pipe))
