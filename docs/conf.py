@@ -38,8 +38,6 @@ if is_installed("sphinxcontrib.mermaid"):
 if is_installed("furo"):
     html_theme = "furo"
 html_title = "cardbox_tracker"
-# A generated report may still be empty.
-suppress_warnings = ["toc.no_title"]
 # Addresses of this repository are known by its files.
 linkcheck_ignore = [re.escape(HOME), r"http://localhost"]
 linkcheck_timeout = 20
