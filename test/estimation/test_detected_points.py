@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
@@ -33,7 +34,7 @@ MEASURED = BodyModel.of(hip_height_m=-0.51)
 GUESSED = MEASURED.with_values(source="proportions")
 BODIES = {"measured": MEASURED, "guessed": GUESSED}
 BEGIN_NS = 10**18
-HAND = 2
+ELBOW, HAND = 1, 2
 
 
 def uncorrected(body: BodyModel) -> TrackerConfig:
@@ -116,10 +117,14 @@ def of_hand(found: tuple[np.ndarray, list[Estimate]], begin: int = 12) -> float:
 
 
 def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> bool:
-    """Whether all frames were; the depth of a person who was not measured may be doubted."""
-    states = [estimate.state for estimate in found[1]]
-    least = 0.8 * len(states) if body is MEASURED else 0
-    return set(states) <= {TRACKING, UNCERTAIN} and states.count(TRACKING) >= least
+    """Whether all frames were; the depth of a hand may be doubted, but not its arm's elbow.
+
+    The depth of a person who was not measured may be doubted altogether.
+    """
+    elbows = [estimate.keypoint_states[ELBOW] for estimate in found[1] if estimate.keypoint_states]
+    least = 0.8 * len(elbows) if body is MEASURED else 0
+    states = {estimate.state for estimate in found[1]}
+    return states <= {TRACKING, UNCERTAIN} and elbows.count(KeypointState.TRACKED) >= least
 
 
 both = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)

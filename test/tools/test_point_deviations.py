@@ -58,10 +58,6 @@ def session(source: str, points: list[ImagePoints]) -> tool.Differences:
     return tool.Differences(source, *map(np.array, zip(*rows, strict=True)))
 
 
-def test_the_wrist_is_where_the_model_has_it() -> None:
-    assert tool._WRIST == kernels._WRIST
-
-
 def test_true_points_have_no_difference() -> None:
     off_px, metres, _, _ = tool.differences_of(seen(), JOINTS_M, CAMERA)
     np.testing.assert_allclose(off_px, 0.0, atol=1e-9)

@@ -12,7 +12,7 @@ from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.estimation.filtering.approach import Approach, at_distances
 from cardbox_tracker.estimation.filtering.visibility import is_trackable
 from cardbox_tracker.estimation.tracker import Tracker
@@ -46,7 +46,8 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     way = np.linspace(begin_m, end_m, steps).tolist()
     found = seen_at([begin_m] * 5 + way + [end_m] * 25, begin_m)
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
-    assert found[-1].state == TRACKING
+    # Far away, the hands are small, so they may be in doubt.
+    assert found[-1].state in (TRACKING, UNCERTAIN)
 
 
 @pytest.mark.parametrize("there_m", [1.4, 4.0])

@@ -211,7 +211,7 @@ def test_depth_in_millimetres_is_told_and_not_used(watching: Watching) -> None:
         is_used = watching.views[-1].observations[0].depth_m is not None
         assert is_used == (depth_m == 2.0) == (not texts)
         if texts:
-            assert "2e+03 m" in texts[0] and "divide 32FC1 by 1000" in texts[0]
+            assert "2e+03 or more" in texts[0] and "divide them by 1000" in texts[0]
 
 
 def test_depth_of_another_view_is_moved_by_its_own_camera_info(watching: Watching) -> None:
