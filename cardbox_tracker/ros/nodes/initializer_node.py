@@ -230,7 +230,7 @@ class GuideOutputs:
         """Advertise the topics for ``node``."""
         self._prompt: Prompt | None = None
         self._guide: Guide | None = None
-        self._status = node.advertise(String, "~/status", qos.LATCHED)
+        self._status = node.advertise(String, "~/status", qos.LATCHED_LINES)
         self._say = node.advertise(String, "~/say", qos.RESULT)
         self._guiding = node.advertise(Bool, "~/guiding", qos.LATCHED)
         self._overlay = node.advertise(Image, "overlay", qos.SENSOR_DATA)

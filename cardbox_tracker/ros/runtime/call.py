@@ -57,11 +57,11 @@ def call_service(service: str, say: Callable[[str], None]) -> str:
         asked = False
 
         def show(message: String) -> None:
-            # The latched line from before the call belongs to an earlier call.
+            # Latched lines from before the call belong to an earlier call.
             if asked:
                 say(message.data)
 
-        node.create_subscription(String, topic, show, qos.LATCHED)
+        node.create_subscription(String, topic, show, qos.LATCHED_LINES)
         settled_s = time.monotonic() + 0.3
         while time.monotonic() < settled_s:
             executor.spin_once(timeout_sec=_STEP_S)

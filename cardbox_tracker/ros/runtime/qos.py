@@ -42,6 +42,12 @@ LATCHED = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+# Lines that follow each other at once must not replace each other before they are sent.
+LATCHED_LINES = QoSProfile(
+    depth=10,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 # tf2's listener uses the same profile, because several programs publish latched messages.
 STATIC_TRANSFORMS = QoSProfile(
     depth=100,
