@@ -29,12 +29,9 @@ from cardbox_tracker.estimation.filtering.correction import (
     DOUBT,
     FAR_M,
     LOG_ODDS,
-    MIDDLE_Z,
     N_ANSWERS,
     OF_DEPTH,
     OF_POINTS,
-    limited,
-    moved,
 )
 from cardbox_tracker.estimation.filtering.low_pass import LowPass, kept_share
 from cardbox_tracker.estimation.filtering.networks import (
@@ -44,6 +41,7 @@ from cardbox_tracker.estimation.filtering.networks import (
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.evaluation.metrics import acceleration_error, beside_shoulders
 from learning import networks
+from learning.answers import answers_of
 from learning.command_line import run, training_arguments
 from learning.odds import calibrated
 from learning.samples import Samples, grouped, load_all, split
@@ -215,7 +213,7 @@ def _answers(modules: Any, features: Any) -> tuple[Any, Any]:
 
 
 def _moved(found: Any, answers: Any) -> Any:
-    """Do what :func:`moved` does, for tensors of sequences."""
+    """Do what the package's ``correction.moved`` does, for tensors of sequences."""
     import torch
 
     arms = answers.reshape(*answers.shape[:3], 3, 3)
@@ -321,17 +319,11 @@ def _apart(one: Layer, other: Layer) -> Layer:
 
 def corrected(network: RecurrentNetwork, samples: Samples, doubt: float = DOUBT) -> FloatArray:
     """Return the corrected and low-pass filtered keypoints, (n, 6, 3)."""
-    hidden, low_pass = network.initial_hidden(2), LowPass(SMOOTHING_S)
+    low_pass = LowPass(SMOOTHING_S)
     intervals_s = np.diff(samples.stamps_ns, prepend=samples.stamps_ns[:1]) / 1e9
     result = np.empty_like(samples.found_m)
-    for i, (features, found_m) in enumerate(zip(samples.features, samples.found_m, strict=True)):
-        answers_m, spread_m, hidden = network(np.asarray(features, np.float64), hidden)
-        answers_m = limited(answers_m[:, DISPLACEMENTS], spread_m[:, DISPLACEMENTS], doubt)
-        if samples.origin.is_measured:
-            answers_m[:, MIDDLE_Z] = 0.0
-        result[i] = low_pass(
-            moved(np.asarray(found_m, np.float64), answers_m), float(intervals_s[i])
-        )
+    for i, (corrected_m, _) in enumerate(answers_of(network, samples, doubt)):
+        result[i] = low_pass(corrected_m, float(intervals_s[i]))
     return result
 
 

@@ -23,18 +23,12 @@ from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
 from cardbox_tracker.estimation.filtering.correction import DATA as NETWORK
-from cardbox_tracker.estimation.filtering.correction import (
-    DISPLACEMENTS,
-    FAR_M,
-    LOG_ODDS,
-    MIDDLE_Z,
-    limited,
-    moved,
-)
+from cardbox_tracker.estimation.filtering.correction import FAR_M, LOG_ODDS
 from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, states_of
 from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
 from cardbox_tracker.evaluation.recorded.keypoint_states import compared
 from cardbox_tracker.evaluation.results import write_json
+from learning.answers import answers_of
 from learning.command_line import run
 from learning.samples import Samples, load_all
 
@@ -43,16 +37,8 @@ FloatArray = NDArray[np.float64]
 
 def odds_of(network: RecurrentNetwork, samples: Samples) -> tuple[FloatArray, FloatArray]:
     """Return log-odds (n, 6) and distances from the truth (n, 6), m, where this is known."""
-    hidden = network.initial_hidden(2)
-    log_odds, off_m = np.empty((2, len(samples.features), 6))
-    for i, features in enumerate(samples.features):
-        answers, spread, hidden = network(np.asarray(features, np.float64), hidden)
-        answers_m = limited(answers[:, DISPLACEMENTS], spread[:, DISPLACEMENTS])
-        if samples.origin.is_measured:
-            answers_m[:, MIDDLE_Z] = 0.0
-        found_m = moved(np.asarray(samples.found_m[i], np.float64), answers_m)
-        off_m[i] = np.linalg.norm(found_m - samples.true_m[i], axis=1)
-        log_odds[i] = answers[:, LOG_ODDS].ravel()
+    corrected_m, log_odds = map(np.array, zip(*answers_of(network, samples), strict=True))
+    off_m = np.linalg.norm(corrected_m - samples.true_m, axis=2)
     known = np.isfinite(samples.true_m).all(axis=(1, 2))
     return log_odds[known], off_m[known]
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
@@ -51,10 +51,11 @@ STANDING_S = 2.0
 CAMERA = Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
 PLACE_M = np.array([2.3, 0.0, 1.2])
 """Optical centre in the world of a person who stands at the origin."""
+_UNTURNED = np.eye(3)
 _LIGHT = np.array([0.0, -0.6, -0.8])
 
 
-def unchanged(silhouette: Silhouette, _: int) -> Silhouette:
+def unchanged(silhouette: Silhouette) -> Silhouette:
     """Return the silhouette."""
     return silhouette
 
@@ -67,34 +68,32 @@ class Situation:
         name: in the table.
         turned: rotation (3, 3) of the person in the world about the hips.
         moved_m: translation (3,) of the person, forward is towards the camera.
-        camera: camera that takes the images; the tracker knows ``CAMERA``.
         told: camera that the tracker is told, for measurement and tracking.
         size: size of the person of whom the body was measured, relative to this one.
-        changed: changes the silhouette of image number n.
+        changed: changes each silhouette.
         other_m: path (2, 3) of a second person, from the first image to the last; None for nobody.
     """
 
     name: str
-    turned: FloatArray = field(default_factory=lambda: np.eye(3))
+    turned: FloatArray = field(default_factory=lambda: _UNTURNED)
     moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    camera: Camera = CAMERA
     told: Camera = CAMERA
     size: float = 1.0
-    changed: Callable[[Silhouette, int], Silhouette] = unchanged
+    changed: Callable[[Silhouette], Silhouette] = unchanged
     other_m: FloatArray | None = None
 
 
-def shifted(silhouette: Silhouette, _: int, columns: int) -> Silhouette:
+def shifted(silhouette: Silhouette, columns: int) -> Silhouette:
     """Return the silhouette of a camera that was turned aside by a number of pixels."""
     return np.roll(silhouette, columns, axis=1)
 
 
-def mirrored(silhouette: Silhouette, _: int) -> Silhouette:
+def mirrored(silhouette: Silhouette) -> Silhouette:
     """Return the silhouette of a camera that mirrors its images."""
     return silhouette[:, ::-1]
 
 
-def with_coat_stand(silhouette: Silhouette, _: int) -> Silhouette:
+def with_coat_stand(silhouette: Silhouette) -> Silhouette:
     """Return the silhouette with a coat stand that touches the person's side."""
     result = silhouette.copy()
     cv2.rectangle(result, (205, 60), (211, 239), 255, -1)
@@ -102,7 +101,7 @@ def with_coat_stand(silhouette: Silhouette, _: int) -> Silhouette:
     return result
 
 
-def with_chair(silhouette: Silhouette, _: int) -> Silhouette:
+def with_chair(silhouette: Silhouette) -> Silhouette:
     """Return the silhouette with the back of a chair before the person's hips."""
     result = silhouette.copy()
     cv2.rectangle(result, (110, 165), (200, 239), 255, -1)
@@ -146,25 +145,28 @@ class Row(NamedTuple):
 
 
 def silhouette_of(
-    body: RiggedBody, pose: Pose, turned: FloatArray, moved_m: FloatArray, camera: Camera
+    body: RiggedBody,
+    pose: Pose,
+    turned: FloatArray = _UNTURNED,
+    moved_m: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Silhouette, FloatArray]:
     """Return the silhouette (H, W) and the keypoints (6, 3), metres in the optical frame."""
     posed = body.posed(*pose)
-    viewpoint = Viewpoint(camera, PLACE_M)
+    viewpoint = Viewpoint(CAMERA, PLACE_M)
 
     def there(points_m: NDArray[np.floating[Any]]) -> FloatArray:
-        return viewpoint.optical((points_m - posed.hips) @ turned.T + posed.hips + moved_m)
+        return viewpoint.optical(
+            (points_m - posed.hips) @ turned.T + posed.hips + np.asarray(moved_m)
+        )
 
-    rendering = render(there(posed.vertices), body.faces, body.colours, camera, _LIGHT)
+    rendering = render(there(posed.vertices), body.faces, body.colours, CAMERA, _LIGHT)
     return 255 * rendering.silhouette.astype(np.uint8), there(posed.keypoints)
 
 
 def measured(body: RiggedBody, told: Camera, seed: int) -> BodyModel:
     """Return the body measured before ``CAMERA`` by somebody who believes in ``told``."""
-    still = np.eye(3), np.zeros(3), CAMERA
     references = {
-        name: silhouette_of(body, reference_pose(name), *still)[0]
-        for name in ("front", "side", "arms")
+        name: silhouette_of(body, reference_pose(name))[0] for name in ("front", "side", "arms")
     }
     config = InitializationConfig(
         distance_m=float(PLACE_M[0]),
@@ -205,17 +207,17 @@ def tracked(situation: Situation, people: Sequence[RiggedBody]) -> Row:
         every = [*standing, *poses(motion)]
         for number, pose in enumerate(every):
             if number < len(standing):
-                silhouette, _ = silhouette_of(body, pose, np.eye(3), np.zeros(3), CAMERA)
+                silhouette, _ = silhouette_of(body, pose)
                 tracker.track(silhouette, stamp_ns=round(number * 1e9 / FPS))
                 continue
-            given = situation.turned, np.array(situation.moved_m), situation.camera
-            silhouette, true_m = silhouette_of(body, pose, *given)
+            placed = situation.turned, situation.moved_m
+            silhouette, true_m = silhouette_of(body, pose, *placed)
             if situation.other_m is not None:
                 share = (number - len(standing)) / len(motion)
                 path_m = situation.other_m[0] + share * np.diff(situation.other_m, axis=0)[0]
-                second = silhouette_of(other, reference_pose("front"), np.eye(3), path_m, CAMERA)[0]
+                second = silhouette_of(other, reference_pose("front"), moved_m=path_m)[0]
                 silhouette = np.maximum(silhouette, second)
-            silhouette = np.ascontiguousarray(situation.changed(silhouette, number))
+            silhouette = np.ascontiguousarray(situation.changed(silhouette))
             found = tracker.track(silhouette, stamp_ns=round(number * 1e9 / FPS))
             states.append(found.state)
             if found.keypoints_m is None or found.posture_stddev is None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
@@ -20,6 +19,7 @@ from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.motions import wave
@@ -34,7 +34,7 @@ MEASURED = BodyModel.of(hip_height_m=-0.51)
 GUESSED = MEASURED.with_values(source="proportions")
 BODIES = {"measured": MEASURED, "guessed": GUESSED}
 BEGIN_NS = 10**18
-ELBOW, HAND = 1, 2
+HAND = 2
 
 
 def uncorrected(body: BodyModel) -> TrackerConfig:
@@ -117,14 +117,17 @@ def of_hand(found: tuple[np.ndarray, list[Estimate]], begin: int = 12) -> float:
 
 
 def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> bool:
-    """Whether all frames were; the depth of a hand may be doubted, but not its arm's elbow.
+    """Whether all frames were, but for doubt about a hand's depth.
 
     The depth of a person who was not measured may be doubted altogether.
     """
-    elbows = [estimate.keypoint_states[ELBOW] for estimate in found[1] if estimate.keypoint_states]
-    least = 0.8 * len(elbows) if body is MEASURED else 0
-    states = {estimate.state for estimate in found[1]}
-    return states <= {TRACKING, UNCERTAIN} and elbows.count(KeypointState.TRACKED) >= least
+    estimates = found[1]
+    sure = [
+        estimate.state == TRACKING or not are_sure(estimate.keypoint_chances[HANDS])
+        for estimate in estimates
+    ]
+    least = 0.8 * len(sure) if body is MEASURED else 0
+    return {one.state for one in estimates} <= {TRACKING, UNCERTAIN} and sum(sure) >= least
 
 
 both = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.estimation.filtering.correction import moved as moved_joints
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
 from cardbox_tracker.estimation.filtering.networks import read_recurrent_network
 from learning import correction as tool
@@ -124,7 +125,7 @@ def test_tensors_move_as_the_package_moves_joints() -> None:
     moved = tool._moved(torch.tensor(found), torch.tensor(answers)).numpy()
     for place in np.ndindex(2, 4):
         # Directions of short vectors are smooth, so they differ a little.
-        assert np.allclose(moved[place], tool.moved(found[place], answers[place]), atol=0.01)
+        assert np.allclose(moved[place], moved_joints(found[place], answers[place]), atol=0.01)
 
 
 def test_disagreement_shortens_the_correction(

@@ -1,4 +1,4 @@
-"""State of each keypoint: whether it can be relied upon, and whether a camera sees it.
+"""State of each keypoint: whether it can be relied upon.
 
 A keypoint is wrong if it is off by more than 30 cm. The learned corrector gives the probability of
 this. Without it, each angle and place is taken to have a normal distribution with its standard
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.body_outline import TRUNK_PATCHES
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.correction import FAR_M
+from cardbox_tracker.estimation.filtering.visibility import are_hidden
 
 BoolArray = NDArray[np.bool_]
 
@@ -28,14 +28,11 @@ LOST_FROM = 0.5
 SHARE_OF_CAMERAS, SHARE_OF_POINTS = 0.5, 0.7
 """Shares of the filter's deviations, which are those of one camera's outline, that keypoints have
 with several cameras that look from different directions, and with points of a detector."""
-BEHIND_M = 0.08
-"""Distance behind the middle plane of the trunk from which the trunk hides a keypoint, m."""
 HANDS = [2, 5]
 """Indices of the hands among the keypoints."""
-_SHOULDERS, _LIMBS = [0, 3], [1, 2, 4, 5]
+_LIMBS = [1, 2, 4, 5]
 # Step of the numerical derivatives, rad and m.
 _STEP = 1e-3
-_NEAREST_M = 1e-3
 
 
 def judged(
@@ -85,48 +82,6 @@ def chances_by_spread(cost: WholeBodyCost, state: FloatArray, stddev: FloatArray
 
 def _beyond(deviation_m: float) -> float:
     return erfc(FAR_M / (deviation_m * sqrt(2.0))) if deviation_m > 0.0 else 0.0
-
-
-def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
-    """Return which keypoints (6,) of a state (14,) no camera sees that sees the person.
-
-    A keypoint is hidden outside of the image and behind the trunk; shoulders are part of the trunk.
-    """
-    hidden = np.ones(6, dtype=np.bool_)
-    for number in cost.seeing:
-        there = cost.to_views[number](state)
-        hidden &= _are_hidden_before(cost.costs[number], there)
-    return hidden
-
-
-def _are_hidden_before(cost: WholeBodyCost, state: FloatArray) -> BoolArray:
-    points_m, trunk_m = cost.keypoints(state), cost.corners(state)[:TRUNK_PATCHES]
-    fx, fy, cx, cy = cost.view[:4]
-    width, height = cost.size
-
-    def projected(points: FloatArray) -> FloatArray:
-        depth_m = np.maximum(points[..., 2], _NEAREST_M)
-        both = fx * points[..., 0] / depth_m + cx, fy * points[..., 1] / depth_m + cy
-        return np.stack(both, axis=-1)
-
-    pixels = projected(points_m)
-    outside = (points_m[:, 2] <= 0.0) | (pixels < 0.0).any(axis=1)
-    outside |= (pixels[:, 0] >= width) | (pixels[:, 1] >= height)
-    # A point is in a convex patch if it is on the same side of all edges.
-    corners = projected(trunk_m)
-    edges = np.roll(corners, -1, axis=1) - corners
-    away = pixels[:, None, None] - corners
-    sides = edges[..., 0] * away[..., 1] - edges[..., 1] * away[..., 0]
-    in_patch = (sides >= 0.0).all(axis=2) | (sides <= 0.0).all(axis=2)
-    # Depth of each patch's plane on the line of sight of each point.
-    normals = np.cross(trunk_m[:, 1] - trunk_m[:, 0], trunk_m[:, 3] - trunk_m[:, 0])
-    along = points_m @ normals.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = points_m[:, 2:] * np.sum(normals * trunk_m[:, 0], axis=1) / along
-    behind = (in_patch & (points_m[:, 2:] > plane_m + BEHIND_M)).any(axis=1)
-    behind[_SHOULDERS] = False
-    found: BoolArray = outside | behind
-    return found
 
 
 def are_sure(chances: FloatArray) -> bool:

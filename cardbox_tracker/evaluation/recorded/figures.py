@@ -18,6 +18,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
+from cardbox_tracker.estimation.filtering.correction import FAR_M
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS
 from cardbox_tracker.evaluation.metrics import (
     SHOULDERS,
     acceleration_error,
@@ -26,7 +28,7 @@ from cardbox_tracker.evaluation.metrics import (
     beside_shoulders,
 )
 from cardbox_tracker.evaluation.recorded.angles import joint_angles
-from cardbox_tracker.evaluation.recorded.keypoint_states import FAR_M, KINDS, compared
+from cardbox_tracker.evaluation.recorded.keypoint_states import KINDS, compared
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 from cardbox_tracker.evaluation.recorded.tracking import SessionRun
 
@@ -37,8 +39,6 @@ FAR_CM = 100.0 * FAR_M
 
 COVERAGE_STDDEVS = 2.0
 _LEAST_STDDEV_DEG = 0.5
-HANDS = [2, 5]
-"""Indices of the hands among the keypoints."""
 
 
 def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.estimation.filtering.correction import FAR_M
 
 FloatArray = NDArray[np.float64]
 
 KINDS = ("shoulder", "elbow", "hand")
 """Keypoints i and i + 3 are of the same kind."""
-FAR_M = 0.30
-"""A keypoint that is off by more is wrong, m."""
 BINS = 10
 """Number of equal intervals of the probability in a reliability diagram."""
 

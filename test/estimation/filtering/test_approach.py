@@ -7,13 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.estimate import LOST, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.filtering.approach import Approach, at_distances
+from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure
 from cardbox_tracker.estimation.filtering.visibility import is_trackable
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.simulation.renderer import Renderer, Scene
@@ -46,8 +48,9 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     way = np.linspace(begin_m, end_m, steps).tolist()
     found = seen_at([begin_m] * 5 + way + [end_m] * 25, begin_m)
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
-    # Far away, the hands are small, so they may be in doubt.
-    assert found[-1].state in (TRACKING, UNCERTAIN)
+    # Far away a keypoint may be in doubt, and the state follows the hands.
+    assert (found[-1].state == TRACKING) == are_sure(found[-1].keypoint_chances[HANDS])
+    assert KeypointState.LOST not in found[-1].keypoint_states
 
 
 @pytest.mark.parametrize("there_m", [1.4, 4.0])

@@ -16,10 +16,10 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.filtering.keypoint_states import (
-    are_hidden,
     chances_by_spread,
     states_of,
 )
+from cardbox_tracker.estimation.filtering.visibility import are_hidden
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
