@@ -6,10 +6,13 @@ are rules of their own.
 
 from __future__ import annotations
 
+from math import dist
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.body_outline import TRUNK_PATCHES
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -27,7 +30,7 @@ LEAST_IN_IMAGE = 0.6
 BEHIND_M = 0.08
 """Distance behind the middle plane of the trunk from which the trunk hides a keypoint, m."""
 
-_SHOULDERS = [0, 3]
+_SHOULDERS = (0, 3)
 _NEAREST_M = 1e-3
 
 
@@ -38,11 +41,11 @@ def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
 
 def _sees_enough(cost: MultiViewCost, number: int, state: FloatArray) -> bool:
     one, there = cost.costs[number], cost.to_views[number](state)
-    shoulders_m = one.keypoints(there)[_SHOULDERS]
-    ahead_m = float(shoulders_m[:, 2].mean())
+    shoulders_m = one.keypoints(there)[list(_SHOULDERS)]
+    ahead_m = 0.5 * float(shoulders_m[0, 2] + shoulders_m[1, 2])
     if ahead_m < NEAREST_TRACKED_M:
         return False
-    breadth_m = float(np.linalg.norm(shoulders_m[0] - shoulders_m[1]))
+    breadth_m = dist(*shoulders_m.tolist())
     fx, fy, cx, cy = one.view[:4]
     if fx * breadth_m / ahead_m < LEAST_SHOULDERS_PX:
         return False
@@ -66,44 +69,80 @@ def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
 def _are_hidden_before(cost: WholeBodyCost, state: FloatArray) -> BoolArray:
     points_m, trunk_m = cost.keypoints(state), cost.corners(state)[:TRUNK_PATCHES]
     fx, fy, cx, cy = cost.view[:4]
-    lens = fx, fy, cx, cy
-    # A point is in a convex patch if it is on the same side of all edges.
-    corners = _projected(trunk_m, lens)
-    edges = np.roll(corners, -1, axis=1) - corners
-    away = _projected(points_m, lens)[:, None, None] - corners
-    sides = edges[..., 0] * away[..., 1] - edges[..., 1] * away[..., 0]
-    in_patch = (sides >= 0.0).all(axis=2) | (sides <= 0.0).all(axis=2)
-    # Depth of each patch's plane on the line of sight of each point.
-    normals = np.cross(trunk_m[:, 1] - trunk_m[:, 0], trunk_m[:, 3] - trunk_m[:, 0])
-    along = points_m @ normals.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        plane_m = points_m[:, 2:] * np.sum(normals * trunk_m[:, 0], axis=1) / along
-    behind = (in_patch & (points_m[:, 2:] > plane_m + BEHIND_M)).any(axis=1)
-    behind[_SHOULDERS] = False
-    hidden: BoolArray = behind | ~_are_in_image(points_m, lens, cost.size)
+    hidden = np.empty(len(points_m), dtype=np.bool_)
+    _mark_hidden(points_m, trunk_m, (fx, fy, cx, cy), cost.size, hidden)
     return hidden
 
 
 def part_in_image(corners_m: FloatArray, lens: Lens, size: tuple[int, int]) -> float:
-    """Return the share of corners (..., 3), metres in the optical frame, that are in an image.
+    """Return the share of corners (n, 4, 3), metres in the optical frame, that are in an image.
 
     Args:
-        corners_m: the corners.
+        corners_m: the corners of n patches.
         lens: focal lengths and principal point, px.
         size: width and height of the image, px.
     """
-    return float(_are_in_image(corners_m, lens, size).mean())
+    return float(_count_in_image(corners_m, lens, size) / (4 * len(corners_m)))
 
 
-def _are_in_image(points_m: FloatArray, lens: Lens, size: tuple[int, int]) -> BoolArray:
-    """Return which points (..., 3) are before the camera and in its image."""
-    pixels = _projected(points_m, lens)
-    inside: BoolArray = np.asarray(((pixels >= 0.0) & (pixels < size)).all(axis=-1))
-    return inside & (points_m[..., 2] > 0.0)
+@kernel
+def _count_in_image(corners_m: FloatArray, lens: Lens, size: tuple[int, int]) -> int:
+    count = 0
+    for patch in range(corners_m.shape[0]):
+        for corner in range(4):
+            count += _is_in_image(corners_m[patch, corner], lens, size)
+    return count
 
 
-def _projected(points_m: FloatArray, lens: Lens) -> FloatArray:
-    """Return the pixels (..., 2) of points (..., 3); depths are at least ``_NEAREST_M``."""
-    depth_m = np.maximum(points_m[..., 2:], _NEAREST_M)
-    pixels: FloatArray = np.asarray(lens[:2]) * points_m[..., :2] / depth_m + lens[2:]
-    return pixels
+@kernel
+def _mark_hidden(
+    points_m: FloatArray, trunk_m: FloatArray, lens: Lens, size: tuple[int, int], hidden: BoolArray
+) -> None:
+    """Write which keypoints (6, 3) are outside of the image or behind patches (n, 4, 3)."""
+    for number in range(points_m.shape[0]):
+        point = points_m[number]
+        hidden[number] = not _is_in_image(point, lens, size)
+        if number in _SHOULDERS:
+            continue
+        for patch in range(trunk_m.shape[0]):
+            hidden[number] |= _is_behind(point, trunk_m[patch], lens)
+
+
+@kernel
+def _is_behind(point_m: FloatArray, patch_m: FloatArray, lens: Lens) -> bool:
+    """Return whether a point (3,) is in the outline of a patch (4, 3) and behind its plane."""
+    u, v = _projected(point_m, lens)
+    first_u, first_v = begin_u, begin_v = _projected(patch_m[0], lens)
+    lefts, rights = 0, 0
+    for corner in range(1, 5):
+        end_u, end_v = _projected(patch_m[corner], lens) if corner < 4 else (first_u, first_v)
+        side = (end_u - begin_u) * (v - begin_v) - (end_v - begin_v) * (u - begin_u)
+        lefts += side >= 0.0
+        rights += side <= 0.0
+        begin_u, begin_v = end_u, end_v
+    # A point is in a convex patch if it is on the same side of all edges.
+    if lefts < 4 and rights < 4:
+        return False
+    normal = np.cross(patch_m[1] - patch_m[0], patch_m[3] - patch_m[0])
+    # Depth of the plane on the line of sight of the point.
+    away, along = 0.0, 0.0
+    for axis in range(3):
+        away += normal[axis] * patch_m[0, axis]
+        along += normal[axis] * point_m[axis]
+    return bool(point_m[2] > point_m[2] * away / along + BEHIND_M)
+
+
+@inlined_kernel
+def _is_in_image(point_m: FloatArray, lens: Lens, size: tuple[int, int]) -> bool:
+    """Return whether a point (3,) is before the camera and in its image."""
+    u, v = _projected(point_m, lens)
+    is_inside = 0.0 <= u < size[0] and 0.0 <= v < size[1]
+    return bool(is_inside and point_m[2] > 0.0)
+
+
+@inlined_kernel
+def _projected(point_m: FloatArray, lens: Lens) -> tuple[float, float]:
+    """Return the pixel of a point (3,); its depth counts as at least ``_NEAREST_M``."""
+    depth_m = max(point_m[2], _NEAREST_M)
+    fx, fy, cx, cy = lens
+    return fx * point_m[0] / depth_m + cx, fy * point_m[1] / depth_m + cy
