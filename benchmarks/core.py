@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.default_stages import measure_default_stages
 from benchmarks.scene import BenchmarkScene, make_scene
 from benchmarks.stages import measure_stages
 from benchmarks.tools import (
@@ -90,6 +91,7 @@ def measure_frames(scene: BenchmarkScene) -> dict[str, Any]:
     return {
         "frames": {name: summary(values) for name, values in times.items()},
         "ratio_opencv": float(np.median(times["opencv"] / times["paper"])),
+        "ratio_default": float(np.median(times["default"] / times["paper"])),
     }
 
 
@@ -182,6 +184,7 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         pauses = measure_after_pauses(scene)
         report(0.3)
         stages = measure_stages(scene)
+        default_stages = measure_default_stages(scene)
         volumetric = measure_models(scene)
         report(0.4)
         scenes = [make_scene(w, h, max(2 * WARM_UP, frames // 3), 2) for w, h in RESOLUTIONS]
@@ -202,6 +205,8 @@ def measure_core(frames: int, report: Callable[[float], None]) -> dict[str, Any]
         "frames": results["frames"],
         "after_pauses": pauses,
         "stages": stages,
+        "default_stages": default_stages,
+        "ratio_default": results["ratio_default"],
         "resolutions": resolutions,
         "particles": particles,
     }

@@ -80,7 +80,7 @@ def _measure(
     report: Callable[[float], None],
 ) -> dict[str, Any]:
     with TemporaryDirectory() as folder, running_nodes(Path(folder)) as nodes:
-        camera = _CameraAndListener(nodes, processes)
+        camera = CameraAndListener(nodes, processes)
         try:
             model = Path(folder) / "body.yaml"
             save_body_model(scenes[STREAMS[0]].body, model)
@@ -98,10 +98,15 @@ def _measure(
     return {"ready_s": ready_s, "rss_mb": memory, "streams": streams}
 
 
-class _CameraAndListener:
-    """Publishes images and records the arrival times of their joint states."""
+class CameraAndListener:
+    """Publishes images and records the arrival times of their joint states.
+
+    Attributes:
+        arrivals_ns: times of the callback and of the arrival in this process, by stamp.
+    """
 
     def __init__(self, nodes: Nodes, processes: tuple[str, ...]) -> None:
+        """Create the ROS node; ``nodes`` will start the executables ``processes``."""
         import rclpy
         from diagnostic_msgs.msg import DiagnosticArray
         from rclpy.executors import SingleThreadedExecutor
@@ -130,7 +135,7 @@ class _CameraAndListener:
             qos.RESULT,
         )
         self._ready: set[str] = set()
-        self._arrivals_ns: dict[int, tuple[int, int]] = {}
+        self.arrivals_ns: dict[int, tuple[int, int]] = {}
         self._listening = threading.Thread(target=partial(_listen, self._executor), daemon=True)
         self._listening.start()
 
@@ -138,7 +143,7 @@ class _CameraAndListener:
         from cardbox_tracker.ros.messages.conversions import stamp_ns
 
         now_ns = time.time_ns()
-        self._arrivals_ns[stamp_ns(message.header.stamp)] = (now_ns, info["received_timestamp"])
+        self.arrivals_ns[stamp_ns(message.header.stamp)] = (now_ns, info["received_timestamp"])
 
     def _note_nodes(self, message: Any, _: dict[str, Any]) -> None:
         from cardbox_tracker.ros.runtime.diagnostics import STATUS, WAITING, WORKING
@@ -184,7 +189,7 @@ class _CameraAndListener:
     ) -> dict[str, Any]:
         """Publish for ``seconds``; return latencies, losses and the nodes' processor time."""
         there_and_back = [*scene.images, *scene.images[::-1]]
-        self._arrivals_ns.clear()
+        self.arrivals_ns.clear()
         count = max(2, int(seconds * rate_hz))
         sent = []
         began = time.monotonic()
@@ -199,10 +204,10 @@ class _CameraAndListener:
         }
         time.sleep(_LAST_S)
         self._nodes.check()
-        arrived = [stamp for stamp in sent if stamp in self._arrivals_ns]
+        arrived = [stamp for stamp in sent if stamp in self.arrivals_ns]
         if not arrived:
             raise CardboxError("no joint states arrived; the nodes do not track")
-        times_ns = np.array([self._arrivals_ns[stamp] for stamp in arrived])
+        times_ns = np.array([self.arrivals_ns[stamp] for stamp in arrived])
         called_ms, received_ms = (times_ns - np.array(arrived)[:, None]).T / 1e6
         return {
             **{f"p{p}_ms": float(np.percentile(called_ms, p)) for p in PERCENTILES},

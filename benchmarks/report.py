@@ -11,6 +11,8 @@ from cardbox_tracker.files import atomic_path
 
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
 COMMAND = "make benchmark"
+PICTURE_OF_WAY = "images/way.png"
+"""Plot of the steps of an image's way, relative to the report."""
 
 _STREAM = "mono8 320x240 at 30 Hz"
 
@@ -48,11 +50,13 @@ def report(results: Mapping[str, Any]) -> str:
         "`fillConvexPoly`, XOR and `countNonZero` do. Drawn by the same compiled code, the "
         f"volumetric model of 42 planes takes {results['ratio_volumetric']:.1f} times as long as "
         f"the cardbox model of 15. The process holds {results['rss_mb']:.0f} MB.",
+        f"The preset `default` takes {results['ratio_default']:.1f} times as long as the paper's "
+        "settings.",
         "## Stages",
-        _table(
-            ("step", "median", "p95"),
-            [(name, *_ms(times)) for name, times in results["stages"].items()],
-        ),
+        "The paper's settings, and the silhouette:",
+        _stages(results["stages"]),
+        "Parts of a frame with the preset `default`:",
+        _stages(results["default_stages"]),
         "## Resolution",
         "The time of a particle grows with the rows of its outline, not with its area: twice the "
         f"width and height take {results['ratio_double_resolution']:.2f} times as long.",
@@ -67,6 +71,7 @@ def report(results: Mapping[str, Any]) -> str:
             [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
         ),
         *_nodes(results["nodes"]),
+        *_way(results["way"]),
         "A live node waits between images; meanwhile the processor slows down and its caches lose "
         "the node's data. Image to posture, preset `default`, takes "
         f"{results['after_pauses']['without_ms']:.1f} ms if images follow each other without a "
@@ -118,6 +123,28 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
     ]
 
 
+def _way(ways: Mapping[str, Any] | None) -> list[str]:
+    if not ways:
+        return []
+    rows = [
+        (
+            step,
+            *(
+                f"{measured[step]['p50_ms']:.2f} ms, {measured[step]['p95_ms']:.2f} ms"
+                for measured in ways.values()
+            ),
+        )
+        for step in next(iter(ways.values()))
+    ]
+    return [
+        "### Where the milliseconds are",
+        "Grey images of 320x240 at 30 Hz; median and 95th percentile of each step. The last rows "
+        "add up the steps of each image: the estimation (silhouette and posture), the rest, all.",
+        _table(("step", *ways), rows),
+        f"![Medians of the steps]({PICTURE_OF_WAY})",
+    ]
+
+
 def _beside_detector(measured: Mapping[str, Any] | None) -> list[str]:
     if measured is None:
         return []
@@ -161,6 +188,11 @@ def _streams(measured: Mapping[str, Any]) -> list[str]:
         f"Ready after: {ready} (from the start of the process, with compiled code in the cache). "
         f"Memory: {memory}.",
     ]
+
+
+def _stages(stages: Mapping[str, Mapping[str, float]]) -> str:
+    rows = [(name, *_ms(times)) for name, times in stages.items()]
+    return _table(("step", "median", "p95"), rows)
 
 
 def _ms(times: Mapping[str, float]) -> tuple[str, str]:

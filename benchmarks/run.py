@@ -8,7 +8,8 @@ from typing import Any
 
 from benchmarks.core import measure_core
 from benchmarks.nodes import measure_nodes
-from benchmarks.report import write_report
+from benchmarks.report import PICTURE_OF_WAY, write_report
+from benchmarks.way import measure_way, plot_way
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.evaluation.results import provenance, write_json
 from cardbox_tracker.progress import progress_bar
@@ -36,7 +37,9 @@ def run_benchmark(
             raise CardboxError(f"there is no folder {path.parent}; make it, or choose another")
     with progress_bar("benchmark") as show:
         core = measure_core(frames, lambda done: show(0.4 * done))
-        nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.6 * done))
+        nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.5 * done))
+        way = measure_way(seconds) if nodes else None
+        show(1.0)
     results = {
         **{name: core.pop(name) for name in list(core) if not isinstance(core[name], dict)},
         **provenance(),
@@ -44,9 +47,14 @@ def run_benchmark(
         "measured_frames": frames,
         **core,
         "nodes": nodes,
+        "way": way,
     }
     write_json(results, json_path)
     if report_path is not None:
+        if way:
+            picture = report_path.parent / PICTURE_OF_WAY
+            picture.parent.mkdir(exist_ok=True)
+            plot_way(way, picture)
         write_report(results, report_path)
     return results
 

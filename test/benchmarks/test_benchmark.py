@@ -12,7 +12,9 @@ import pytest
 from benchmarks import core as benchmark_core
 from benchmarks import report as benchmark_report
 from benchmarks import run as benchmark
+from benchmarks.default_stages import WHOLE
 from benchmarks.scene import make_scene
+from benchmarks.way import STEPS, steps_of
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.evaluation.results import read_json
 from tools.readme_figures import BENCHMARKS
@@ -56,6 +58,32 @@ NODES = {
         },
     },
 }
+
+
+# One image with the stamp 0, and a second one that was lost on its way.
+NOTES = {
+    0: {"received": 10**6, "converted": 2 * 10**6, "cut out": 4 * 10**6}
+    | {"delivered": 5 * 10**6, "tracked": 9 * 10**6},
+    7: {"received": 10**6},
+}
+ENDS = {0: (12 * 10**6, 10 * 10**6), 7: (10**6, 10**6)}
+
+
+def test_the_steps_of_an_image_by_hand() -> None:
+    medians = {name: times["p50_ms"] for name, times in steps_of(NOTES, ENDS).items()}
+    assert [medians[step] for step in STEPS] == [1.0, 1.0, 2.0, 1.0, 4.0, 1.0, 2.0]
+    assert (medians["estimation"], medians["all but estimation"], medians["all"]) == (
+        6.0,
+        6.0,
+        12.0,
+    )
+
+
+def test_the_parts_of_a_frame_add_up(core: dict[str, Any]) -> None:
+    stages = core["default_stages"]
+    parts = [times["median_ms"] for name, times in stages.items() if name != WHOLE]
+    assert all(time > 0.0 for time in parts)
+    assert sum(parts) == pytest.approx(stages[WHOLE]["median_ms"], rel=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -123,6 +151,7 @@ def test_files_hold_what_is_promised(
 ) -> None:
     monkeypatch.setattr(benchmark, "measure_core", lambda *_: dict(core))
     monkeypatch.setattr(benchmark, "measure_nodes", lambda *_: nodes)
+    monkeypatch.setattr(benchmark, "measure_way", lambda _: {"one process": steps_of(NOTES, ENDS)})
     json_path, report_path = tmp_path / "b.json", tmp_path / "b.md"
     assert main(["benchmark", "--json", str(json_path), "--report", str(report_path)]) == 0
     results = json.loads(json_path.read_text())
@@ -132,6 +161,8 @@ def test_files_hold_what_is_promised(
     assert results["cpu"] in text
     assert ("Not measured" in text) == (nodes is None)
     assert ("299/300" in text) == (nodes is not None)
+    assert ("| posture | 4.00 ms, 4.00 ms |" in text) == (nodes is not None)
+    assert (tmp_path / benchmark_report.PICTURE_OF_WAY).exists() == (nodes is not None)
     assert "times faster" in capsys.readouterr().out
     section = benchmark_report.readme_section(results)
     for text in ("5.0 ms median, 7.0 ms p95", "4.0 ms median, 6.0 ms p95"):
