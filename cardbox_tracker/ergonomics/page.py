@@ -40,23 +40,26 @@ _LIMITS = (
     "chance for each score. The chances contain no errors that are common to all images, such as "
     "a wrong body model.",
 )
+# The number after it stays on the same line.
+_FIRM_COLON = ":\N{NO-BREAK SPACE}"
 _STYLE = """
 @page { size: A4; margin: 14mm; }
 body { font: 15px/1.45 system-ui, sans-serif; color: #111; background: #fff;
   max-width: 920px; margin: 1.5em auto; padding: 0 1em; }
 h1 { font-size: 1.6em; } h2 { font-size: 1.15em; margin: 1.6em 0 .4em; }
-h1, td, dd { overflow-wrap: anywhere; }
+h1, table.facts td { overflow-wrap: anywhere; }
 table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: 2px 10px 2px 0; }
+th, td:first-child, td.short { white-space: nowrap; }
 tr { border-bottom: 1px solid #ddd; }
 svg text { font: 12px system-ui, sans-serif; }
 svg.timeline, img { width: 100%; height: auto; } svg.bar { display: block; }
 .key { display: inline-block; width: 1em; height: .9em; border: 1px solid #888;
-  margin-right: .4em; }
-.moments { display: grid; grid-template-columns: 1fr 1fr; gap: 14px; }
+  margin: 0 .4em 0 0; }
+.moments { display: grid; grid-template-columns: 1fr 1fr 1fr; gap: 12px; }
 figure { margin: 0; } figcaption { font-size: .9em; }
 @media print {
-  body { font-size: 10.5pt; max-width: none; margin: 0; padding: 0; }
+  body { font-size: 9.5pt; max-width: none; margin: 0; padding: 0; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   h2 { break-after: avoid; } tr, figure, svg { break-inside: avoid; }
 }
@@ -106,7 +109,7 @@ def _page(content: PageContent) -> Element:
     body = add(root, "body")
     add(body, "h1", content.title)
     summary = summarize(content.rows)
-    _table(body, [(name, value) for name, value in content.facts.items()])
+    _table(body, content.facts)
     _result(body, summary)
     if summary.measured_s:
         worst = worst_moments(content.rows)
@@ -118,8 +121,7 @@ def _page(content: PageContent) -> Element:
         _declared(body, content.config, summary)
     add(body, "h2", "Settings")
     add(body, "p", "Limits of angles that the paper leaves open, in degrees:")
-    names = [(name.replace("_", " "), value) for name, value in limits(content.config).items()]
-    _table(body, names)
+    _table(body, {n.replace("_", " "): value for n, value in limits(content.config).items()})
     add(body, "h2", "Method and its limits")
     add(body, "p", REFERENCE)
     listed = add(body, "ul")
@@ -163,9 +165,8 @@ def _timeline(body: Element, rows: Sequence[RulaRow], worst: WorstMoments) -> No
     add(body, "h2", "Score over time")
     body.append(timeline(rows, worst.rows))
     note = add(body, "p")
-    _key(note, UNCERTAIN_COLOUR, "posture may be wrong  ")
-    _key(note, NOTHING_COLOUR, "no posture  ")
-    note[-1].tail = (note[-1].tail or "") + "Numbers: the worst moments below."
+    _key(note, UNCERTAIN_COLOUR, "posture may be wrong; ")
+    _key(note, NOTHING_COLOUR, "no posture; numbers are the worst moments below")
 
 
 def _parts(body: Element, content: PageContent) -> None:
@@ -174,12 +175,14 @@ def _parts(body: Element, content: PageContent) -> None:
         body,
         "p",
         "Mean score of each part, and the share of the time at each score. Table A rates upper "
-        "arm, lower arm and wrist, table B neck, trunk and legs; both without load and muscle use.",
+        "arm, lower arm and wrist, table B neck, trunk and legs; both without load and muscle use. "
+        "The source mixed is a score from measured and declared ones.",
     )
     table = add(body, "table")
     _row(table, ("part", "source", "mean", "share of the time at each score", ""), "th")
     for one in score_shares(content.rows, content.config):
-        row = _row(table, (one.words, one.source, f"{one.mean:.1f}", "", share_words(one)))
+        words = share_words(one).replace(": ", _FIRM_COLON)
+        row = _row(table, (one.words, one.source, f"{one.mean:.1f}", "", words))
         row[3].append(share_bar(one.shares))
 
 
@@ -191,10 +194,11 @@ def _declared(body: Element, config: RulaConfig, summary: RulaSummary) -> None:
         text += f" The {NECK} was measured for {neck_s:.1f} of {summary.measured_s:.1f} s."
     add(body, "p", text)
     table = add(body, "table")
-    _row(table, ("input", "value", "", "meaning"), "th")
+    _row(table, ("input", "value", "meaning"), "th")
     for one in declared(config):
-        default = "default" if one.is_default else ""
-        _row(table, (one.name.replace("_", " "), one.value, default, one.description))
+        value = f"{one.value} (default)" if one.is_default else one.value
+        row = _row(table, (one.name.replace("_", " "), value, one.description))
+        row[1].set("class", "short")
 
 
 def _moments(body: Element, content: PageContent, worst: WorstMoments) -> None:
@@ -226,9 +230,9 @@ def _moment_words(row: RulaRow) -> str:
     return f"score {row.scores.mean:.1f} ({'; '.join(parts)})"
 
 
-def _table(body: Element, lines: Sequence[tuple[str, str]]) -> None:
-    table = add(body, "table")
-    for name, value in lines:
+def _table(body: Element, facts: Mapping[str, str]) -> None:
+    table = add(body, "table", class_="facts")
+    for name, value in facts.items():
         row = add(table, "tr")
         add(row, "th", name)
         add(row, "td", value)

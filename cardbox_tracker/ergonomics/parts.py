@@ -11,8 +11,8 @@ from cardbox_tracker.ergonomics.rula import RulaScores
 from cardbox_tracker.ergonomics.tables import ScoreArray
 from cardbox_tracker.settings import settings_of
 
-MEASURED, DECLARED, BOTH = "measured", "declared", "measured and declared"
-"""Origins of a part score; tables and the grand score have both."""
+MEASURED, DECLARED, MIXED = "measured", "declared", "mixed"
+"""Origins of a part score; tables and the grand score are mixed."""
 
 NECK = "neck"
 """Part that is measured only where a detector gives points of the face."""

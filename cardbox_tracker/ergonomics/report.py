@@ -37,7 +37,7 @@ def report_lines(
             yield f"  of these, {summary.uncertain_s:.1f} s have a posture that may be wrong"
         yield "mean score of each part, and the share of the time at each score:"
         for one in shares:
-            yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<21}  {share_words(one)}"
+            yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<8}  {share_words(one)}"
     inputs = declared(config)
     for title, is_default in ((NOT_SEEN, False), ("neither seen nor declared, so defaults", True)):
         found = [one.words for one in inputs if one.is_default == is_default]

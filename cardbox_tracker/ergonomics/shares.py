@@ -11,7 +11,7 @@ import numpy as np
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import expected
-from cardbox_tracker.ergonomics.parts import BOTH, DECLARED, DECLARED_PARTS, MEASURED, NECK, PARTS
+from cardbox_tracker.ergonomics.parts import DECLARED, DECLARED_PARTS, MEASURED, MIXED, NECK, PARTS
 from cardbox_tracker.ergonomics.recording import RulaRow, scored_times
 from cardbox_tracker.ergonomics.tables import HIGHEST
 from cardbox_tracker.files import write_table
@@ -26,7 +26,7 @@ class ScoreShares:
     Attributes:
         name: of the part, as in the tables.
         words: the same for people.
-        source: ``MEASURED``, ``DECLARED`` or ``BOTH``.
+        source: ``MEASURED``, ``DECLARED`` or ``MIXED``.
         time_s: time (n,) at the scores 1 to n, s.
     """
 
@@ -58,14 +58,14 @@ def score_shares(rows: Sequence[RulaRow], config: RulaConfig) -> tuple[ScoreShar
 
     every = [scores for _, scores in scored]
     grand = times([scores.grand for scores in every], HIGHEST)
-    shares = [ScoreShares("grand", "grand score", BOTH, grand)]
+    shares = [ScoreShares("grand", "grand score", MIXED, grand)]
     necks = {row.is_neck_measured for row, _ in scored} or {False}
     for part in PARTS:
         source = MEASURED
         if part.name == NECK:
-            source = BOTH if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
+            source = MIXED if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
         elif "table" in part.name:
-            source = BOTH
+            source = MIXED
         time_s = times([scores.parts[part.name] for scores in every], part.highest)
         shares.append(ScoreShares(part.name, part.words, source, time_s))
     for name, highest in DECLARED_PARTS.items():
