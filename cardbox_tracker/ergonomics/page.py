@@ -18,9 +18,9 @@ from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import expected
 from cardbox_tracker.ergonomics.markup import Element, add, document, element
 from cardbox_tracker.ergonomics.moments import GAP_S, WorstMoments, worst_moments
-from cardbox_tracker.ergonomics.parts import NECK, PARTS, declared, limits
+from cardbox_tracker.ergonomics.parts import PARTS, limits
 from cardbox_tracker.ergonomics.recording import ABOVE, RulaRow, RulaSummary, summarize
-from cardbox_tracker.ergonomics.report import share_words
+from cardbox_tracker.ergonomics.report import neck_words, share_words, unseen
 from cardbox_tracker.ergonomics.shares import score_shares
 from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
 from cardbox_tracker.files import atomic_path
@@ -133,7 +133,7 @@ def _page(content: PageContent) -> Element:
 def _result(body: Element, summary: RulaSummary) -> None:
     add(body, "h2", "Result")
     if not summary.measured_s:
-        add(body, "p", "No image has a posture, so there is no score.")
+        add(body, "p", "There is no time with a posture, so there is no score.")
         return
     share = summary.above_s / summary.measured_s
     add(
@@ -188,14 +188,13 @@ def _parts(body: Element, content: PageContent) -> None:
 
 def _declared(body: Element, config: RulaConfig, summary: RulaSummary) -> None:
     add(body, "h2", "Declared, not seen")
-    neck_s = summary.neck_measured_s
-    text = "The images do not show these inputs. “default” is a value that nobody declared."
-    if neck_s:
-        text += f" The {NECK} was measured for {neck_s:.1f} of {summary.measured_s:.1f} s."
-    add(body, "p", text)
+    text = "These inputs are not measured. “default” marks a value that counts if none is declared"
+    if summary.neck_measured_s:
+        text += f"; {neck_words(summary)}"
+    add(body, "p", f"{text}.")
     table = add(body, "table")
     _row(table, ("input", "value", "meaning"), "th")
-    for one in declared(config):
+    for one in unseen(config, summary):
         value = f"{one.value} (default)" if one.is_default else one.value
         row = _row(table, (one.name.replace("_", " "), value, one.description))
         row[1].set("class", "short")
@@ -205,8 +204,10 @@ def _moments(body: Element, content: PageContent, worst: WorstMoments) -> None:
     add(body, "h2", "Worst moments")
     text = f"The highest expected scores, at least {GAP_S:g} s apart."
     if worst.uncertain:
-        text += f" {worst.uncertain} images whose posture may be wrong are left out."
-    if content.images is None:
+        text += f" Images left out, since their posture may be wrong: {worst.uncertain}."
+    if not worst.rows:
+        text += " There is no other image, so none is shown."
+    elif content.images is None:
         text += " The images of the recording were not given, so this page has none."
     elif content.are_heads_hidden:
         text += " The head of the tracked person is hidden; check for others before you share."

@@ -69,6 +69,11 @@ class RulaSummary:
     uncertain_s: float
     neck_measured_s: float
 
+    @property
+    def is_neck_always_measured(self) -> bool:
+        """Whether no image with a posture has a declared neck."""
+        return 0 < self.measured_s <= self.neck_measured_s + 1e-9
+
 
 def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
     """Return the expected time spent at each score."""

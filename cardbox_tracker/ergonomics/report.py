@@ -12,6 +12,7 @@ from cardbox_tracker.ergonomics.parts import (
     MEASURED,
     NECK,
     PARTS,
+    Declared,
     declared,
 )
 from cardbox_tracker.ergonomics.recording import ABOVE, RulaSummary
@@ -38,12 +39,28 @@ def report_lines(
         yield "mean score of each part, and the share of the time at each score:"
         for one in shares:
             yield f"  {one.words:<16} {one.mean:.1f}  {one.source:<8}  {share_words(one)}"
-    inputs = declared(config)
-    for title, is_default in ((NOT_SEEN, False), ("neither seen nor declared, so defaults", True)):
+    inputs = unseen(config, summary)
+    for title, is_default in ((NOT_SEEN, False), (f"{NOT_SEEN}, with the default value", True)):
         found = [one.words for one in inputs if one.is_default == is_default]
         yield f"{title}: {', '.join(found) or 'nothing'}"
     if summary.neck_measured_s:
-        yield f"  the neck was measured for {summary.neck_measured_s:.1f} s"
+        yield neck_words(summary)
+
+
+def unseen(config: RulaConfig, summary: RulaSummary) -> list[Declared]:
+    """Return the inputs that were declared, without a neck that was measured all the time."""
+    is_neck_seen = summary.is_neck_always_measured
+    return [one for one in declared(config) if one.name != NECK or not is_neck_seen]
+
+
+def neck_words(summary: RulaSummary) -> str:
+    """Return for how long the neck was measured, as words."""
+    if summary.is_neck_always_measured:
+        return "the neck was measured all the time"
+    return (
+        f"the neck was measured for {summary.neck_measured_s:.1f} of {summary.measured_s:.1f} s, "
+        "and counts as declared for the rest"
+    )
 
 
 def share_words(shares: ScoreShares) -> str:

@@ -115,13 +115,24 @@ def test_the_report_names_what_was_not_seen() -> None:
     assert "of these, 1.0 s have a posture that may be wrong" in text
     assert re.search(r"grand score +4\.5 +mixed +3: 50%, 6: 50%", text)
     assert "declared, not seen: wrist 2, arm load 3\n" in text
-    assert "defaults: neck 1, wrist twist 1, legs 1" in text
+    assert "with the default value: neck 1, wrist twist 1, legs 1" in text
     nothing = [row(0, None, "lost")]
     lines = list(report_lines(summarize(nothing), score_shares(nothing, config), config))
     assert [line.split(":")[0] for line in lines] == [
         "declared, not seen",
-        "neither seen nor declared, so defaults",
+        "declared, not seen, with the default value",
     ]
+
+
+def test_the_report_says_how_long_the_neck_was_measured() -> None:
+    config = RulaConfig(neck=2)
+    for rows, words, is_declared in (
+        ([row(0, 3), row(1, 3, is_neck_measured=True)], "for 1.0 of 2.0 s", True),
+        ([row(n, 3, is_neck_measured=True) for n in range(2)], "all the time", False),
+    ):
+        text = "\n".join(report_lines(summarize(rows), score_shares(rows, config), config))
+        assert f"the neck was measured {words}" in text
+        assert ("declared, not seen: neck 2" in text) == is_declared
 
 
 def test_a_measured_neck_is_not_among_the_declared_inputs() -> None:
@@ -196,7 +207,7 @@ def test_a_page_has_what_the_reader_needs(tmp_path: Path) -> None:
     for part in PARTS:
         assert part.words in words
     assert "McAtamney" in words
-    assert "1 images whose posture may be wrong are left out" in words
+    assert "left out, since their posture may be wrong: 1." in words
     assert "1. 5.0 s: score 6.5" in words
     assert "2. 1.0 s: score 6.0" in words
     assert "head of the tracked person is hidden" in words
@@ -215,10 +226,20 @@ def test_a_page_says_that_it_has_no_images_or_shows_faces(tmp_path: Path) -> Non
     assert "Faces are shown" in page(tmp_path, {}, are_heads_hidden=False).words
 
 
+def test_a_page_of_uncertain_images_shows_none(tmp_path: Path) -> None:
+    content = PageContent(
+        "Task", {}, RulaConfig(), [row(0, 6, "uncertain"), row(1, 6, "uncertain")], {}
+    )
+    write_page(content, tmp_path / "rula.html")
+    found = Page(tmp_path / "rula.html")
+    assert "There is no other image, so none is shown" in found.words
+    assert "figure" not in dict(found.elements)
+
+
 def test_a_page_without_a_posture_says_so(tmp_path: Path) -> None:
     content = PageContent("Task", {}, RulaConfig(), [row(0, None, "lost")])
     write_page(content, tmp_path / "rula.html")
-    assert "No image has a posture" in Page(tmp_path / "rula.html").words
+    assert "no time with a posture" in Page(tmp_path / "rula.html").words
 
 
 def test_the_line_breaks_where_no_posture_is_known(tmp_path: Path) -> None:
