@@ -125,7 +125,7 @@ def _content(
     from cardbox_tracker.ergonomics.page import PageContent
 
     name = options.recording.resolve().name
-    person = f"stature {options.stature} m" if options.model is None else str(options.model)
+    person = f"stature {options.stature} m" if options.model is None else options.model.name
     if body is not None:
         person += f"; sizes from {_SIZES_FROM[body.source]}"
     span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"

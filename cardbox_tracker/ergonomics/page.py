@@ -59,7 +59,8 @@ svg.timeline, img { width: 100%; height: auto; } svg.bar { display: block; }
 .moments { display: grid; grid-template-columns: 1fr 1fr 1fr; gap: 12px; }
 figure { margin: 0; } figcaption { font-size: .9em; }
 @media print {
-  body { font-size: 9.5pt; max-width: none; margin: 0; padding: 0; }
+  body { font-size: 9pt; line-height: 1.3; max-width: none; margin: 0; padding: 0; }
+  h2 { margin-top: 1em; } p { margin: .4em 0; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   h2 { break-after: avoid; } tr, figure, svg { break-inside: avoid; }
 }
@@ -120,8 +121,8 @@ def _page(content: PageContent) -> Element:
     else:
         _declared(body, content.config, summary)
     add(body, "h2", "Settings")
-    add(body, "p", "Limits of angles that the paper leaves open, in degrees:")
-    _table(body, {n.replace("_", " "): value for n, value in limits(content.config).items()})
+    angles = [f"{name.replace('_', ' ')} {x}" for name, x in limits(content.config).items()]
+    add(body, "p", f"Limits of angles that the paper leaves open, degrees: {', '.join(angles)}.")
     add(body, "h2", "Method and its limits")
     add(body, "p", REFERENCE)
     listed = add(body, "ul")
