@@ -49,6 +49,11 @@ COMMANDS: tuple[Command, ...] = (
 )
 # Replacements of the subcommands of former versions.
 RETIRED = {"screenshots": "python -m tools.screenshots --output docs/images"}
+# Methods that users may look for, and why there is none.
+ABSENT = {
+    "reba": "REBA rates legs and knees in every posture, and this tracker does not see legs; use "
+    "'cardbox rula', which rates arms, neck and trunk and takes the legs as declared (--legs)"
+}
 
 _EVERY_COMMAND = tuple(command.NAME for command in COMMANDS)
 _DESCRIPTION = """\
@@ -81,6 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser = build_parser(words)
             if name in RETIRED:
                 parser.error(f"{name!r} is no longer a subcommand; use {RETIRED[name]!r}")
+            if name in ABSENT:
+                parser.error(ABSENT[name])
             options = parser.parse_args(words)
             options.run(options)
             sys.stdout.flush()

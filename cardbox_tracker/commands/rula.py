@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from cardbox_tracker import __version__
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
 from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.errors import CardboxError
+
+if TYPE_CHECKING:
+    from cardbox_tracker.body.model import BodyModel
+    from cardbox_tracker.ergonomics.config import RulaConfig
+    from cardbox_tracker.ergonomics.page import PageContent
+    from cardbox_tracker.ergonomics.recording import RulaRow
+    from cardbox_tracker.recordings.moment_images import MomentImages
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
+HIDDEN_HEAD, _, NO_IMAGES = IMAGES = ("hidden-head", "shown", "none")
+
+_SIZES_FROM = {"measured": "reference postures", "proportions": "proportions of people"}
+# Stamps before 2001 count from a start of their own, as those of films do.
+_LEAST_CLOCK_S = 1e9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,38 +45,103 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plot", type=Path, default=None, metavar="OUT.png", help="also draw the scores over time"
     )
+    parser.add_argument(
+        "--shares",
+        type=Path,
+        default=None,
+        metavar="SHARES.csv",
+        help="also write the time at each score of each part",
+    )
+    parser.add_argument(
+        "--html",
+        type=Path,
+        default=None,
+        metavar="OUT.html",
+        help="also write one page that prints: scores, shares of time, and the worst moments",
+    )
+    parser.add_argument(
+        "--images",
+        choices=IMAGES,
+        default=IMAGES[0],
+        help="images of the worst moments in --html: with the head of the tracked person made "
+        "unrecognizable, as they are, or none",
+    )
+    parser.add_argument(
+        "--title", default=None, metavar="TEXT", help="heading of --html, such as the task"
+    )
     add_force(parser)
     add_settings(parser, RulaConfig, "the task and the limits that the paper leaves open")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person, score every image, and print the time at each level.
+    """Track the person, score every image, and print times, part scores and declared inputs.
 
     Raises:
-        CardboxError: the recording or the body model cannot be read, a setting is out of range, or
-            a result cannot be written.
+        CardboxError: the recording or the body model cannot be read, a setting is out of range, an
+            option has no effect, or a result cannot be written.
     """
     from cardbox_tracker.ergonomics.config import RulaConfig
+    from cardbox_tracker.ergonomics.page import write_page
     from cardbox_tracker.ergonomics.plot import plot_scores
-    from cardbox_tracker.ergonomics.recording import ABOVE, summarize, write_csv
-    from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
+    from cardbox_tracker.ergonomics.recording import summarize, write_csv
+    from cardbox_tracker.ergonomics.report import report_lines
+    from cardbox_tracker.ergonomics.shares import score_shares, write_shares
+    from cardbox_tracker.recordings.moment_images import MomentImages
     from cardbox_tracker.recordings.rula import RulaObserver
 
-    check_outputs((options.csv, options.plot), options.force, inputs=inputs_of(options))
-    observer = RulaObserver(settings_from(options, RulaConfig), options.seed)
-    track_inputs(options, observers=(observer,))
-    write_csv(observer.rows, options.csv)
-    summary = summarize(observer.rows)
-    if summary.measured_s:
-        share = summary.above_s / summary.measured_s
-        print(
-            f"expected RULA score {summary.mean:.1f}; above {ABOVE} for {summary.above_s:.1f} of "
-            f"{summary.measured_s:.1f} s ({share:.0%})"
-        )
-        for (low, high, meaning), time_s in zip(ACTION_LEVELS, summary.by_level_s, strict=True):
-            scores = str(low) if low == high else f"{low}-{high}"
-            print(f"  {scores:<3} {time_s:6.1f} s  {meaning}")
-    print(f"wrote {options.csv}")
+    if options.html is None and (options.title is not None or options.images != IMAGES[0]):
+        raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
+    outputs = (options.csv, options.plot, options.shares, options.html)
+    check_outputs(outputs, options.force, inputs=inputs_of(options))
+    config = settings_from(options, RulaConfig)
+    images = None
+    if options.html is not None and options.images != NO_IMAGES:
+        images = MomentImages(is_head_hidden=options.images == HIDDEN_HEAD)
+    observer = RulaObserver(config, options.seed, images)
+    summary = track_inputs(options, observers=(observer,))
+    rows = observer.rows
+    shares = score_shares(rows, config)
+    write_csv(rows, options.csv)
+    for line in report_lines(summarize(rows), shares, config):
+        print(line)
     if options.plot is not None:
-        plot_scores(observer.rows, options.plot)
-        print(f"wrote {options.plot}")
+        plot_scores(rows, options.plot)
+    if options.shares is not None:
+        write_shares(shares, options.shares)
+    if options.html is not None:
+        write_page(_content(options, config, rows, summary.body, images), options.html)
+    for path in outputs:
+        if path is not None:
+            print(f"wrote {path}")
+
+
+def _content(
+    options: argparse.Namespace,
+    config: RulaConfig,
+    rows: Sequence[RulaRow],
+    body: BodyModel | None,
+    images: MomentImages | None,
+) -> PageContent:
+    from cardbox_tracker.ergonomics.page import PageContent
+
+    name = options.recording.resolve().name
+    person = f"stature {options.stature} m" if options.model is None else options.model.name
+    if body is not None:
+        person += f"; sizes from {_SIZES_FROM[body.source]}"
+    span = f"{rows[0].time_s:.1f} to {rows[-1].time_s:.1f} s, {len(rows)} images"
+    facts = {"Recording": f"{name}, {span}", "Person": person}
+    begin_s = rows[0].stamp_ns / 1e9
+    if begin_s > _LEAST_CLOCK_S:
+        facts["Begin"] = f"{datetime.fromtimestamp(begin_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    points = options.detector or "none, so the neck is declared"
+    facts["Points of a detector"] = points
+    facts["Tracker"] = f"cardbox_tracker {__version__}, preset {options.preset}"
+    facts["Random seed"] = str(options.seed)
+    return PageContent(
+        options.title or f"RULA of {name}",
+        facts,
+        config,
+        rows,
+        None if images is None else images.by_stamp(),
+        images is None or images.is_head_hidden,
+    )

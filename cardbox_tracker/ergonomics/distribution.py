@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -10,13 +12,12 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import NECK_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.ergonomics.config import RulaConfig
+from cardbox_tracker.ergonomics.parts import PARTS
 from cardbox_tracker.ergonomics.rula import rula_scores
 from cardbox_tracker.ergonomics.tables import HIGHEST, ScoreArray
 
 SAMPLES = 500
 """Samples of a distribution; the standard error of a probability of 0.5 is then 0.02."""
-
-_SCORES = np.arange(1, HIGHEST + 1)
 
 
 class ScoreDistribution(NamedTuple):
@@ -26,11 +27,14 @@ class ScoreDistribution(NamedTuple):
         grand: probabilities for the worse arm.
         left: probabilities for the left arm.
         right: probabilities for the right arm.
+        parts: probabilities of the scores from 1 on of each of ``PARTS``, by its name; empty if
+            they are not known.
     """
 
     grand: FloatArray
     left: FloatArray
     right: FloatArray
+    parts: Mapping[str, FloatArray] = MappingProxyType({})
 
     @property
     def mean(self) -> float:
@@ -48,8 +52,8 @@ class ScoreDistribution(NamedTuple):
 
 
 def expected(chances: FloatArray) -> float:
-    """Return the expected score of probabilities (7,)."""
-    return float(chances @ _SCORES)
+    """Return the expected score of the probabilities (n,) of the scores 1 to n."""
+    return float(chances @ np.arange(1, len(chances) + 1))
 
 
 def neck_samples(
@@ -69,9 +73,13 @@ def score_distribution(
     ``necks`` (n, 2) are the angles of the neck in each of them, rad; None if they are unknown.
     """
     scores = rula_scores(body, postures, config, necks)
-    return ScoreDistribution(*map(_chances, (scores.grand, scores.left.grand, scores.right.grand)))
+    grand, left, right = (
+        _chances(one, HIGHEST) for one in (scores.grand, scores.left.grand, scores.right.grand)
+    )
+    parts = {part.name: _chances(part.of(scores), part.highest) for part in PARTS}
+    return ScoreDistribution(grand, left, right, parts)
 
 
-def _chances(scores: ScoreArray) -> FloatArray:
-    found: FloatArray = np.bincount(scores, minlength=HIGHEST + 1)[1:] / len(scores)
+def _chances(scores: ScoreArray, highest: int) -> FloatArray:
+    found: FloatArray = np.bincount(scores, minlength=highest + 1)[1:] / len(scores)
     return found

@@ -33,17 +33,19 @@ BoolArray = NDArray[np.bool_]
 
 
 class ArmScores(NamedTuple):
-    """Scores (...) of one arm: its parts, and the grand score computed with this arm."""
+    """Scores (...) of one arm: its parts, ``TABLE_A``, and the grand score with this arm."""
 
     upper_arm: ScoreArray
     lower_arm: ScoreArray
+    table_a: ScoreArray
     grand: ScoreArray
 
 
 class RulaScores(NamedTuple):
     """Scores (...) of both arms and the trunk; ``grand`` is that of the worse arm, 1 to 7.
 
-    ``neck`` is that of the settings if the angles of the neck are not known.
+    ``neck`` is that of the settings if the angles of the neck are not known. ``table_b`` is the
+    score of neck, trunk and legs without load and muscle use.
     """
 
     left: ArmScores
@@ -51,6 +53,7 @@ class RulaScores(NamedTuple):
     trunk: ScoreArray
     grand: ScoreArray
     neck: ScoreArray
+    table_b: ScoreArray
 
 
 def rula_scores(
@@ -69,13 +72,13 @@ def rula_scores(
     neck = np.full(trunk.shape, config.neck)
     if necks is not None:
         neck = neck_score(necks[..., 0], necks[..., 1], config)
-    rest = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
-    rest = rest + config.body_muscle_use + config.body_load
+    table_b = TABLE_B[neck - 1, trunk - 1, config.legs - 1]
+    rest = table_b + config.body_muscle_use + config.body_load
     left, right = (
         _arm(body, d[..., joints], side, rest, config)
         for joints, side in ((LEFT_ARM, 1.0), (RIGHT_ARM, -1.0))
     )
-    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck)
+    return RulaScores(left, right, trunk, np.maximum(left.grand, right.grand), neck, table_b)
 
 
 def grand_score(arm: ScoreArray, rest: ScoreArray) -> ScoreArray:
@@ -146,9 +149,9 @@ def _arm(
     bend = np.arccos(np.clip((upper * fore).sum(axis=-1), -1.0, 1.0))
     upper_arm = upper_arm_score(upper, side, config)
     lower_arm = lower_arm_score(bend, side * fore[..., 1], side * hand_m < 0.0, config)
-    posture = TABLE_A[upper_arm - 1, lower_arm - 1, config.wrist - 1, config.wrist_twist - 1]
-    arm = posture + config.arm_muscle_use + config.arm_load
-    return ArmScores(upper_arm, lower_arm, grand_score(arm, rest))
+    table_a = TABLE_A[upper_arm - 1, lower_arm - 1, config.wrist - 1, config.wrist_twist - 1]
+    arm = table_a + config.arm_muscle_use + config.arm_load
+    return ArmScores(upper_arm, lower_arm, table_a, grand_score(arm, rest))
 
 
 def _step(angle_deg: FloatArray, first: float, second: float, third: float) -> ScoreArray:

@@ -9,6 +9,7 @@ from cardbox_tracker.ergonomics.distribution import SAMPLES, neck_samples, score
 from cardbox_tracker.ergonomics.recording import RulaRow
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.recordings.moment_images import MomentImages
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 # A separate random stream leaves the tracker's random numbers unchanged.
@@ -22,19 +23,29 @@ class RulaObserver:
         rows: one row an image, in order.
     """
 
-    def __init__(self, config: RulaConfig, seed: int) -> None:
-        """Seed the random numbers; the same images and ``seed`` give the same rows."""
+    def __init__(self, config: RulaConfig, seed: int, images: MomentImages | None = None) -> None:
+        """Seed the random numbers; the same images and ``seed`` give the same rows.
+
+        Args:
+            config: settings of the score.
+            seed: random seed.
+            images: keeps the images of high scores; None if none are wanted.
+        """
         self._config = config
+        self._images = images
         self._rng = np.random.default_rng([seed, _STREAM])
         self.rows: list[RulaRow] = []
 
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Append the row of one image."""
-        scores = None
+        scores = necks = None
         if estimate.posture is not None:
             postures = tracker.sample(estimate, SAMPLES, self._rng)
-            necks = None
             if estimate.neck is not None and estimate.neck_stddev is not None:
                 necks = neck_samples(estimate.neck, estimate.neck_stddev, SAMPLES, self._rng)
             scores = score_distribution(tracker.body, postures, self._config, necks)
-        self.rows.append(RulaRow(frame.stamp_ns, estimate.state, scores))
+        has_neck = necks is not None
+        row = RulaRow(frame.stamp_ns, estimate.state, scores, frame.time_s, has_neck)
+        self.rows.append(row)
+        if self._images is not None:
+            self._images.add(row, frame, estimate, tracker)

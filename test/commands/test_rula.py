@@ -16,11 +16,15 @@ def options(files: Path) -> tuple[object, ...]:
 
 def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -> None:
     table, plot = tmp_path / "rula.csv", tmp_path / "rula.png"
+    shares, page = tmp_path / "shares.csv", tmp_path / "rula.html"
     words = ("rula", *options(files), "--csv", table, "--arm-load", "3", "--trunk-twisted")
-    done = cardbox(*words, "--plot", plot)
+    pages = ("--shares", shares, "--html", page, "--title", "Packing")
+    done = cardbox(*words, "--plot", plot, *pages)
     assert done.code == 0, done.err
     assert "expected RULA score" in done.out
-    assert f"wrote {plot}" in done.out
+    for path in (table, plot, shares, page):
+        assert f"wrote {path}" in done.out
+    assert "declared, not seen: arm load 3, trunk twisted yes" in done.out
     assert plot.read_bytes().startswith(b"\x89PNG")
     with table.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["score"]]
@@ -28,9 +32,17 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     for row in rows:
         assert sum(float(row[f"chance_{i}"]) for i in range(1, 8)) == pytest.approx(1, abs=0.01)
         assert float(row["score"]) >= 3  # A of at least 1 and a load of 3: row 4 of table C
-    first = table.read_bytes()
-    assert cardbox(*words, "--force").code == 0
-    assert table.read_bytes() == first
+    text = page.read_text(encoding="utf-8")
+    assert "<h1>Packing</h1>" in text
+    assert "data:image/jpeg;base64," in text
+    with shares.open(encoding="utf-8") as file:
+        grand = [float(row["share"]) for row in csv.DictReader(file) if row["part"] == "grand"]
+    assert sum(grand) == pytest.approx(1, abs=0.001)
+    first = table.read_bytes(), shares.read_bytes()
+    done = cardbox(*words, *pages, "--images", "none", "--force")
+    assert done.code == 0, done.err
+    assert (table.read_bytes(), shares.read_bytes()) == first
+    assert "data:image" not in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -39,6 +51,9 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
         (("--neck", "7"), "--neck is 7; expected 1 to 6"),
         (("--side-bent-deg", "90"), "--side-bent-deg is 90; expected 1 to 45"),
         (("--legs", "both"), "argument --legs: invalid int value: 'both'"),
+        (("--images", "none"), "give --html OUT.html"),
+        (("--title", "Packing"), "give --html OUT.html"),
+        (("--html", "FOLDER/rula.csv"), "is given for two outputs"),
         (("--plot", "FOLDER/missing/rula.png"), "No such file or directory"),
     ],
 )
@@ -49,3 +64,9 @@ def test_mistakes_of_rula(
     done = cardbox("rula", *options(files), "--csv", files / "rula.csv", *given)
     done.assert_refused("rula", expected)
     assert not (files / "rula.csv").exists()
+
+
+def test_reba_is_refused_with_its_reason(cardbox: Callable) -> None:
+    done = cardbox("reba", "session")
+    assert (done.code, done.out) == (2, "")
+    assert "does not see legs; use 'cardbox rula'" in done.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from cardbox_tracker.ergonomics.distribution import (
     neck_samples,
     score_distribution,
 )
+from cardbox_tracker.ergonomics.parts import PARTS, declared
 from cardbox_tracker.ergonomics.plot import plot_scores
 from cardbox_tracker.ergonomics.recording import CSV_HEADER, RulaRow, summarize, write_csv
 from cardbox_tracker.ergonomics.rula import grand_score, rula_scores
@@ -100,6 +102,28 @@ def test_a_hand_beyond_the_middle_of_the_body_adds_one() -> None:
     assert scores(left_elbow_flexion=80)[1] == 1
     assert scores(left_elbow_abduction=-80)[1] == 2
     assert scores(left_elbow_abduction=80)[1] == 2  # to the outside
+
+
+def test_tables_count_without_load_and_muscle_use() -> None:
+    config = RulaConfig(wrist=3, wrist_twist=2, arm_load=2, legs=2, body_muscle_use=1)
+    found = rula_scores(BODY, posture(left_shoulder_abduction=100, torso_pitch=30), config)
+    # Upper arm 5, lower arm 3, wrist 3, twist 2; upper arm 1, lower arm 2; neck 1, trunk 3, legs 2.
+    assert (found.left.table_a, found.right.table_a, found.table_b) == (7, 3, 4)
+    spread = score_distribution(BODY, posture(torso_pitch=30)[None], config)
+    assert {name: len(chances) for name, chances in spread.parts.items()} == {
+        part.name: part.highest for part in PARTS
+    }
+    assert spread.parts["trunk"].tolist() == [0, 0, 1, 0, 0, 0]
+
+
+def test_each_input_that_is_not_seen_is_named_with_its_value() -> None:
+    found = list(map(str, declared(RulaConfig(wrist=2, trunk_twisted=True))))
+    assert found == [
+        *("neck 1 (default)", "wrist 2", "wrist twist 1 (default)", "legs 1 (default)"),
+        *("arm load 0 (default)", "arm muscle use 0 (default)"),
+        *("body load 0 (default)", "body muscle use 0 (default)"),
+        *("shoulders raised no (default)", "arms supported no (default)", "trunk twisted yes"),
+    ]
 
 
 def test_what_is_declared_counts() -> None:
@@ -188,8 +212,10 @@ def rows_of(*scores: int | None) -> list[RulaRow]:
     rows = []
     for number, score in enumerate(scores):
         chances = np.eye(7)[score - 1] if score else None
-        found = None if chances is None else ScoreDistribution(chances, chances, chances)
-        rows.append(RulaRow(number * 10**8, "tracking" if score else "lost", found))
+        parts = {part.name: np.eye(part.highest)[0] for part in PARTS}
+        found = None if chances is None else ScoreDistribution(chances, chances, chances, parts)
+        state = "tracking" if score else "lost"
+        rows.append(RulaRow(number * 10**8, state, found, number / 10))
     return rows
 
 
@@ -204,7 +230,7 @@ def test_time_above_five_is_that_of_six_and_seven() -> None:
 
 def test_a_gap_in_the_images_is_not_time_at_a_score() -> None:
     rows = rows_of(6, 6, 6, 6)
-    rows[-1] = RulaRow(10**11, "tracking", rows[-1].scores)
+    rows[-1] = replace(rows[-1], stamp_ns=10**11)
     assert summarize(rows).above_s == pytest.approx(0.1 + 0.1 + 0.3 + 0.1)
 
 
@@ -217,5 +243,6 @@ def test_table_and_plot_are_written(tmp_path: Path) -> None:
     assert first[:5] == ["0", "tracking", "3.000", "3", "0.000"]
     assert lost == ["100000000", "lost", *[""] * (len(CSV_HEADER) - 2)]
     assert (last[3], last[4]) == ("6", "1.000")
+    assert last[-1 - len(PARTS) :] == [*["1.000"] * len(PARTS), "declared"]
     plot_scores(rows, tmp_path / "r.png")
     assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")

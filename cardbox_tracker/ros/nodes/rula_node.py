@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,7 @@ from cardbox_tracker.ergonomics.distribution import (
     score_distribution,
 )
 from cardbox_tracker.ergonomics.recording import ABOVE
+from cardbox_tracker.ergonomics.report import part_values
 from cardbox_tracker.ergonomics.tables import ACTION_LEVELS
 from cardbox_tracker.estimation.sampling import normal_postures
 from cardbox_tracker.ros.messages import conversions
@@ -110,10 +112,12 @@ class RulaNode(CardboxNode):
         neck, neck_stddev, necks = neck_of(self._joints), neck_of(message), None
         if neck is not None and neck_stddev is not None:
             necks = neck_samples(neck, neck_stddev, SAMPLES, self._rng)
-        scores = score_distribution(self._body, postures, self.parameters.value.config(), necks)
+        config = self.parameters.value.config()
+        scores = score_distribution(self._body, postures, config, necks)
         self._score.publish(Float32(data=scores.mean))
         self._chances.publish(_chances_message(scores))
-        self._report.publish(_report_message(message, scores, self.get_name()))
+        parts = part_values(scores, config, necks is not None)
+        self._report.publish(_report_message(message, scores, parts, self.get_name()))
         self.diagnostics.working(sent_ns)
 
 
@@ -123,8 +127,10 @@ def _chances_message(scores: ScoreDistribution) -> Float32MultiArray:
     return Float32MultiArray(layout=layout, data=scores.grand.tolist())
 
 
-def _report_message(message: JointState, scores: ScoreDistribution, name: str) -> DiagnosticArray:
-    """Return the scores of one image under its header."""
+def _report_message(
+    message: JointState, scores: ScoreDistribution, parts: Mapping[str, str], name: str
+) -> DiagnosticArray:
+    """Return the scores of one image, and those of its ``parts``, under its header."""
     meaning = next(text for low, high, text in ACTION_LEVELS if low <= scores.likeliest <= high)
     values = {
         "score": f"{scores.mean:.2f}",
@@ -132,6 +138,7 @@ def _report_message(message: JointState, scores: ScoreDistribution, name: str) -
         f"chance above {ABOVE}": f"{scores.chance_above(ABOVE):.3f}",
         "score with the left arm": f"{expected(scores.left):.2f}",
         "score with the right arm": f"{expected(scores.right):.2f}",
+        **parts,
     }
     is_high = scores.likeliest > ABOVE
     return DiagnosticArray(

@@ -39,6 +39,11 @@ def test_a_pair_is_scored_under_its_stamp(bus: Any, joints: Any) -> None:
     values = {value.key: value.value for value in report.status[0].values}
     assert values["likeliest score"] == "5"
     assert float(values["score with the right arm"]) < float(values["score with the left arm"])
+    # Upper arms 5 and 1, table A 6 and 2; trunk 3, table B 3.
+    assert (values["upper arm, left"], values["upper arm, right"]) == ("5.00", "1.00")
+    assert (values["table A, left"], values["table B"]) == ("6.00", "3.00")
+    assert values["neck (declared)"] == "1.00"
+    assert values["declared, not seen"].startswith("neck 1 (default), wrist 1 (default)")
     (score,), (chances,) = bus.texts("/rula/score"), map(np.array, bus.texts("/rula/chances"))
     assert score == pytest.approx(float(values["score"]), abs=0.01)
     assert chances.argmax() + 1 == 5
