@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> None:
     results = [] if options.live else _results_of(options)
     if options.beside is not None and not results:
         raise CardboxError(
-            "--beside needs a bag of results as BAG: run 'cardbox track --bag' first"
+            "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
         )
     from cardbox_tracker.viewing.feed import Feed
     from cardbox_tracker.viewing.layout import columns, layout

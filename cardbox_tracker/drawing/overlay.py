@@ -258,8 +258,8 @@ def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
 
 def readable_scale(image: ImageArray) -> int:
     """Return the whole factor from which lines and text over ``image`` (H, W, ...) are readable."""
-    height, width = image.shape[:2]
-    return -(-_READABLE_PX // max(height, width))
+    longer_px = int(max(image.shape[:2]))
+    return -(-_READABLE_PX // longer_px)
 
 
 def enlarged(image: ImageArray, scale: int) -> ImageArray:
