@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
     )
+    parser.add_argument(
+        "--beside",
+        type=Path,
+        default=None,
+        metavar="RESULTS",
+        help="second bag of results of the same recording, such as with other settings, to show "
+        "beside the first",
+    )
     add_inputs(parser, required=False)
     add_force(parser)
 
@@ -51,25 +59,35 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
-    inputs = *inputs_of(options), options.truth
+    inputs = *inputs_of(options), options.truth, options.beside
     check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
-    is_result = not options.live and _holds_results(options)
-    truth = None if options.live else _truth_of(options)
+    results = [] if options.live else _results_of(options)
+    if options.beside is not None and not results:
+        raise CardboxError(
+            "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
+        )
     from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.layout import layout
+    from cardbox_tracker.viewing.layout import columns, layout
     from cardbox_tracker.viewing.library import recording
+    from cardbox_tracker.viewing.same_images import check_same_images
     from cardbox_tracker.viewing.scene import Scene
 
-    with recording(layout(), options.save, options.web) as (stream, address):
+    first_ns = check_same_images(*results) if len(results) > 1 else None
+    truth = None if options.live else _truth_of(options, results)
+    shown = columns(_names_of(results))
+    blueprint = layout(shown, has_truth=truth is not None, is_live=options.live)
+    with recording(blueprint, options.save, options.web) as (stream, address):
         if address:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
         if options.live:
             _show_nodes(Scene(stream))
-        else:
-            feed = Feed(Scene(stream), truth)
-            count = _show_results(options.recording, feed) if is_result else _track(options, feed)
+        elif not results:
+            count = _track(options, Feed(Scene(stream), truth))
             print(f"shown: {count} images with a posture", flush=True)
+        for path, column in zip(results, shown, strict=False):
+            count = _show_results(path, Feed(Scene(stream, column, first_ns), truth))
+            print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
             with suppress(KeyboardInterrupt):
@@ -87,8 +105,8 @@ def _show_nodes(scene: Scene) -> None:
     show_nodes(scene)
 
 
-def _holds_results(options: argparse.Namespace) -> bool:
-    """Return whether the recording has results, or False if the options suffice to track it.
+def _results_of(options: argparse.Namespace) -> list[Path]:
+    """Return the bags of results to show; none if the recording is to be tracked.
 
     Raises:
         CardboxError: the recording cannot be read, or options are missing.
@@ -100,21 +118,48 @@ def _holds_results(options: argparse.Namespace) -> bool:
     if is_bag(options.recording) or not options.recording.exists():
         with BagReader(options.recording) as bag:
             if has_results(bag):
-                return True
+                return [path for path in (options.recording, options.beside) if path is not None]
     missing = [] if options.stature is not None else _missing(options)
     if missing:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
             f"--{', --'.join(missing)} as for 'cardbox track', to track it now"
         )
-    return False
+    return []
 
 
-def _truth_of(options: argparse.Namespace) -> Mapping[int, TrueFrame] | None:
+def _names_of(results: Sequence[Path]) -> list[str]:
+    """Return a name for each bag: that of its folder, or as much of the path as differs."""
+    parts = [path.resolve().parts for path in results]
+    longest = max(map(len, parts), default=0)
+    lengths = (n for n in range(1, longest) if len({p[-n:] for p in parts}) == len(parts))
+    length = next(lengths, longest)
+    return ["/".join(part[-length:]) for part in parts]
+
+
+def _truth_of(
+    options: argparse.Namespace, results: Sequence[Path]
+) -> Mapping[int, TrueFrame] | None:
+    """Return the true frames by stamp, of which results must have one; None if there are none.
+
+    Raises:
+        CardboxError: the ground truth cannot be read, or is given for other images.
+    """
     from cardbox_tracker.evaluation.truth import load_ground_truth
+    from cardbox_tracker.viewing.same_images import image_stamps
 
     path = options.truth or _truth_beside(options.recording)
-    return None if path is None else load_ground_truth(path).frames
+    if path is None:
+        return None
+    frames = load_ground_truth(path).frames
+    if not results or not frames.keys().isdisjoint(image_stamps(results[0])):
+        return frames
+    if options.truth is not None:
+        raise CardboxError(
+            f"{path} has no true frame for an image of {results[0]}; give the ground truth of its "
+            "recording"
+        )
+    return None
 
 
 def _show_results(path: Path, feed: Feed) -> int:

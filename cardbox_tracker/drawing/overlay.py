@@ -48,6 +48,8 @@ _BONE_BGR = {
 
 _SHIFT = 4
 OUTLINE_SHIFT = 1
+# Lines and text are readable from this size of the longer side on.
+_READABLE_PX = 640
 
 
 def draw_overlay(
@@ -252,6 +254,12 @@ def outlines_of(camera: Camera, patches: FloatArray) -> list[NDArray[np.int32]]:
     opened = cv2.morphologyEx(model, cv2.MORPH_OPEN, np.ones((whisker, whisker), np.uint8))
     found, _ = cv2.findContours(opened, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return [np.asarray(cv2.approxPolyDP(outline, 1.0, True), np.int32) for outline in found]
+
+
+def readable_scale(image: ImageArray) -> int:
+    """Return the whole factor from which lines and text over ``image`` (H, W, ...) are readable."""
+    longer_px = int(max(image.shape[:2]))
+    return -(-_READABLE_PX // longer_px)
 
 
 def enlarged(image: ImageArray, scale: int) -> ImageArray:

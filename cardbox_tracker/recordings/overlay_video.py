@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.drawing.overlay import draw_overlay, readable_scale
 from cardbox_tracker.drawing.video import video_file
 from cardbox_tracker.errors import BagError
 from cardbox_tracker.estimation.estimate import Estimate
@@ -14,8 +14,6 @@ from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
-# Lines and text are readable from this size on.
-_LEAST_PX = 640
 # Rate of a video of a single image.
 _USUAL_HZ = 15.0
 
@@ -36,8 +34,8 @@ def overlay_video(
 
         def observe(frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
             picture = recording.first.full_picture(frame)
-            scale = -(-_LEAST_PX // max(picture.shape[:2]))
-            add(draw_overlay(picture, tracker.body, tracker.camera, estimate, max(1, scale)))
+            scale = readable_scale(picture)
+            add(draw_overlay(picture, tracker.body, tracker.camera, estimate, scale))
 
         yield observe
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
 from cardbox_tracker.description.urdf import urdf_from_body
-from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.drawing.overlay import draw_overlay, readable_scale
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.keypoint_status import CHANCE_KEY, LEVELS, KeypointStates, chance_text
@@ -82,7 +82,10 @@ class _ResultBag:
         self._described = body
         bag.write_image("/silhouette", stamp, optical, frame.silhouette, "mono8")
         bag.write_camera_info("/silhouette/camera_info", stamp, optical, camera)
-        overlay = draw_overlay(frame.picture, body, camera, estimate)
+        # Repeated pixels compress well, and lines and text over them are sharp.
+        scale = readable_scale(frame.picture)
+        picture = frame.picture.repeat(scale, axis=0).repeat(scale, axis=1)
+        overlay = draw_overlay(picture, body, camera, estimate)
         bag.write_image("/overlay", stamp, optical, overlay, "bgr8")
         for output, value in self._outputs.values(stamp, estimate, tracker):
             _write_value(bag, f"/{output.topic}", stamp, optical, value)

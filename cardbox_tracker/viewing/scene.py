@@ -18,19 +18,21 @@ from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.outputs import JointValues
 from cardbox_tracker.viewing.layout import (
+    ALONE,
     ERROR,
     IMAGE,
     JOINTS,
     ROOT_FRAME,
     SPREAD,
     STATE,
+    Column,
     plot_of,
 )
 from cardbox_tracker.viewing.library import rerun
 
 Rgb = tuple[int, int, int]
 
-_COLOURS = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
+_COLOURS: list[tuple[int, ...]] = [(66, 133, 244), (219, 68, 55), (15, 157, 88), (171, 71, 188)]
 _MEASURED_RGB, _TRUE_RGB = (255, 140, 0), (0, 200, 83)
 _STATE_RGB: dict[str, Rgb] = {
     KeypointState.UNCERTAIN: (255, 230, 0),
@@ -42,17 +44,23 @@ _SPREAD = 2.0
 _HALF_TURN = (0.0, 0.0, 1.0, 0.0)
 _ARMS = ((0, 1, 2), (3, 4, 5))
 _RADIUS_M = 0.018
-_JPEG_QUALITY = 80
+# Letters have visible fringes at lower qualities.
+_JPEG_QUALITY = 92
 
 
 class Scene:
     """Logs to a Rerun stream; :meth:`at` selects the image, and other calls may have any order."""
 
-    def __init__(self, stream: Any) -> None:
-        """Start an empty scene; ``stream`` is a rerun.RecordingStream."""
+    def __init__(self, stream: Any, column: Column = ALONE, first_ns: int | None = None) -> None:
+        """Start an empty scene.
+
+        Args:
+            stream: a rerun.RecordingStream.
+            column: place of the result among those of the layout.
+            first_ns: stamp from which the time line counts, ns; None for that of the first image.
+        """
         self._rr = rerun()
-        self._stream = stream
-        self._first_ns: int | None = None
+        self._stream, self._column, self._first_ns = stream, column, first_ns
         self._state = ""
         self._styled: set[str] = set()
         self._trees: dict[str, dict[str, Any]] = {}
@@ -80,10 +88,10 @@ class Scene:
         put = self._rr.Transform3D(
             translation=place_m,
             quaternion=self._rr.Quaternion(xyzw=_HALF_TURN),
-            parent_frame=ROOT_FRAME,
-            child_frame=f"{name}/{root}",
+            parent_frame=self._column.prefix + ROOT_FRAME,
+            child_frame=f"{self._column.prefix}{name}/{root}",
         )
-        self._stream.log(f"{name}/place", put, static=True)
+        self._log(f"{name}/place", put, static=True)
 
     def _robot(self, name: str, urdf: str) -> str:
         """Log geometry and joints below ``name`` and return the root link.
@@ -97,9 +105,9 @@ class Scene:
             try:
                 tree = self._rr.urdf.UrdfTree.from_file_path(
                     path,
-                    entity_path_prefix=name,
-                    frame_prefix=f"{name}/",
-                    static_transform_entity_path=f"{name}/links",
+                    entity_path_prefix=self._column.geometry(name),
+                    frame_prefix=f"{self._column.prefix}{name}/",
+                    static_transform_entity_path=f"{self._column.prefix}{name}/links",
                 )
                 tree.log_urdf_to_recording(self._stream)
             except Exception as error:
@@ -114,12 +122,12 @@ class Scene:
     def image(self, bgr: NDArray[np.uint8]) -> None:
         """Show an image (H, W, 3)."""
         shown = self._rr.Image(bgr, color_model="BGR")
-        self._stream.log(IMAGE, shown.compress(jpeg_quality=_JPEG_QUALITY))
+        self._log(IMAGE, shown.compress(jpeg_quality=_JPEG_QUALITY))
 
     def state(self, text: str) -> None:
         """Log the tracking state if it has changed."""
         if text != self._state:
-            self._stream.log(STATE, self._rr.TextLog(text))
+            self._log(STATE, self._rr.TextLog(self._column.named(text)))
         self._state = text
 
     def joints(self, joints: JointValues) -> None:
@@ -145,7 +153,7 @@ class Scene:
         for name, value in zip(joints.names, joints.values.tolist(), strict=True):
             if name in known:
                 turned = known[name].compute_transform(value, clamp=False)
-                self._stream.log(f"{robot}/joints/{name}", turned)
+                self._log(f"{robot}/joints/{name}", turned)
 
     def keypoints(
         self,
@@ -174,20 +182,27 @@ class Scene:
         strips = [points[list(arm)] for arm in _ARMS]
         bones = self._rr.LineStrips3D(strips, colors=[rgb] * len(strips), radii=_RADIUS_M / 3)
         joints = self._rr.Points3D(points, colors=list(joint_rgb) or rgb, radii=_RADIUS_M)
+        frame = self._column.prefix + ROOT_FRAME
         for name, shown in (("arms", bones), ("joints", joints)):
-            self._once(f"{entity}/{name}", self._rr.CoordinateFrame(ROOT_FRAME))
-            self._stream.log(f"{entity}/{name}", shown)
+            self._once(f"{entity}/{name}", self._rr.CoordinateFrame(frame))
+            self._log(f"{entity}/{name}", shown)
 
     def _plot(self, entity: str, name: str, value: float, colour: int, width: float) -> None:
         rgb = _COLOURS[colour % len(_COLOURS)]
-        self._once(entity, self._rr.SeriesLines(colors=rgb, names=name, widths=width))
-        self._stream.log(entity, self._rr.Scalars(value))
+        if self._column.is_pale:
+            rgb = tuple((level + 255) // 2 for level in rgb)
+        named = self._column.named(name)
+        self._once(entity, self._rr.SeriesLines(colors=rgb, names=named, widths=width))
+        self._log(entity, self._rr.Scalars(value))
 
     def _once(self, entity: str, what: Any) -> None:
         """Log a constant entity once."""
         if entity not in self._styled:
-            self._stream.log(entity, what, static=True)
+            self._log(entity, what, static=True)
         self._styled.add(entity)
+
+    def _log(self, entity: str, what: Any, static: bool = False) -> None:
+        self._stream.log(self._column.prefix + entity, what, static=static)
 
 
 def _shown(joints: JointValues) -> Mapping[str, float]:

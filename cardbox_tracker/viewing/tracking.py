@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.body.model_file import dumps_body_model
-from cardbox_tracker.drawing.overlay import draw_overlay
+from cardbox_tracker.drawing.overlay import draw_overlay, readable_scale
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.outputs import joint_deviations, joint_values
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.viewing.feed import Feed
-
-_SCALE = 2
 
 
 class ShownTracking:
@@ -35,7 +33,8 @@ class ShownTracking:
             feed.model(dumps_body_model(tracker.body), "the tracker")
         self._described = tracker.body
         feed.state(stamp_ns, estimate.state)
-        overlay = draw_overlay(frame.picture, tracker.body, tracker.camera, estimate, _SCALE)
+        scale = readable_scale(frame.picture)
+        overlay = draw_overlay(frame.picture, tracker.body, tracker.camera, estimate, scale)
         feed.image(stamp_ns, overlay)
         joints, deviations = joint_values(estimate), joint_deviations(estimate)
         if joints is not None and deviations is not None:

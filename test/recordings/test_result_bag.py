@@ -97,7 +97,8 @@ def test_images_are_those_of_the_tracker(
     for frame, silhouette in zip(source.frames(0.0, 8.0), decoded["/silhouette"], strict=False):
         assert bytes(silhouette.data) == frame.silhouette.tobytes()
     overlay = decoded["/overlay"][-1]
-    assert (overlay.encoding, overlay.width, overlay.height) == ("bgr8", 320, 240)
+    # Twice the size of the silhouettes, for lines and text.
+    assert (overlay.encoding, overlay.width, overlay.height) == ("bgr8", 640, 480)
 
 
 def test_type_hashes_are_those_of_the_installed_messages(

@@ -6,6 +6,7 @@ import re
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,19 +31,27 @@ CAMERA = Camera(64, 48, 66.0, 66.0, 31.5, 23.5)
 IMAGES = 5
 
 
-@pytest.fixture
-def results(tmp_path: Path) -> Path:
-    """A bag as 'cardbox track --bag' writes it, and a true frame for each image."""
+def write_results(path: Path, first: int = 0, seed: int = 0, later_ns: int = 0) -> Path:
+    """Write a bag as 'cardbox track --bag' does: images from ``first`` on, of the noise ``seed``.
+
+    The person of another seed is seen by a camera whose pictures have other noise.
+    """
     tracker = Tracker(BODY, CAMERA)
-    grey = np.zeros((48, 64), np.uint8)
-    with result_bag(tmp_path / "results", "camera") as bag:
-        for i in range(IMAGES):
+    noise = np.random.default_rng(seed).integers(0, 256, (IMAGES + 1, 48, 64), np.uint8)
+    with result_bag(path, "camera") as bag:
+        for i in range(first, IMAGES + 1):
             posture = wave(i / 5.0)
             points = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
             estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
-            bag(RecordedFrame(i * 10**8, i / 10, grey, grey), estimate, tracker)
-        bag(RecordedFrame(IMAGES * 10**8, IMAGES / 10, grey, grey), Estimate(LOST), tracker)
-    return tmp_path / "results"
+            frame = RecordedFrame(i * 10**8 + later_ns, i / 10, noise[i], noise[i])
+            bag(frame, estimate if i < IMAGES else Estimate(LOST), tracker)
+    return path
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """Results for all images; the person is lost in the last one."""
+    return write_results(tmp_path / "results")
 
 
 def view(*words: object) -> int:
@@ -78,13 +87,106 @@ def test_every_image_is_in_the_file(results: Path, tmp_path: Path) -> None:
     assert not any(entity.startswith("error") for entity in rows)
 
 
-def test_errors_are_shown_where_there_is_a_truth(results: Path, tmp_path: Path) -> None:
+def test_the_truth_of_other_images_is_refused_or_ignored(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
     synthesize_session(tmp_path / "other", "bow", form=SessionFormat(2.0, 64, 48))
     truth = tmp_path / "other" / "ground_truth.json"
-    assert view(results, "--truth", truth, "--save", tmp_path / "v.rrd") == 0
-    # None of its frames has the stamp of an image.
-    assert "error/aligned" not in rows_of(tmp_path / "v.rrd")
+    assert view(results, "--truth", truth, "--save", tmp_path / "v.rrd") == 1
+    assert "has no true frame for an image of" in capsys.readouterr().err
+    # Nobody gave the one that lies beside the results.
+    truth.rename(tmp_path / "ground_truth.json")
+    assert view(results, "--save", tmp_path / "v.rrd") == 0
+    assert not any(entity.startswith("error") for entity in rows_of(tmp_path / "v.rrd"))
+
+
+def titles(part: Any) -> list[str]:
+    """Return the titles of all views of a blueprint."""
+    container = pytest.importorskip("rerun.blueprint").Container
+
+    if isinstance(part, container):
+        return [title for inner in part.contents for title in titles(inner)]
+    return [part.name]
+
+
+@pytest.mark.parametrize("has_truth", [False, True])
+def test_the_view_of_errors_is_there_only_with_a_truth(has_truth: bool) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    from cardbox_tracker.viewing.layout import layout
+
+    found = titles(layout(has_truth=has_truth).root_container)
+    assert ("error [cm]" in found) == has_truth
+    assert {"image", "measured body", "left arm [deg]", "state"} <= set(found)
+
+
+def test_recordings_play_from_the_start_and_nodes_are_followed() -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    from cardbox_tracker.viewing.layout import layout
+
+    assert layout().time_panel.play_state == "playing"
+    assert layout(is_live=True).time_panel.play_state == "following"
+
+
+def test_two_results_have_a_column_each_and_one_time_line(tmp_path: Path) -> None:
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
+    from cardbox_tracker.viewing.layout import columns, layout
+
+    # The second one was tracked from a later image on.
+    first, second = write_results(tmp_path / "a"), write_results(tmp_path / "b", first=2)
+    out = tmp_path / "v.rrd"
+    assert view(second, "--beside", first, "--save", out) == 0
+    rows = rows_of(out)
+    assert rows["first/image"] == IMAGES - 1
+    assert rows["second/image"] == IMAGES + 1
+    for entity in ("keypoints/joints", "person/joints/left_elbow_flexion"):
+        assert (rows[f"first/{entity}"], rows[f"second/{entity}"]) == (IMAGES - 2, IMAGES)
+    assert {"first_person", "second_person"} <= {entity.split("/")[0] for entity in rows}
+    starts_s: dict[str, float] = {}
+    for one in chunk.RrdReader(out).stream():
+        if (entity := str(one.entity_path)).endswith("/image"):
+            start_s = min(one.to_record_batch()["time"].to_pylist()).total_seconds()
+            starts_s[entity] = min(start_s, starts_s.get(entity, start_s))
+    assert starts_s == pytest.approx({"/first/image": 0.2, "/second/image": 0.0})
+    found = titles(layout(columns(("b", "a"))).root_container)
+    assert [title for title in found if ":" in title] == [
+        *("b: image", "b: measured body", "a: image", "a: measured body"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        ({"later_ns": 1}, "have no image in common"),
+        ({"later_ns": 10**8}, r"1 of the 6 images of \S+ are not among those of"),
+        ({"seed": 1}, "have the same stamps but other pictures"),
+    ],
+)
+def test_results_of_other_images_are_not_compared(
+    results: Path,
+    tmp_path: Path,
+    other: dict[str, int],
+    expected: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+    beside = write_results(tmp_path / "other", **other)
+    assert view(results, "--beside", beside, "--save", tmp_path / "v.rrd") == 1
+    said = capsys.readouterr().err
+    assert re.search(expected, said)
+    assert "give two results of the same recording" in said
+    assert not (tmp_path / "v.rrd").exists()
+
+
+def test_names_of_results_differ() -> None:
+    from cardbox_tracker.commands.view import _names_of
+
+    assert _names_of([]) == []
+    assert _names_of([Path("/x/one"), Path("/x/two")]) == ["one", "two"]
+    assert _names_of([Path("/x/one/results"), Path("/x/two/results")]) == [
+        "one/results",
+        "two/results",
+    ]
 
 
 def test_a_robot_of_its_own_namespace_is_shown(tmp_path: Path) -> None:
@@ -127,6 +229,8 @@ REFUSALS: list[Refusal] = [
     ((), "expected either BAG or --live"),
     (("BAG", "--live"), "expected either BAG or --live"),
     (("BAG", "--save", "FOLDER/missing/v.rrd"), "No such file or directory"),
+    (("BAG", "--beside", "FOLDER/missing"), "there is no recording"),
+    (("--live", "--beside", "BAG"), "--beside needs a bag of results"),
 ]
 
 
