@@ -107,42 +107,66 @@ def counts_of(sessions: int, frames: int) -> list[int]:
     return [frames + (more + number) // sessions for number in range(sessions)]
 
 
+class TrackedFilm:
+    """A session of a real person, tracked with the detector's points.
+
+    Attributes:
+        numbers: indices of the session's images that have an estimate.
+        session: the session.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Track the session in ``folder``.
+
+        Raises:
+            CardboxError: the folder is not a session, no image has an estimate, or the detector is
+                not installed.
+        """
+        self.session, detector = load_session(folder), Detector.installed()
+        self._found: dict[int, tuple[BodyModel, Estimate]] = {}
+        points = InputSelection(points=detector)
+        track_session(self.session, default_preset(), (0,), points, self._keep)
+        self.numbers = [
+            number
+            for number, stamp_ns in enumerate(self.session.stamps_ns.tolist())
+            if stamp_ns in self._found and self._found[stamp_ns][1].posture is not None
+        ]
+        if not self.numbers:
+            raise CardboxError(f"{self.session.name} has no image with estimate and reference")
+        truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
+        self._width = truth["camera"]["width"]
+        self._entries = {entry["stamp_ns"]: entry for entry in truth["frames"]}
+        self._frames, self._camera = _frames(self.session, detector)
+
+    def _keep(self, seed: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
+        self._found[stamp_ns] = tracker.body, estimate
+
+    def estimate(self, number: int) -> Estimate:
+        """Return the estimate of one of ``numbers``."""
+        return self._found[int(self.session.stamps_ns[number])][1]
+
+    def picture(self, number: int) -> Image:
+        """Return the first camera's image (H, W, 3), blurred, with model and reference."""
+        stamp_ns = int(self.session.stamps_ns[number])
+        frame, (body, estimate) = self._frames[stamp_ns], self._found[stamp_ns]
+        heads = heads_in(frame, self._entries[stamp_ns], self._camera, self._width)
+        seen = hidden(frame.picture, frame.silhouette, heads)
+        view = self._camera.with_pitch(body.camera_pose.pitch_rad)
+        tile = draw_overlay(seen, body, view, estimate)
+        for u, v in self._camera.project(self.session.keypoints_m[number]):
+            cv2.circle(tile, (round(u), round(v)), 3, REFERENCE_BGR, -1, cv2.LINE_AA)
+        return tile
+
+
 def tiles_of(folder: Path, count: int) -> list[Image]:
-    """Return ``count`` images of the first camera, evenly over a session, with model and reference.
+    """Return ``count`` pictures of a session in ``folder``, evenly over its time.
 
     Raises:
-        CardboxError: the folder is not a session, or the detector is not installed.
+        CardboxError: see :class:`TrackedFilm`.
     """
-    session, detector = load_session(folder), Detector.installed()
-    found: dict[int, tuple[BodyModel, Estimate]] = {}
-
-    def keep(seed: int, stamp_ns: int, estimate: Estimate, tracker: Tracker) -> None:
-        found[stamp_ns] = tracker.body, estimate
-
-    track_session(session, default_preset(), (0,), InputSelection(points=detector), keep)
-    tracked = [
-        number
-        for number, stamp_ns in enumerate(session.stamps_ns.tolist())
-        if stamp_ns in found and found[stamp_ns][1].posture is not None
-    ]
-    if not tracked:
-        raise CardboxError(f"{session.name} has no image with an estimate and a reference")
-    chosen = [tracked[int((i + 0.5) * len(tracked) / count)] for i in range(count)]
-    truth = json.loads((folder / "ground_truth.json").read_text(encoding="utf-8"))
-    entries = {entry["stamp_ns"]: entry for entry in truth["frames"]}
-    frames, camera = _frames(session, detector)
-    tiles = []
-    for number in chosen:
-        stamp_ns = int(session.stamps_ns[number])
-        frame, (body, estimate) = frames[stamp_ns], found[stamp_ns]
-        heads = heads_in(frame, entries[stamp_ns], camera, truth["camera"]["width"])
-        seen = hidden(frame.picture, frame.silhouette, heads)
-        view = camera.with_pitch(body.camera_pose.pitch_rad)
-        tile = draw_overlay(seen, body, view, estimate)
-        for u, v in camera.project(session.keypoints_m[number]):
-            cv2.circle(tile, (round(u), round(v)), 3, REFERENCE_BGR, -1, cv2.LINE_AA)
-        tiles.append(tile)
-    return tiles
+    film = TrackedFilm(folder)
+    numbers = film.numbers
+    return [film.picture(numbers[int((i + 0.5) * len(numbers) / count)]) for i in range(count)]
 
 
 def _frames(

@@ -79,11 +79,10 @@ def test_the_steps_of_an_image_by_hand() -> None:
     )
 
 
-def test_the_parts_of_a_frame_add_up(core: dict[str, Any]) -> None:
-    stages = core["default_stages"]
-    parts = [times["median_ms"] for name, times in stages.items() if name != WHOLE]
-    assert all(time > 0.0 for time in parts)
-    assert sum(parts) == pytest.approx(stages[WHOLE]["median_ms"], rel=0.3)
+def test_the_parts_of_a_frame_are_less_than_the_whole(core: dict[str, Any]) -> None:
+    medians = {name: times["median_ms"] for name, times in core["default_stages"].items()}
+    whole = medians.pop(WHOLE)
+    assert all(0.0 < time < whole for time in medians.values())
 
 
 @pytest.fixture(scope="module")
