@@ -85,6 +85,19 @@ def only_noted() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def withheld() -> Iterator[None]:
+    """Context that holds SIGINT back until its end; processes started in it never receive SIGINT.
+
+    Ctrl-C reaches all processes of a terminal, and one that is still importing prints a traceback.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def ignore() -> None:
     """Ignore SIGINT and SIGTERM from now on: for a node that ends, while DDS leaves the network.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
-from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"

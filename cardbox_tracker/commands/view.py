@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
     )
-    add_inputs(parser, required=False)
+    add_inputs(parser, needs_recording=False, needs_person=False)
     add_force(parser)
 
 
