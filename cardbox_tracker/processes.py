@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import closing, contextmanager
+from multiprocessing import resource_tracker
 from typing import TypeVar
 
 from cardbox_tracker import interrupts
@@ -35,10 +36,12 @@ def results_of(
         jobs: number of processes; with 1, the calls are done in this process.
 
     Raises:
-        CardboxError: the iterator finds that a process was killed.
+        CardboxError: the iterator finds that a process ended unexpectedly.
     """
     from joblib import Parallel, delayed, parallel_config
 
+    # Python's tracker of resources unblocks SIGINT when it starts, so it starts before.
+    resource_tracker.ensure_running()
     # numba, BLAS and OpenMP read their number of threads when a process begins.
     with parallel_config("loky", inner_max_num_threads=1):
         parallel = Parallel(
@@ -55,5 +58,6 @@ def _checked(results: Iterator[R]) -> Iterator[R]:
         yield from results
     except BrokenExecutor:
         raise CardboxError(
-            "a process was killed, perhaps because the memory was full; give a smaller --jobs"
+            "a process ended unexpectedly, perhaps because the memory was full; give a smaller "
+            "--jobs"
         ) from None

@@ -64,11 +64,10 @@ def _read(path: Path) -> dict[str, Any]:
     except ValueError as error:  # no UTF-8, or a quotation mark without its second
         raise CardboxError(f"{path} has no options as they are typed: {error}") from None
     parser = _parser(path)
-    given = {
-        name: value
-        for name, value in vars(parser.parse_args(words)).items()
-        if value != argparse.SUPPRESS
-    }
+    absent = object()
+    values = argparse.Namespace(**dict.fromkeys(vars(parser.parse_args([])), absent))
+    parser.parse_args(words, values)
+    given = {name: value for name, value in vars(values).items() if value is not absent}
     for name, value in given.items():
         if isinstance(value, Path):
             given[name] = path.parent / value
@@ -78,7 +77,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _parser(path: Path) -> argparse.ArgumentParser:
-    """Return a parser of the options of tracking, whose defaults are left out."""
+    """Return a parser of the options of tracking, whose errors name the file."""
 
     class Parser(argparse.ArgumentParser):
         def error(self, message: str) -> NoReturn:
@@ -86,6 +85,4 @@ def _parser(path: Path) -> argparse.ArgumentParser:
 
     parser = Parser(add_help=False, allow_abbrev=False)
     add_inputs(parser, needs_recording=False, needs_person=False)
-    defaults = vars(parser.parse_args([]))
-    parser.set_defaults(**dict.fromkeys(defaults, argparse.SUPPRESS))
     return parser

@@ -46,16 +46,13 @@ def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
     """
     left_out = None if output is None else output.resolve()
     paths = {path.relative_to(folder): path for path in _found(folder, left_out)}
-    short = {
-        inside: inside if path.is_dir() else inside.with_suffix("")
-        for inside, path in paths.items()
-    }
-    count = Counter(short.values())
+    short = {path: path if paths[path].is_dir() else path.with_suffix("") for path in paths}
+    count = Counter([*short.values(), *paths])
     names = {
-        (short[inside] if count[short[inside]] == 1 else inside).as_posix(): path
-        for inside, path in paths.items()
+        (short[path] if count[short[path]] == 1 + (short[path] == path) else path).as_posix(): path
+        for path in paths
     }
-    return dict(sorted(names.items()))
+    return {name: paths[names[name]] for name in sorted(names)}
 
 
 def _found(folder: Path, left_out: Path | None) -> Iterator[Path]:
