@@ -12,10 +12,7 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 # The tools that train the package's networks and coefficients need these 3 GB.
 LEARN = ["scikit-learn>=1.4,<2", "torch>=2.2,<3"]
-# The paper's experiments need this; a checkout has them.
-EXPERIMENTS = ["joblib>=1.3,<2"]
 TEST = [
-    *EXPERIMENTS,
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
     "hypothesis>=6.100",
@@ -87,6 +84,7 @@ setup(
     # The upper bound is the next version that may break the interface: a major one, but a minor
     # one of rosbags, whose interface still changes.
     install_requires=[
+        "joblib>=1.3,<2",
         "lz4>=4.3,<5",
         "matplotlib>=3.8,<4",
         "numba>=0.60,<1",
@@ -103,7 +101,6 @@ setup(
         "view": VIEW,
         "retarget": RETARGET,
         "learn": LEARN,
-        "experiments": EXPERIMENTS,
         "detector": DETECTOR,
         "parquet": PARQUET,
         "docs": DOCS,

@@ -85,6 +85,23 @@ def only_noted() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def withheld() -> Iterator[None]:
+    """Context that holds signals back until its end; processes started in it never receive SIGINT.
+
+    Ctrl-C reaches all processes of a terminal, and one that is still importing prints a traceback.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        # A thread that does not block the signal can receive it, too.
+        with _responding("note"):
+            yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    if _state.response == "raise" and _state.received:
+        raise KeyboardInterrupt
+
+
 def ignore() -> None:
     """Ignore SIGINT and SIGTERM from now on: for a node that ends, while DDS leaves the network.
 

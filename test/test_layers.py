@@ -16,7 +16,10 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # From the bottom to the top: a module imports from its own folder and from the layers before.
 # Folders named together do not import each other.
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("compiling", "errors", "files", "interrupts", "progress", "settings", "small_yaml"),
+    (
+        *("compiling", "errors", "files", "interrupts", "processes", "progress", "settings"),
+        "small_yaml",
+    ),
     ("body",),
     ("vision", "description"),
     ("detection",),

@@ -40,5 +40,5 @@ def from_checkout(module: str, target: str) -> Any:
     except ModuleNotFoundError as error:
         raise CardboxError(
             f"{module} needs {error.name}, which is not installed; "
-            "run pip install '.[experiments]' in the checkout"
+            "run 'pip install .' in the checkout"
         ) from None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from cardbox_tracker import __version__
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
 from cardbox_tracker.commands.settings_arguments import add_settings, settings_from
-from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:

@@ -1,55 +1,35 @@
-"""``cardbox track``: the posture in each image of a recording."""
+"""``cardbox track``: the posture in each image of a recording, or of a folder of recordings."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.arguments import (
-    add_cameras,
-    add_depth,
-    add_detector,
-    add_preset,
-    add_recording,
-    add_retired,
-    add_seed,
-    points_of,
-    print_remarks,
-    silhouettes_of,
-)
-from cardbox_tracker.commands.camera_arguments import (
-    add_camera,
-    camera_of,
-    detector_among,
-    pitch_of,
-)
+from cardbox_tracker.commands.arguments import at_least
+from cardbox_tracker.commands.camera_arguments import check_alone
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.person_arguments import (
-    STANDING_S,
-    add_person,
-    measured_person,
-    person_of_stature,
-    start_of,
+from cardbox_tracker.commands.tracking import (
+    ResultFiles,
+    add_inputs,
+    check_person,
+    inputs_of,
+    track_inputs,
 )
-from cardbox_tracker.commands.settings_arguments import (
-    add_tracker_settings,
-    with_tracker_settings,
-)
-from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.files import is_written_in_place
 
-if TYPE_CHECKING:
-    from cardbox_tracker.estimation.config import TrackerConfig
-    from cardbox_tracker.recordings.track import Observer, TrackFiles, TrackSummary
-
 NAME = "track"
-HELP = "follow the posture through a recording"
+HELP = "follow the posture through a recording, or through all recordings of a folder"
+
+_OF_ONE = ("--csv", "--bag", "--video")
+_OF_MANY = ("--output", "--formats", "--jobs")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox track``."""
-    add_inputs(parser)
+    from cardbox_tracker.commands.track_folder import FORMATS
+
+    # The recordings of a folder can have files that name the person.
+    add_inputs(parser, needs_person=False)
     parser.add_argument(
         "--csv",
         type=Path,
@@ -65,38 +45,56 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--video", type=Path, default=None, metavar="OUT.mp4", help="also write an overlay video"
     )
+    many = parser.add_argument_group("a folder of recordings (docs/many-recordings.md)")
+    many.add_argument(
+        "--output",
+        type=Path,
+        default=None,
+        metavar="DIR",
+        help="folder of the results; by default FOLDER_tracked in the current folder. A recording "
+        "that is finished there with the same inputs and settings is not tracked again",
+    )
+    many.add_argument(
+        "--formats",
+        nargs="+",
+        choices=FORMATS,
+        default=None,
+        help="results of each recording; csv by default",
+    )
+    many.add_argument(
+        "--jobs",
+        type=at_least(1),
+        default=None,
+        metavar="N",
+        help="recordings that are tracked at a time, each on one core; one per core by default",
+    )
     add_force(parser)
-
-
-def add_inputs(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """Add the arguments for the recording, the person and the settings.
-
-    Without ``required``, the recording may be missing, or be a bag of results without further
-    arguments.
-    """
-    add_recording(parser, required, only_bags=False)
-    add_cameras(parser)
-    add_depth(parser)
-    add_detector(parser)
-    add_camera(parser)
-    add_person(parser, required)
-    add_preset(parser, "default")
-    add_tracker_settings(parser)
-    add_retired(parser, "--refine-sizes", "breadths stay as they were measured")
-    add_seed(parser, "the filters")
 
 
 def run(options: argparse.Namespace) -> None:
     """Track the person and write the requested files.
 
     Raises:
-        CardboxError: the recording or the body model cannot be read, a setting is out of range, or
-            a result cannot be written.
+        CardboxError: a recording or a body model cannot be read, a setting is out of range, or a
+            result cannot be written.
     """
-    from cardbox_tracker.body.model_file import save_body_model
-    from cardbox_tracker.recordings.result_table import check_table
-    from cardbox_tracker.recordings.track import TrackFiles
+    from cardbox_tracker.recordings.folder import is_one_recording, recordings_in
 
+    path = options.recording
+    if not is_one_recording(path) and recordings_in(path, options.output):
+        from cardbox_tracker.commands.track_folder import track_folder
+
+        check_alone(options, _OF_ONE, f"on {path}, a folder of recordings: give --formats")
+        track_folder(options)
+    else:
+        check_alone(options, _OF_MANY, f"on {path}, which is one recording: give --csv")
+        _track_one(options)
+
+
+def _track_one(options: argparse.Namespace) -> None:
+    from cardbox_tracker.recordings.result_table import check_table
+
+    check_person(options)
     table = options.csv or Path(f"{_name(options.recording)}.csv")
     check_table(table)
     model = None
@@ -104,16 +102,14 @@ def run(options: argparse.Namespace) -> None:
         # There is no place for a further file beside a pipe.
         beside = Path(_name(options.recording)) if is_written_in_place(table) else table
         model = beside.with_name(f"{beside.stem}.body.yaml")
+    files = ResultFiles(table, options.video, options.bag, model)
     check_outputs(
         (table, model, options.video),
         options.force,
         inputs=inputs_of(options),
         results=() if options.bag is None else (options.bag,),
     )
-    files = TrackFiles(table, options.video)
-    summary = track_inputs(options, files, options.bag, options.force)
-    if model is not None and summary.body is not None:
-        save_body_model(summary.body, model)
+    track_inputs(options, files, options.force)
     for path in (table, model, options.video, options.bag):
         if path is not None:
             print(f"wrote {path}")
@@ -122,95 +118,3 @@ def run(options: argparse.Namespace) -> None:
 def _name(recording: Path) -> str:
     path = recording.resolve()
     return path.name if path.is_dir() else path.stem
-
-
-def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
-    """Return the files that the arguments of :func:`add_inputs` name."""
-    # These two may also be words, which name no file.
-    words = options.detector, options.corrector
-    files = options.recording, options.model, options.extrinsics, options.settings
-    return *files, options.calibration, *(Path(word) for word in words if word)
-
-
-def track_inputs(
-    options: argparse.Namespace,
-    files: TrackFiles | None = None,
-    bag: Path | None = None,
-    force: bool = False,
-    observers: tuple[Observer, ...] = (),
-) -> TrackSummary:
-    """Track the recording of :func:`add_inputs`, print a summary and return it.
-
-    ``observers`` are called after each image. With ``force``, an existing ``bag`` is replaced.
-
-    Raises:
-        CardboxError: see :func:`run`.
-    """
-    from cardbox_tracker.progress import progress_bar
-    from cardbox_tracker.recordings.recording import open_recording
-    from cardbox_tracker.recordings.result_bag import result_bag
-    from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.recordings.track import TrackFiles, track_recording
-
-    start_s = start_of(options)
-    # Mistakes in the numbers are reported before the recording is read.
-    is_measured = options.stature is None
-    body = measured_person(options) if is_measured else person_of_stature(options)
-    config = _config(options)
-    is_more = len(options.cameras) > 1 or options.depth is not None
-    if is_more and not config.has_several_views:
-        raise CardboxError(
-            "--preset paper uses the silhouette of one camera; give --preset default with several "
-            "cameras or with --depth"
-        )
-    silhouettes, points = silhouettes_of(options), points_of(options)
-    camera = camera_of(options)
-    if not is_measured:
-        standing = TimeSpan(start_s, start_s + STANDING_S)
-        pitch_rad, camera = pitch_of(options, detector_among(silhouettes, points), standing)
-        body = person_of_stature(options, pitch_rad)
-    with open_recording(
-        options.recording,
-        silhouettes,
-        options.cameras,
-        options.extrinsics,
-        options.depth,
-        points,
-        camera,
-    ) as source:
-        total_s = max(1e-9, source.first.duration_s - start_s)
-        with (
-            result_bag(bag, source.first.frame_id, force) as record,
-            progress_bar("track") as show,
-        ):
-            summary = track_recording(
-                source,
-                body,
-                config,
-                options.seed,
-                start_s,
-                files or TrackFiles(),
-                observers=(
-                    record,
-                    *observers,
-                    lambda frame, *_: show((frame.time_s - start_s) / total_s),
-                ),
-            )
-        remarks = source.first.remarks
-    doubt = f" ({summary.frames_uncertain} of them uncertain)" if summary.frames_uncertain else ""
-    print(
-        f"tracked {summary.frames_tracked} of {summary.frames} images{doubt}, "
-        f"mean cost {summary.mean_cost_px:.0f} px, mean IoU {summary.mean_iou:.3f}"
-    )
-    print_remarks(remarks, summary.remarks)
-    return summary
-
-
-def _config(options: argparse.Namespace) -> TrackerConfig:
-    """Return the preset changed by the options."""
-    from cardbox_tracker.estimation.config import PRESETS
-
-    config = PRESETS[options.preset]()
-    if options.depth is not None:
-        config = config.with_depth()
-    return with_tracker_settings(config, options)

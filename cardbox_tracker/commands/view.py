@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.track import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="second bag of results of the same recording, such as with other settings, to show "
         "beside the first",
     )
-    add_inputs(parser, required=False)
+    add_inputs(parser, needs_recording=False, needs_person=False)
     add_force(parser)
 
 

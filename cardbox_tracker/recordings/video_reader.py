@@ -21,6 +21,8 @@ from cardbox_tracker.vision.image_headers import check_pixels
 
 FORMATS = "MP4, MOV, AVI, MKV or WebM"
 """Common containers, for texts; any that OpenCV can read will do."""
+SUFFIXES = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm")
+"""Endings, in small or capital letters, by which videos are found in a folder."""
 
 # Rate of a video that states none, and the largest rate that is believed, Hz.
 _USUAL_HZ, _MOST_HZ = 30.0, 1000.0

@@ -19,6 +19,10 @@ ROOT = Path(__file__).resolve().parents[2]
 NAMES = [command.NAME for command in COMMANDS]
 # Modules beside the subcommands.
 SHARED = {
+    "folder_summary",
+    "recording_options",
+    "track_folder",
+    "tracking",
     *("output_paths", "__init__", "arguments", "checkout", "command", "main"),
     *("camera_arguments", "person_arguments"),
     "settings_arguments",

@@ -1,0 +1,63 @@
+"""Independent calls in several processes of one thread each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import closing, contextmanager
+from multiprocessing import resource_tracker
+from typing import TypeVar
+
+from cardbox_tracker import interrupts
+from cardbox_tracker.errors import CardboxError
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    from joblib import cpu_count
+
+    return int(cpu_count())
+
+
+@contextmanager
+def results_of(
+    function: Callable[[A], R], arguments: Sequence[A], jobs: int
+) -> Iterator[Iterator[R]]:
+    """Context of an iterator over the results of calls, in the order in which they finish.
+
+    Leaving the context before the end, as by Ctrl-C, ends all processes at once.
+
+    Args:
+        function: function of a module that other processes can import.
+        arguments: the argument of each call; calls begin in this order.
+        jobs: number of processes; with 1, the calls are done in this process.
+
+    Raises:
+        CardboxError: the iterator finds that a process ended unexpectedly.
+    """
+    from joblib import Parallel, delayed, parallel_config
+
+    # Python's tracker of resources unblocks SIGINT when it starts, so it starts before.
+    resource_tracker.ensure_running()
+    # numba, BLAS and OpenMP read their number of threads when a process begins.
+    with parallel_config("loky", inner_max_num_threads=1):
+        parallel = Parallel(
+            jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="all", max_nbytes=None
+        )
+        with interrupts.withheld():
+            results = parallel(delayed(function)(argument) for argument in arguments)
+    with closing(results):
+        yield _checked(results)
+
+
+def _checked(results: Iterator[R]) -> Iterator[R]:
+    try:
+        yield from results
+    except BrokenExecutor:
+        raise CardboxError(
+            "a process ended unexpectedly, perhaps because the memory was full; give a smaller "
+            "--jobs"
+        ) from None

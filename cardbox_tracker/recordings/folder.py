@@ -1,0 +1,71 @@
+"""Finds the recordings in a folder."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS
+from cardbox_tracker.recordings.image_folder import image_files
+from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
+
+SUMMARY = "_summary.csv"
+"""Name of the summary in a folder of results, by which such folders are left out."""
+
+
+def is_one_recording(path: Path) -> bool:
+    """Return whether a path is a single recording, not a folder of them.
+
+    A folder is a recording if it is a rosbag2, if its folder ``bag`` is one, or if it has exactly
+    one file of a bag. It is also one if it has images, unless such recordings are in its folders.
+    """
+    if not path.is_dir() or _is_rosbag2(path):
+        return True
+    inside = list(path.iterdir())
+    if sum(entry.suffix in FILE_ENDINGS and entry.is_file() for entry in inside) == 1:
+        return True
+    return bool(image_files(path)) and not any(map(_is_rosbag2, inside))
+
+
+def _is_rosbag2(path: Path) -> bool:
+    return any((folder / "metadata.yaml").is_file() for folder in (path, path / "bag"))
+
+
+def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
+    """Return the recordings in ``folder`` and in its folders, by their names, in order.
+
+    A name is the path from ``folder`` on, with "/". It has the ending of the file only where
+    another recording would have the same name. Hidden entries and folders of results are left out,
+    and links to folders are followed only if they are recordings.
+
+    Args:
+        folder: a folder that is no recording itself.
+        output: a folder that is left out; None for none.
+    """
+    left_out = None if output is None else output.resolve()
+    paths = {path.relative_to(folder): path for path in _found(folder, left_out)}
+    short = {path: path if paths[path].is_dir() else path.with_suffix("") for path in paths}
+    count = Counter([*short.values(), *paths])
+    names = {
+        (short[path] if count[short[path]] == 1 + (short[path] == path) else path).as_posix(): path
+        for path in paths
+    }
+    return {name: paths[names[name]] for name in sorted(names)}
+
+
+def _found(folder: Path, left_out: Path | None) -> Iterator[Path]:
+    with os.scandir(folder) as entries:
+        names = sorted(entry.name for entry in entries if not entry.name.startswith("."))
+    if SUMMARY in names:
+        return
+    for path in (folder / name for name in names):
+        if path.is_file():
+            if path.suffix in FILE_ENDINGS or path.suffix.lower() in VIDEO_ENDINGS:
+                yield path
+        elif path.is_dir() and path.resolve() != left_out:
+            if is_one_recording(path):
+                yield path
+            elif not path.is_symlink():
+                yield from _found(path, left_out)

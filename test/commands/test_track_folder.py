@@ -1,0 +1,260 @@
+"""'cardbox track' of a folder: the bytes, the resumption, failures and Ctrl-C."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cardbox_tracker.commands import track_folder
+from cardbox_tracker.commands.tracking import ResultFiles
+from cardbox_tracker.errors import CardboxError
+from cardbox_tracker.recordings.folder import SUMMARY
+from cardbox_tracker.recordings.track import TrackSummary
+
+GIVEN = ("--model", "PERSON", "--background=0:3.9", "--start=15.6")
+
+
+def words(files: Path) -> list[str]:
+    return [word.replace("PERSON", str(files / "person.yaml")) for word in GIVEN]
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Return the content of every file below a folder, by its path."""
+    found = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found}
+
+
+def rows(folder: Path) -> dict[str, dict[str, str]]:
+    with (folder / SUMMARY).open(newline="") as file:
+        return {row["recording"]: row for row in csv.DictReader(file)}
+
+
+@pytest.fixture(scope="module")
+def recordings(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of two recordings that differ, and one that is cut off."""
+    folder = tmp_path_factory.mktemp("many")
+    shutil.copytree(files / "session", folder / "a")
+    shutil.copytree(files / "session", folder / "anna" / "b")
+    (folder / "anna" / "b.options").write_text("--start 17\n")
+    shutil.copy(files / "cut.mcap", folder / "cut.mcap")
+    (folder / "plan.txt").write_text("no recording")
+    shutil.copy(files / "cut.mcap", folder / "cut2.mcap")
+    return folder
+
+
+def test_two_processes_write_the_bytes_of_one_after_the_other(
+    files: Path, recordings: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    given = words(files)
+    alone, both = tmp_path / "alone", tmp_path / "both"
+    many = cardbox("track", recordings, *given, "--output", both, "--jobs=2", "--formats", "bag")
+    for name, start in (("a", "15.6"), ("anna/b", "17")):
+        (alone / name).parent.mkdir(parents=True, exist_ok=True)
+        outputs = (f"--csv={alone / name}.csv", f"--bag={alone / name}.bag")
+        assert cardbox("track", recordings / name, *given, f"--start={start}", *outputs).code == 0
+    found = results(both)
+    assert found.pop(SUMMARY)
+    assert found == results(alone)
+    # The others are done, and the failures are told at the end.
+    assert many.code == 1
+    assert "Traceback" not in many.err
+    *_, failed, first, second = many.err.replace("\r", "\n").splitlines()
+    assert failed == "cardbox track: 2 of 4 recordings failed"
+    assert first.startswith("  cut: cannot read the recording")
+    assert second.startswith("  cut2: cannot read the recording")
+    assert re.search(r"(?m)^a +\d+ +\d+ +\d+ +0\.\d+$", many.out)
+    assert re.search(r"(?m)^cut +failed$", many.out)
+    status = {name: row["status"] for name, row in rows(both).items()}
+    assert status == {"a": "tracked", "anna/b": "tracked", "cut": "failed", "cut2": "failed"}
+
+
+class Tracked:
+    """Stands for the tracking of a recording: it writes the table and notes the name.
+
+    Attributes:
+        names: recordings that were tracked.
+        errors: what is raised for a recording.
+    """
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self.errors: dict[str, BaseException] = {}
+
+    def __call__(
+        self, options: argparse.Namespace, files: ResultFiles, force: bool, show: Any
+    ) -> TrackSummary:
+        name = options.recording.stem
+        self.names.append(name)
+        for path in filter(None, files):
+            path.write_text(f"{name} with effort {options.effort}")
+        if name in self.errors:
+            raise self.errors[name]
+        show(0.5)
+        print("cardbox: a remark", file=sys.stderr)
+        return TrackSummary(10, 8, 12.34, 0.9, 1)
+
+
+@pytest.fixture
+def tracked(monkeypatch: pytest.MonkeyPatch) -> Tracked:
+    tracking = Tracked()
+    monkeypatch.setattr(track_folder, "track_inputs", tracking)
+    return tracking
+
+
+@pytest.fixture
+def track(files: Path, tmp_path: Path, cardbox: Callable, tracked: Tracked) -> Callable:
+    """Track the films a, b and c, and return the recordings that were tracked."""
+    folder = tmp_path / "films"
+    folder.mkdir()
+    shutil.copy(files / "person.yaml", folder / "person.yaml")
+    for name in "abc":
+        (folder / f"{name}.mp4").write_text(name)
+
+    def run(*more: object, code: int = 0) -> list[str]:
+        tracked.names.clear()
+        given = ("--model", folder / "person.yaml", "--background=0:3.9", "--start=15.6")
+        output = ("--output", tmp_path / "out", "--jobs=1")
+        done = cardbox("track", folder, *given, *output, *more)
+        assert done.code == code, done.err
+        run.done = done  # type: ignore[attr-defined]
+        return sorted(tracked.names)
+
+    return run
+
+
+def test_finished_recordings_are_not_done_again(track: Callable, tmp_path: Path) -> None:
+    assert track() == ["a", "b", "c"]
+    before = results(tmp_path / "out")
+    assert sorted(before) == [SUMMARY, "a.csv", "b.csv", "c.csv"]
+    assert track() == []
+    assert "3 of 3 recordings are finished" in track.done.out
+    assert results(tmp_path / "out") == before
+    assert track("--force") == ["a", "b", "c"]
+    assert results(tmp_path / "out") == before
+
+
+def test_changes_are_done_again(track: Callable, tmp_path: Path) -> None:
+    films, out = tmp_path / "films", tmp_path / "out"
+    track()
+    assert track("--effort=2") == ["a", "b", "c"]
+    assert (out / "a.csv").read_text() == "a with effort 2.0"
+    assert track("--effort=2", "--formats", "csv", "mp4") == ["a", "b", "c"]
+    assert track() == ["a", "b", "c"]
+    assert sorted(results(out)) == [SUMMARY, "a.csv", "b.csv", "c.csv"]
+    (films / "b.mp4").write_text("longer")
+    assert track() == ["b"]
+    (films / "c.options").write_text("--effort 0.5")
+    assert track() == ["c"]
+    (out / "a.csv").unlink()
+    assert track() == ["a"]
+    (films / "d.mp4").write_text("d")
+    assert track() == ["d"]
+    text = (films / "person.yaml").read_text()
+    (films / "person.yaml").write_text(text + "\n# measured again\n")
+    assert track() == ["a", "b", "c", "d"]
+
+
+def test_a_failure_is_named_and_tried_again(
+    track: Callable, tracked: Tracked, tmp_path: Path
+) -> None:
+    track()
+    tracked.errors = {"a": CardboxError("no image lies\nhere"), "b": ZeroDivisionError("by zero")}
+    assert track("--effort=2", code=1) == ["a", "b", "c"]
+    assert "2 of 3 recordings failed\n  a: no image lies here\n" in track.done.err
+    assert "  b: unexpected ZeroDivisionError: by zero; 'cardbox track'" in track.done.err
+    assert "c: a remark\n" in track.done.err
+    # Results of other settings would be taken for those of this run.
+    assert sorted(results(tmp_path / "out")) == [SUMMARY, "c.csv"]
+    tracked.errors = {}
+    assert track("--effort=2") == ["a", "b"]
+
+
+def test_mistakes_in_the_options_of_one_do_not_stop_the_others(
+    track: Callable, tmp_path: Path
+) -> None:
+    (tmp_path / "films" / "b.options").write_text("--distance far")
+    assert track(code=1) == ["a", "c"]
+    assert "1 of 3 recordings failed\n  b: " in track.done.err
+    assert "b.options" in track.done.err
+
+
+def test_an_interrupted_run_leaves_nothing_half_done(
+    track: Callable, tracked: Tracked, tmp_path: Path
+) -> None:
+    tracked.errors = {"b": KeyboardInterrupt()}
+    track(code=130)
+    done = sorted(set(tracked.names) - {"b"})
+    assert sorted(results(tmp_path / "out")) == [SUMMARY, *(f"{name}.csv" for name in done)]
+    assert sorted(rows(tmp_path / "out")) == done
+    tracked.errors = {}
+    assert track() == sorted({"a", "b", "c"} - set(done))
+
+
+def test_what_is_refused(track: Callable, tmp_path: Path, files: Path, cardbox: Callable) -> None:
+    films = tmp_path / "films"
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.txt").write_text("years of work")
+    for given, expected in (
+        (("--csv", tmp_path / "x.csv"), "--csv has no effect on"),
+        (("--formats", "csv", "parquet"), "csv and parquet; give one"),
+        (("--output", tmp_path / "other"), "other exists and has no _summary.csv"),
+        (("--output", films), "it is read"),
+        (("--output", films / "a.mp4"), "it is read"),
+    ):
+        assert track(*given, code=1) == []
+        track.done.assert_refused("track", expected)
+    one = cardbox("track", files / "session", *words(files), "--jobs=2")
+    one.assert_refused("track", "--jobs has no effect on", "which is one recording")
+    (tmp_path / "out").mkdir(exist_ok=True)
+    (tmp_path / "out" / SUMMARY).write_text("year,income\n")
+    assert track(code=1) == []
+    track.done.assert_refused("track", "is no summary of tracked recordings")
+
+
+def test_the_person_may_be_in_the_files_alone(
+    files: Path, tmp_path: Path, tracked: Tracked, cardbox: Callable
+) -> None:
+    for name in "ab":
+        (tmp_path / f"{name}.mp4").write_text(name)
+    (tmp_path / "a.options").write_text("--stature 1.7")
+    done = cardbox("track", tmp_path, "--output", tmp_path / "out", "--jobs=1")
+    assert (done.code, tracked.names) == (1, ["a"])
+    assert "  b: one of the arguments --model --stature is required" in done.err
+    assert sorted(results(tmp_path / "out")) == [SUMMARY, "a.body.yaml", "a.csv"]
+
+
+def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Path) -> None:
+    out, folder = tmp_path / "out", tmp_path / "many"
+    for number in range(8):
+        shutil.copytree(files / "session", folder / f"{number}")
+    command = [sys.executable, "-m", "cardbox_tracker.start", "cardbox", "track", str(folder)]
+    given = [*words(files), "--effort=4", "--jobs=2", f"--output={out}"]
+    with subprocess.Popen(
+        command + given, stderr=subprocess.PIPE, start_new_session=True, text=True
+    ) as process:
+        # The first result shows that others are being tracked.
+        while not list(out.glob("*.csv"))[1:]:
+            assert process.poll() is None
+            time.sleep(0.02)
+        # A terminal sends it to all processes.
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert said.rstrip().endswith("cardbox track: interrupted")
+    # Finished results are whole, and nothing else is left.
+    done = rows(out)
+    assert 1 <= len(done) < 8
+    assert sorted(results(out)) == [*(f"{name}.csv" for name in sorted(done)), SUMMARY]

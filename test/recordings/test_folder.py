@@ -1,0 +1,72 @@
+"""The recordings of a folder: which paths are some, and their names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cardbox_tracker.recordings.folder import SUMMARY, is_one_recording, recordings_in
+
+
+def make(folder: Path, *names: str) -> None:
+    """Make empty files; their content does not count."""
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (("metadata.yaml", "a_0.mcap", "a_1.mcap"), True),
+        (("bag/metadata.yaml", "bag/bag.mcap", "background.png"), True),
+        (("a.mcap",), True),
+        (("a.mcap", "b.mcap"), False),
+        (("1.JPG", "2.JPG", "masks/1.png"), True),
+        (("1.jpg", "preview.mp4"), True),
+        (("plan.png", "a/bag/metadata.yaml"), False),
+        (("a.mp4",), False),
+        (("README.md",), False),
+    ],
+)
+def test_a_folder_is_one_recording_or_many(
+    tmp_path: Path, names: tuple[str, ...], expected: bool
+) -> None:
+    make(tmp_path, *names)
+    assert is_one_recording(tmp_path) is expected
+
+
+def test_a_file_is_one_recording(tmp_path: Path) -> None:
+    assert is_one_recording(tmp_path / "missing.mp4")
+
+
+def test_recordings_are_named_by_their_place(tmp_path: Path) -> None:
+    make(tmp_path, "b/bag/metadata.yaml", "a/film.MP4", "a/photos/1.png", "c_0.mcap", "d.db3")
+    make(tmp_path, "README.md", "notes.txt", "a/film.options", "person.yaml", "empty/.keep")
+    found = recordings_in(tmp_path)
+    assert list(found) == ["a/film", "a/photos", "b", "c_0", "d"]
+    assert found["a/film"] == tmp_path / "a" / "film.MP4"
+    assert found["b"] == tmp_path / "b"
+
+
+def test_equal_names_keep_their_endings(tmp_path: Path) -> None:
+    make(tmp_path, "film.mp4", "film.mov", "walk.mp4", "walk/metadata.yaml")
+    assert list(recordings_in(tmp_path)) == ["film.mov", "film.mp4", "walk", "walk.mp4"]
+
+
+def test_names_that_an_ending_would_make_equal_differ(tmp_path: Path) -> None:
+    make(tmp_path, "film.mp4", "film.mov", "film.mp4.avi")
+    found = recordings_in(tmp_path)
+    assert len(found) == 3
+    assert set(found.values()) == set(tmp_path.iterdir())
+
+
+def test_results_hidden_entries_and_linked_folders_are_left_out(tmp_path: Path) -> None:
+    make(tmp_path, "in/a.mp4", "in/.cache/b.mp4", "in/.c.mp4", f"in/old/{SUMMARY}", "in/old/a.mp4")
+    make(tmp_path, "in/new/a.mp4", "far/d.mp4", "session/metadata.yaml")
+    (tmp_path / "in" / "link").symlink_to(tmp_path / "far")
+    (tmp_path / "in" / "linked").symlink_to(tmp_path / "session")
+    (tmp_path / "in" / "circle").symlink_to(tmp_path / "in")
+    assert list(recordings_in(tmp_path / "in", tmp_path / "in" / "new")) == ["a", "linked"]
