@@ -71,7 +71,9 @@ def hour(record: Record, seconds: float) -> None:
 
         def take(passed_s: float) -> None:
             background = cameras.account("background", line.sent)
-            tracker = cameras.account("tracker", background["published"])
+            # A gap before the first node is one before the second as well.
+            passed_on = background["published"] + background["told"]
+            tracker = cameras.account("tracker", passed_on)
             shown = [number for number in range(line.sent) if is_there(number / RATE_HZ)]
             back = [n for n in shown if not is_there((n - 2 * RATE_HZ) / RATE_HZ) and n > 150]
             come = [n for n in back if is_there((n - 2 * RATE_HZ + 1) / RATE_HZ)]
@@ -83,7 +85,7 @@ def hour(record: Record, seconds: float) -> None:
                     "images left out in silence": background["silent"],
                     "silhouettes sent by `background`": background["published"],
                     "silhouettes received by `tracker`": tracker["received"],
-                    "silhouettes left out on the way, and told": tracker["told"],
+                    "silhouettes left out on the way, and told, with those images": tracker["told"],
                     "silhouettes left out in silence": tracker["silent"],
                     "images with the person": len(shown),
                     "of these with a posture": len(line.answered & set(shown)),

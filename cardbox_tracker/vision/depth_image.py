@@ -58,8 +58,8 @@ def decode_depth(
     padded = raw[: height * step].reshape(height, step)
     if code == "u2" and step == 2 * row_bytes and padded[:, row_bytes:].any():
         raise EncodingError(
-            f"a {encoding} image of {width}x{height} has rows of {step} bytes with numbers in all of "
-            f"them; expected {row_bytes} bytes: is it 32FC1, in metres? Correct the encoding"
+            f"a {encoding} image of {width}x{height} has rows of {step} bytes with numbers in all "
+            f"of them; expected {row_bytes} bytes: is it 32FC1, in metres? Correct the encoding"
         )
     rows = np.ascontiguousarray(padded[:, :row_bytes])
     depth = rows.view(kind).reshape(height, width).astype(np.float32) * np.float32(metres)
@@ -134,9 +134,9 @@ def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
     # Sizes are rounded to multiples of eight pixels.
     if abs(columns * height - rows * width) > _ASPECT * rows * width:
         raise EncodingError(
-            f"the depth image is {columns}x{rows}, another shape than the camera's {width}x{height}, "
-            "so it has another view; expected the depth in the camera's view, or on a topic with "
-            "its own CameraInfo"
+            f"the depth image is {columns}x{rows}, another shape than the camera's "
+            f"{width}x{height}, so it has another view; expected the depth in the "
+            "camera's view, or on a topic with its own CameraInfo"
         )
     resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(resized, np.float32)
