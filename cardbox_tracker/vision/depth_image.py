@@ -23,6 +23,8 @@ from cardbox_tracker.vision.image_headers import check_pixels, compressed_size
 DepthImage = NDArray[np.float32]
 
 _LONGEST_PX = 32_766
+# Largest difference of two aspect ratios that are meant to be one.
+_ASPECT = 0.04
 # Header before the PNG of a compressedDepth message: the number of the format and the two
 # parameters of the inverse depths in which 32FC1 is packed.
 _PACKED = struct.Struct("<iff")
@@ -36,8 +38,8 @@ def decode_depth(
     """Return a depth image (H, W), metres along the optical axis; 0 where nothing was measured.
 
     Raises:
-        EncodingError: the encoding is not that of a depth image, the bytes do not fit it, or it is
-            too large.
+        EncodingError: the encoding is not that of a depth image, the bytes do not fit it or seem to
+            be of 32 bit a pixel where it has 16, or the image is too large.
     """
     if encoding not in _KINDS:
         raise EncodingError(
@@ -53,7 +55,13 @@ def decode_depth(
             f"a {encoding} image of {width}x{height} has rows of {step} bytes and {len(raw)} bytes "
             f"in all; expected {row_bytes} or more a row: the message is incomplete"
         )
-    rows = np.ascontiguousarray(raw[: height * step].reshape(height, step)[:, :row_bytes])
+    padded = raw[: height * step].reshape(height, step)
+    if code == "u2" and step == 2 * row_bytes and padded[:, row_bytes:].any():
+        raise EncodingError(
+            f"a {encoding} image of {width}x{height} has rows of {step} bytes with numbers in all "
+            f"of them; expected {row_bytes} bytes: is it 32FC1, in metres? Correct the encoding"
+        )
+    rows = np.ascontiguousarray(padded[:, :row_bytes])
     depth = rows.view(kind).reshape(height, width).astype(np.float32) * np.float32(metres)
     return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
 
@@ -115,9 +123,21 @@ def depth_from_image(message: Any) -> DepthImage:
 
 
 def at_size(depth_m: DepthImage, width: int, height: int) -> DepthImage:
-    """Resize a depth image by picking pixels, so that each value is measured and no mean."""
-    if depth_m.shape == (height, width):
+    """Resize a depth image by picking pixels, so that each value is measured and no mean.
+
+    Raises:
+        EncodingError: the aspect ratio is another one, so the image has another view.
+    """
+    rows, columns = depth_m.shape
+    if (rows, columns) == (height, width):
         return depth_m
+    # Sizes are rounded to multiples of eight pixels.
+    if abs(columns * height - rows * width) > _ASPECT * rows * width:
+        raise EncodingError(
+            f"the depth image is {columns}x{rows}, another shape than the camera's "
+            f"{width}x{height}, so it has another view; expected the depth in the "
+            "camera's view, or on a topic with its own CameraInfo"
+        )
     resized = cv2.resize(depth_m, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(resized, np.float32)
 

@@ -16,6 +16,8 @@ _PAUSE_NS = 2_000_000_000
 _RESTART_NS = 1_000_000_000
 # After this many consecutive images of one clock the other clock is forgotten.
 _PATIENCE = 5
+# The period is known from this number of spacings on.
+_ENOUGH = 5
 
 
 class StampOrder(Enum):
@@ -118,8 +120,11 @@ class StreamStatistics:
             self._ordered_ns.clear()
         elif order is StampOrder.NEXT and last_ns is not None:
             self._note(spacing_ns := stamp_ns - last_ns)
-            if len(self._spacings_ns) >= 5:
-                self.dropped += max(round(spacing_ns / self.period_ns) - 1, 0)
+            # Once the period is known, losses among the images that showed it count as well.
+            if len(self._spacings_ns) == _ENOUGH:
+                self.dropped += sum(map(self._lost_in, self._spacings_ns))
+            elif len(self._spacings_ns) > _ENOUGH:
+                self.dropped += self._lost_in(spacing_ns)
         return order
 
     def _note(self, spacing_ns: int) -> None:
@@ -127,6 +132,9 @@ class StreamStatistics:
             del self._ordered_ns[bisect_left(self._ordered_ns, self._spacings_ns.popleft())]
         self._spacings_ns.append(spacing_ns)
         insort(self._ordered_ns, spacing_ns)
+
+    def _lost_in(self, spacing_ns: int) -> int:
+        return max(round(spacing_ns / self.period_ns) - 1, 0)
 
     @property
     def out_of_order(self) -> int:
@@ -148,7 +156,7 @@ class StreamStatistics:
     @property
     def loss(self) -> float:
         """Fraction of the latest messages that were lost, estimated by the stamps."""
-        if len(self._spacings_ns) < 5:
+        if len(self._spacings_ns) < _ENOUGH:
             return 0.0
         expected = max(round(sum(self._spacings_ns) / self.period_ns), 1)
         return max(1.0 - len(self._spacings_ns) / expected, 0.0)

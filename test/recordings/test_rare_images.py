@@ -179,3 +179,44 @@ def test_a_damaged_video(tmp_path: Path, suffix: str, seed: int) -> None:
 def test_an_8k_video_is_read(tmp_path: Path) -> None:
     film(tmp_path / "film.mp4", 2, 7680, 4320)
     assert len(read(tmp_path / "film.mp4")) == 2
+
+
+@pytest.mark.promise(VIDEOS)
+def test_the_images_of_a_variable_rate_have_their_own_times(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    data = film(path, 12)
+    (per_s,) = struct.unpack_from(">I", data, data.index(b"mdhd") + 16)
+    spacings = [per_s // 30 * count for count in (1, 1, 5, 1, 2, 30, 1, 1, 1, 3, 1, 1)]
+    table = b"".join(struct.pack(">II", 1, spacing) for spacing in spacings)
+    at = data.index(b"stts") - 4
+    (size,) = struct.unpack_from(">I", data, at)
+    box = struct.pack(">I4sII", 16 + len(table), b"stts", 0, len(spacings)) + table
+    # The boxes around it grow, and the whole is longer than it was; the images stand before them.
+    for name in (b"moov", b"trak", b"mdia", b"minf", b"stbl"):
+        start = data.index(name) - 4
+        (before,) = struct.unpack_from(">I", data, start)
+        struct.pack_into(">I", data, start, before + len(box) - size)
+    in_box(data, b"elst", 12, 2**31 - 1)
+    data[at : at + size] = box
+    path.write_bytes(data)
+    expected = np.concatenate([[0], np.cumsum(spacings[:-1])]) / per_s
+    np.testing.assert_allclose(np.array(read(path)) / 1e9, expected, atol=1e-3)
+
+
+@pytest.mark.promise(VIDEOS)
+def test_a_video_of_16_bit_is_read_as_8(tmp_path: Path) -> None:
+    path = tmp_path / "film.mkv"
+    code = cv2.VideoWriter.fourcc(*"FFV1")
+    options = [cv2.VIDEOWRITER_PROP_DEPTH, cv2.CV_16U, cv2.VIDEOWRITER_PROP_IS_COLOR, 0]
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, 30.0, (64, 48), options)
+    if not writer.isOpened():
+        pytest.skip("this OpenCV writes no video of 16 bit")
+    image = np.full((48, 64), 65_535, np.uint16)
+    image[:, :32] = 200 * 257
+    for _ in range(5):
+        writer.write(image)
+    writer.release()
+    with open_images(path, FOV) as video:
+        found = [one.as_sent for one in video.images()]
+    assert [(one.dtype, one.shape) for one in found] == [(np.uint8, (48, 64, 3))] * 5
+    assert np.abs(found[0][:, [10, 50]].mean(axis=(0, 2)) - [200, 255]).max() < 3

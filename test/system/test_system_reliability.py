@@ -38,6 +38,7 @@ from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
 )
 from cardbox_tracker.ros.messages.results import joint_values_of  # noqa: E402
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
+from tools.endurance_record import resources_of  # noqa: E402
 from tools.fault_nodes import header_of  # noqa: E402
 from tools.fault_scene import (  # noqa: E402
     EMPTY,
@@ -179,13 +180,6 @@ class Live:
     def resources(self) -> dict[str, tuple[float, int, int]]:
         """Return memory in MB, open files and threads of each process."""
         return {name: resources_of(p.process.pid) for name, p in self.processes.items()}
-
-
-def resources_of(pid: int) -> tuple[float, int, int]:
-    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    status = dict(line.split(":", 1) for line in lines)
-    files = len(list(Path(f"/proc/{pid}/fd").iterdir()))
-    return int(status["VmRSS"].split()[0]) / 1000, files, int(status["Threads"])
 
 
 @pytest.fixture

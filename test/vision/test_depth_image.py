@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.vision.depth_image import (
+    at_size,
     decode_depth,
     depth_from_image,
     median_depth,
@@ -112,6 +113,35 @@ def test_millimetres_for_metres_are_told(packing: str) -> None:
         message = raw_depth(depth)
     with pytest.raises(EncodingError, match=r"2\.3e\+03 or more, .* divide them by 1000"):
         depth_from_image(message)
+
+
+@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+def test_depth_of_32_bit_that_is_labelled_as_16_is_told() -> None:
+    message = raw_depth(np.full((4, 6), 2.3))
+    message.encoding = "16UC1"
+    with pytest.raises(EncodingError, match=r"24 bytes .* expected 12 .* 32FC1"):
+        depth_from_image(message)
+    # Padding is empty, however long it is.
+    padded = np.zeros((4, 12), np.uint16)
+    padded[:, :6] = 2300
+    message.data = padded.tobytes()
+    np.testing.assert_allclose(depth_from_image(message), np.full((4, 6), 2.3))
+
+
+@pytest.mark.promise("Depth of another view than the camera's is refused in words")
+@pytest.mark.parametrize(
+    ("size", "is_same"),
+    [((640, 480), True), ((160, 120), True), ((640, 360), False), ((1280, 1024), False)],
+)
+def test_depth_of_another_shape_has_another_view(size: tuple[int, int], is_same: bool) -> None:
+    depth_m = np.ones((size[1], size[0]), np.float32)
+    if is_same:
+        assert at_size(depth_m, 320, 240).shape == (240, 320)
+    else:
+        with pytest.raises(EncodingError, match=f"{size[0]}x{size[1]}, another shape .* 320x240"):
+            at_size(depth_m, 320, 240)
+    # The working size of a film is rounded to eight pixels.
+    assert at_size(np.ones((1080, 1920), np.float32), 368, 208).shape == (208, 368)
 
 
 def raw_depth(depth: np.ndarray) -> SimpleNamespace:

@@ -122,3 +122,16 @@ def test_what_is_wrong_with_the_stamps_is_said(stamps: list[int], kinds: set[str
     for stamp in stamps:
         statistics.add(stamp)
     assert set(statistics.remarks()) == kinds
+
+
+@pytest.mark.promise("Every image that is lost on the way is counted")
+@pytest.mark.parametrize("first", [1, 3, 7, 40])
+def test_losses_are_counted_from_the_first_image_on(first: int) -> None:
+    """Every third image of a second is lost, and two more in a row, at ``first``."""
+    sent = [number * 66_666_667 for number in range(1, 100)]
+    lost = {*range(0, 15, 3), first, first + 1} - {0}
+    statistics = StreamStatistics()
+    for number, stamp_ns in enumerate(sent):
+        if number not in lost:
+            statistics.add(stamp_ns)
+    assert statistics.received + statistics.dropped == len(sent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -58,3 +59,18 @@ def test_a_wall_is_found_at_its_distance(rng: np.random.Generator) -> None:
     assert np.mean(seen > 0) > 0.8
     with pytest.raises(CameraError, match="left camera"):
         StereoDepth(fx, -baseline_m)
+
+
+@pytest.mark.promise("Images of a stereo pair that are swapped are told")
+@pytest.mark.parametrize("texture", [0.0, 1.0, 20.0])
+def test_which_image_is_the_left_one_is_seen(rng: np.random.Generator, texture: float) -> None:
+    """Noise of two grey values: a wall without texture does not tell the sides apart."""
+    wall = cv2.GaussianBlur(rng.normal(0.0, 1.0, (120, 220)), (0, 0), 2.0)
+    wall = 128.0 + texture * wall / wall.std()
+    left, right = (
+        np.clip(part + rng.normal(0.0, 2.0, part.shape), 0, 255).astype(np.uint8)
+        for part in (wall[:, :200], wall[:, 12:212])
+    )
+    stereo = StereoDepth(300.0, 0.12)
+    assert not stereo.seem_swapped(left, right, stereo(left, right))
+    assert stereo.seem_swapped(right, left, stereo(right, left)) == (texture > 0.0)

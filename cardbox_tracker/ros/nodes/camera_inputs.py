@@ -19,7 +19,7 @@ from cardbox_tracker.ros.messages.conversions import ImageArray
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses, silhouettes_of
 from cardbox_tracker.ros.nodes.depth_input import DepthInput
 from cardbox_tracker.ros.nodes.image_pairing import ImagePairing
-from cardbox_tracker.ros.nodes.input_stream import InputStream
+from cardbox_tracker.ros.nodes.input_stream import ClockDifference, InputStream
 from cardbox_tracker.ros.nodes.keypoint_inputs import KeypointInputs
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
@@ -29,9 +29,8 @@ from cardbox_tracker.vision.depth_image import DepthImage
 from cardbox_tracker.vision.pairing import TOLERANCE_NS, Arrivals
 
 _SILENT_S = 3.0
-# A paused camera falls behind, so stamps are compared only while all cameras send.
-_RECENT_S = 0.5
-_OTHER_CLOCK_NS = 1_000_000_000
+# Of one clock, images from different computers or of depth may arrive this much later.
+_OTHER_CLOCK_S = 0.1
 
 
 class Received(NamedTuple):
@@ -107,6 +106,7 @@ class CameraInputs:
         self._count = len(self._streams)
         if settings.depth:
             self._streams.append(InputStream("depth", node.resolve(settings.depth)))
+        self._clocks = [ClockDifference(self._streams[0], one) for one in self._streams[1:]]
         self._is_named = bool(settings.cameras or settings.depth)
         self._arrivals: Arrivals[Received] = Arrivals(len(self._streams), TOLERANCE_NS)
         self._pairings = [ImagePairing(partial(self._add, number)) for number in range(self._count)]
@@ -147,6 +147,8 @@ class CameraInputs:
     def _add(self, number: int, message: Image, image: Image | None, sent_ns: int) -> None:
         stamp_ns, received = _stamp_ns(message), Received(message, image, sent_ns)
         is_usable = self._streams[number].arrived(stamp_ns).is_usable
+        if number:
+            self._clocks[number - 1].see()
         if len(self._streams) == 1:
             # The node itself drops and counts repeated and late messages.
             self._deliver(received, [received])
@@ -252,15 +254,14 @@ class CameraInputs:
                 )
             elif stream.problem:
                 texts[f"{stream.name} cannot be read"] = f"{stream.topic}: {stream.problem}"
-        for stream in others:
-            apart_ns = abs(stream.newest_ns - first.newest_ns)
-            is_stamped = stream.newest_ns and first.newest_ns
-            is_recent = max(stream.age_s, first.age_s) < _RECENT_S
-            if is_stamped and is_recent and apart_ns > _OTHER_CLOCK_NS:
+        for stream, clock in zip(others, self._clocks, strict=True):
+            apart_s = abs(clock.apart_s)
+            if apart_s > max(_OTHER_CLOCK_S, first.statistics.period_ns / 2e9):
                 texts[f"clock of {stream.name}"] = (
-                    f"the stamps on {stream.topic} and {first.topic} are {apart_ns / 1e9:.1f} s "
-                    "apart, so their images cannot be paired; synchronize the clocks of both "
-                    "computers, for example with chrony"
+                    f"the stamps on {stream.topic} and {first.topic} are {apart_s:.2f} s "
+                    "apart in images that arrive together, so images of different moments are "
+                    "paired, or none; synchronize the clocks of both computers, for example with "
+                    "chrony, unless one of them takes so much longer to send its images"
                 )
         return texts
 

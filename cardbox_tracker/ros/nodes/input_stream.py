@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+
+import numpy as np
 
 from cardbox_tracker.vision.stamps import StampOrder, StreamStatistics
+
+# A paused camera falls behind, so stamps are compared only while both cameras send.
+_RECENT_S = 0.5
+_COMPARED, _LEAST = 60, 10
 
 
 class InputStream:
@@ -32,6 +39,11 @@ class InputStream:
         """Seconds since the last message, or since the start."""
         return time.monotonic() - self._arrived_s
 
+    @property
+    def delay_s(self) -> float:
+        """Arrival of the last message minus its stamp, seconds, with an unknown constant."""
+        return self._arrived_s - self.newest_ns / 1e9
+
     def arrived(self, stamp_ns: int) -> StampOrder:
         """Count a message, and return the relation of its stamp to the one before."""
         self._arrived_s, self.newest_ns = time.monotonic(), stamp_ns
@@ -46,3 +58,32 @@ class InputStream:
             f"{self.name} rate (Hz)": f"{rate:.1f}",
             f"{self.name} age (s)": f"{self.age_s:.1f}" if count else "never",
         }
+
+
+class ClockDifference:
+    """How far the clocks of two streams are apart, by when their images arrive.
+
+    Images of the same moment arrive at almost the same time, so that a steady difference of their
+    stamps is one of the clocks, or of the time that the images take to arrive. The median is not
+    disturbed by single images that are late.
+    """
+
+    def __init__(self, first: InputStream, other: InputStream) -> None:
+        """Compare ``other`` with ``first``."""
+        self._first, self._other = first, other
+        self._found: deque[float] = deque(maxlen=_COMPARED)
+
+    def see(self) -> None:
+        """Compare the newest messages, after each message of the other stream."""
+        first, other = self._first, self._other
+        if first.newest_ns and other.newest_ns and first.age_s < _RECENT_S:
+            self._found.append(first.delay_s - other.delay_s)
+
+    @property
+    def apart_s(self) -> float:
+        """Difference of the stamps of images that arrive together, seconds; 0 while unknown.
+
+        It is positive if the clock of the other stream is ahead.
+        """
+        is_known = len(self._found) >= _LEAST and self._other.age_s < _RECENT_S
+        return float(np.median(self._found)) if is_known else 0.0

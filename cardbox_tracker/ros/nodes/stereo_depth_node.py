@@ -31,6 +31,8 @@ from cardbox_tracker.vision.stereo import NEAREST_M, StereoDepth, stereo_of_pair
 _DOES = "Measure depth in a rectified pair of cameras, by semi-global matching."
 # Largest number of images of one side that wait for the other side.
 _KEPT = 4
+# Pairs between two looks at whether the sides are swapped.
+_LOOK_AGAIN = 30
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class StereoDepthNode(CardboxNode):
         settings = self.parameters.value
         self._infos: dict[str, CameraInfo] = {}
         self._pair: _Pair | None = None
-        self._known = 0.0
+        self._known, self._measured, self._are_swapped = 0.0, 0, False
         self._depth = self.advertise(Image, "depth", qos.SILHOUETTE)
         self._depth_info = self.advertise(CameraInfo, "depth/camera_info", qos.SILHOUETTE)
         compressed = settings.image_transport == "compressed"
@@ -89,6 +91,7 @@ class StereoDepthNode(CardboxNode):
         self.subscribe(kind, f"left/{topic}", self._on_left, qos.SENSOR_DATA)
         self.subscribe(kind, f"right/{topic}", self._on_right, qos.SENSOR_DATA)
         self.diagnostics.extra = lambda: {"known (% of the image)": f"{100 * self._known:.1f}"}
+        self.diagnostics.advice = self._warnings
         self.diagnostics.source = f"images on {self._topics['left']}"
         self.diagnostics.wait_for(
             f"images on {self._topics['left']} and {self._topics['right']}, and the CameraInfo of "
@@ -149,11 +152,23 @@ class StereoDepthNode(CardboxNode):
             image = to_working_size(image, pair.camera.width, pair.camera.height)
             images.append(image if rectifier is None else rectifier(image))
         depth_m = pair.stereo(*images)
+        if self._measured % _LOOK_AGAIN == 0:
+            self._are_swapped = pair.stereo.seem_swapped(images[0], images[1], depth_m)
+        self._measured += 1
         self._known = float(np.count_nonzero(depth_m) / depth_m.size)
         depth_m[depth_m == 0.0] = np.nan
         self._depth.publish(conversions.image_message(left.header, depth_m, "32FC1"))
         self._depth_info.publish(conversions.camera_info_message(left.header, pair.camera))
         self.diagnostics.working(sent_ns)
+
+    def _warnings(self) -> dict[str, str]:
+        if not self._are_swapped:
+            return {}
+        return {
+            "swapped": f"{100 * self._known:.0f} % of the pixels have a depth, and more would have "
+            f"one with the images exchanged; are {self._topics['left']} and "
+            f"{self._topics['right']} swapped?"
+        }
 
     def _pair_of_infos(self) -> _Pair:
         """Return the data of both CameraInfo; raise CameraError if they are not rectified."""

@@ -265,21 +265,24 @@ def test_silence_and_other_clocks_are_said(
 ) -> None:
     now_s = input_stream.time.monotonic()
     monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s)
-    watching.show("left", 100 * S)
-    watching.show("right", 90 * S)
-    watching.show_depth(100 * S, np.ones((48, 64)))
+    for number in range(10):
+        assert not watching.source.warnings()
+        stamp_ns = 100 * S + number * S // 10
+        watching.show("left", stamp_ns)
+        watching.show("right", stamp_ns - 10 * S)
+        watching.show_depth(stamp_ns, np.ones((48, 64)))
     (text,) = watching.source.warnings().values()
-    assert "10.0 s apart" in text
+    assert "10.00 s apart" in text
     now_s += 5.0
-    watching.show("left", 105 * S)
-    watching.show_depth(105 * S, np.ones((48, 64)))
+    watching.show("left", 106 * S)
+    watching.show_depth(106 * S, np.ones((48, 64)))
     (text,) = watching.source.warnings().values()
     assert "/right/silhouette for 5 s" in text
     values = watching.source.values([0.9, None])
     assert values["left iou"] == "0.900"
     assert values["right iou"] == "sees nobody"
     assert (values["left age (s)"], values["right age (s)"]) == ("0.0", "5.0")
-    assert values["right rate (Hz)"] == "0.2"
+    assert values["right rate (Hz)"] == "2.0"
 
 
 CLOCKS = "Cameras with different clocks, or that come and go, are told; the others go on"
@@ -293,11 +296,47 @@ def test_clocks_that_are_apart_are_told(watching: Watching, apart_s: int) -> Non
             watching.show(name, number * S // 10 + (stamp_s + 2000) * S)
         watching.show_depth(number * S // 10 + 2000 * S, np.ones((48, 64)))
     (text,) = watching.source.warnings().values()
-    assert f"{abs(apart_s)}.0 s apart" in text
+    assert f"{abs(apart_s)}.00 s apart" in text
     # One camera goes on alone: the one whose clock is ahead.
     ahead = int(apart_s > 0)
     assert sum(view.headers[ahead] is not None for view in watching.views) == 20
     assert all(None in view.headers for view in watching.views)
+
+
+@pytest.mark.promise(CLOCKS)
+@pytest.mark.parametrize(
+    ("apart_s", "drift", "delay_s", "told"),
+    [
+        (0.2, 0.0, 0.0, "0.20 s"),  # a steady difference, in which images still pair
+        (-0.2, 0.0, 0.04, "0.24 s"),
+        (0.0, 0.01, 0.0, "0.17 s"),  # the mean of two to four seconds ago, at 1 % faster
+        (0.0, 0.0, 0.08, ""),  # a camera whose images take longer than the interval
+        (0.0, 0.0, 0.0, ""),
+    ],
+)
+def test_clocks_a_little_apart_or_adrift_are_told(
+    watching: Watching,
+    monkeypatch: pytest.MonkeyPatch,
+    apart_s: float,
+    drift: float,
+    delay_s: float,
+    told: str,
+) -> None:
+    """At 15 Hz, for 19 s; an image is sent when it is taken, or ``delay_s`` later."""
+    now_s = 1000.0
+    monkeypatch.setattr(input_stream.time, "monotonic", lambda: now_s)
+    times = [(number / 15, "left") for number in range(285)]
+    times += [(number / 15 + delay_s, "right") for number in range(285)]
+    for at_s, name in sorted(times):
+        now_s = 1000.0 + at_s
+        taken_s = at_s if name == "left" else at_s - delay_s
+        own_s = taken_s if name == "left" else apart_s + taken_s * (1 + drift)
+        watching.show(name, round((500 + own_s) * S))
+        if name == "left":
+            watching.show_depth(round((500 + at_s) * S), np.ones((48, 64)))
+    texts = watching.source.warnings()
+    assert list(texts) == (["clock of right"] if told else [])
+    assert all(f"are {told} apart" in text for text in texts.values())
 
 
 @pytest.mark.promise(CLOCKS)

@@ -89,3 +89,18 @@ def test_what_is_no_rectified_pair_is_said(bus: Any) -> None:
         status = bus.tick()
         assert status.level == DiagnosticStatus.ERROR
         assert text in status.message
+
+
+@pytest.mark.promise("Images of a stereo pair that are swapped are told")
+@pytest.mark.parametrize("swapped", [False, True])
+def test_swapped_images_are_told(bus: Any, swapped: bool) -> None:
+    give_infos(bus)
+    left, right = pair(40, 40)
+    if swapped:
+        left.data, right.data = right.data, left.data
+    bus.send("/right/image_raw", right)
+    bus.send("/left/image_raw", left)
+    assert len(bus.sent["/depth"]) == 1
+    status = bus.tick()
+    assert ("/right/image_raw swapped?" in status.message) == swapped
+    assert (status.level == DiagnosticStatus.WARN) == swapped
