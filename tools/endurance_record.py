@@ -190,6 +190,8 @@ def plot(runs: Sequence[Mapping[str, Any]], path: Path) -> None:
             )
         latency.set(title=f"{data['run']}: latency", ylabel="ms", xlabel="minutes", ylim=(0, None))
         for axis in (memory, latency):
+            # A flat line would otherwise lie on the frame.
+            axis.set_ylim(0.0, 1.2 * axis.get_ylim()[1])
             axis.legend(fontsize="x-small", loc="lower right")
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png")
