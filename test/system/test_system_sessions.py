@@ -35,7 +35,7 @@ def deep(topic: str, end: str) -> tuple[str, ...]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["synthetic", "person_a", "person_b"])
+@pytest.mark.parametrize("name", ["synthetic", "person_a"])
 def test_session_is_measured_and_tracked_to_its_end(
     own_graph: Any, name: str, tmp_path: Path
 ) -> None:
