@@ -254,7 +254,7 @@ def test_what_is_imported_is_declared() -> None:
     distributions = {
         "ai_edge_litert": "ai-edge-litert",
         "cv2": "opencv-python-headless",
-    "PIL": "pillow",
+        "PIL": "pillow",
         "pink": "pin-pink",
         "pinocchio": "pin",
         "rerun": "rerun-sdk",
