@@ -261,6 +261,8 @@ def recordings(draw: st.DrawFn) -> dict[str, bytes]:
 
 
 @pytest.mark.promise("A damaged recording is read or refused in words")
+# Hypothesis warns of its own long texts about large recordings.
+@pytest.mark.filterwarnings("ignore:Generating overly large repr")
 @given(recordings())
 def test_recording(files: dict[str, bytes]) -> None:
     folder = Path(tempfile.mkdtemp())
