@@ -1,6 +1,6 @@
 """A node that notes when each image passes a hand-over.
 
-    python -m benchmarks.traced_nodes FILE.json NODE [ARGUMENT...]
+    python benchmarks/traced_nodes.py FILE.json NODE [ARGUMENT...]
 
 The program runs the executable ``NODE`` of the package. At its end it writes the times since the
 epoch, ns, by the image's stamp and by the name of the hand-over.
@@ -26,7 +26,7 @@ from cardbox_tracker.start import NODES
 
 HeaderOf = Callable[..., Any]
 
-# The first argument of each method, and where its header is.
+# Methods whose begin is noted, and where the header is in their first argument.
 _HAND_OVERS: dict[str, tuple[type, str, HeaderOf]] = {
     "received": (CameraImages, "on_image", lambda message: message.header),
     "converted": (BackgroundNode, "_on_image", lambda header: header),
@@ -34,8 +34,6 @@ _HAND_OVERS: dict[str, tuple[type, str, HeaderOf]] = {
     "delivered": (TrackerNode, "_on_input", lambda lead: lead.message.header),
     "tracked": (TrackerOutputs, "publish", lambda seen: seen.header),
 }
-HAND_OVERS = tuple(_HAND_OVERS)
-"""Names of the hand-overs in the order of the data; each is noted when it begins."""
 
 
 def trace() -> dict[int, dict[str, int]]:

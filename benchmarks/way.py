@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,7 +35,7 @@ WORK = ("silhouette", "posture")
 RATE_HZ = 30.0
 
 _ORDER = ("received", "converted", "cut out", "delivered", "tracked")
-_ROOT = Path(__file__).resolve().parents[1]
+_TRACED = Path(__file__).with_name("traced_nodes.py")
 _DPI = 90
 
 
@@ -47,17 +46,10 @@ class _TracedNodes(Nodes):
         super().__init__(folder)
         self._folder = folder
 
-    def start(self, name: str, *arguments: str, called: str = "") -> None:
-        called = called or name
-        command = [sys.executable, "-m", "benchmarks.traced_nodes"]
-        notes = str(self._folder / f"{called}.json")
-        with (self._folder / f"{called}.log").open("wb") as log:
-            self._processes[called] = subprocess.Popen(
-                [*command, notes, name, *arguments],
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                cwd=_ROOT,
-            )
+    def _program(self, called: str) -> list[str]:
+        notes = self._folder / f"{called}.json"
+        # With -P the installed package runs, whose code is compiled, as in the other tables.
+        return [sys.executable, "-P", str(_TRACED), str(notes)]
 
     def notes(self) -> dict[int, dict[str, int]]:
         """Return the times of all hand-overs, ns, by the image's stamp."""

@@ -62,7 +62,10 @@ def _read(path: Path) -> dict[str, Any]:
     except UnreadableFileError as error:
         raise CardboxError(f"cannot read {path}: {error}") from None
     except ValueError as error:  # no UTF-8, or a quotation mark without its second
-        raise CardboxError(f"{path} has no options as they are typed: {error}") from None
+        raise CardboxError(
+            f"{path} has no options as they are typed: {error}; give options of 'cardbox track' in "
+            "UTF-8, such as --stature 1.75"
+        ) from None
     parser = _parser(path)
     absent = object()
     values = argparse.Namespace(**dict.fromkeys(vars(parser.parse_args([])), absent))

@@ -44,8 +44,6 @@ def silhouette_from(
             above 255 or not a number; the text has the expectation and the remedy.
     """
     mask = _array(given, name)
-    if mask.ndim == 3 and mask.shape[2] == 1:
-        mask = mask[..., 0]
     if mask.ndim != 2 or not mask.size:
         raise ValueError(
             f"{name} has the shape {mask.shape}; expected {size or '(height, width)'}: give one "
@@ -82,8 +80,6 @@ def image_from(given: ArrayLike, name: str = "image", size: Size | None = None) 
             above 255 or not a number; the text has the expectation and the remedy.
     """
     image = _array(given, name)
-    if image.ndim == 3 and image.shape[2] == 1:
-        image = image[..., 0]
     if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)) or not image.size:
         remedy = "convert it to grey or to bgr"
         if image.ndim == 3 and image.shape[2] == 4:
@@ -119,8 +115,6 @@ def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None
             the known depths are above 100.
     """
     depth = _array(given, name)
-    if depth.ndim == 3 and depth.shape[2] == 1:
-        depth = depth[..., 0]
     if depth.ndim != 2:
         raise ValueError(
             f"{name} has the shape {depth.shape}; expected {size or '(height, width)'}"
@@ -145,7 +139,7 @@ def depth_from(given: ArrayLike, name: str = "depth_m", size: Size | None = None
 
 
 def _array(given: ArrayLike, name: str) -> NDArray[Any]:
-    """Return numbers as an array."""
+    """Return numbers as an array; (H, W, 1) becomes (H, W)."""
     try:
         array = np.asarray(given)
     except (TypeError, ValueError, RuntimeError, OverflowError) as error:
@@ -155,7 +149,7 @@ def _array(given: ArrayLike, name: str) -> NDArray[Any]:
             f"{name} is of the type {type(given).__name__}, of {array.dtype}; expected an array "
             "of numbers"
         )
-    return array
+    return array[..., 0] if array.ndim == 3 and array.shape[2] == 1 else array
 
 
 def _check_size(array: NDArray[Any], name: str, size: Size | None) -> None:

@@ -78,10 +78,14 @@ class Nodes:
         called = called or name
         with (self._logs / f"{called}.log").open("wb") as log:
             self._processes[called] = subprocess.Popen(
-                [*_OF_PACKAGE, "cardbox_tracker.start", name, *arguments],
+                [*self._program(called), name, *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
+
+    def _program(self, called: str) -> list[str]:
+        """Return the command that takes the name of an executable and its arguments."""
+        return [*_OF_PACKAGE, "cardbox_tracker.start"]
 
     def check(self) -> None:
         """Raise if a node died.
