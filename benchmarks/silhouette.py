@@ -135,7 +135,9 @@ def _recorded(path: str, background: TimeSpan, count: int) -> tuple[Images, Imag
     """Return images of the span ``background``, and ``count`` images after it."""
     with open_images(path) as recording:
         source = SilhouetteSource(recording, background)
-        prepared = [(time_s, image) for _, time_s, image, _ in islice(source.images(), _MOST_IMAGES)]
+        prepared = [
+            (time_s, image) for _, time_s, image, _ in islice(source.images(), _MOST_IMAGES)
+        ]
     empty = [image for time_s, image in prepared if background.contains(time_s)]
     after = [image for time_s, image in prepared if time_s > background.end_s]
     return empty, after[:count]
