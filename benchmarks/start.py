@@ -1,4 +1,4 @@
-"""Time from the start of a node's process until it waits for input: ``python -m benchmarks.start``.
+"""Time from the start of a node's process until it waits for input.
 
 It is compared, in turns on one core, with a process that only imports rclpy, numba, OpenCV and
 numpy. Compiled code must be in the cache.
@@ -6,7 +6,6 @@ numpy. Compiled code must be in the cache.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -66,7 +65,7 @@ def _ready_s(name: str, model: Path) -> float:
         command += parameters
     begun_s, left = time.monotonic(), PROCESSES[name]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as process:
         assert process.stdout is not None
         for line in process.stdout:
@@ -78,13 +77,3 @@ def _ready_s(name: str, model: Path) -> float:
     if left:
         raise CardboxError(f"the process {name} ended before its nodes were ready; start it alone")
     return spent_s
-
-
-def main() -> None:
-    """Print the figures."""
-    for name, start in measure_start().items():
-        print(f"{name}: {start.seconds:.2f} s, {start.ratio:.1f} times the imports")
-
-
-if __name__ == "__main__":
-    main()

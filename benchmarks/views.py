@@ -1,4 +1,4 @@
-"""Time of a frame with two cameras against one, preset ``default``: ``python -m benchmarks.views``."""
+"""Time of a frame with two cameras against one, preset ``default``."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scene import BenchmarkScene, make_scene
-from benchmarks.tools import WARM_UP, pinned
+from benchmarks.scene import BenchmarkScene
+from benchmarks.tools import WARM_UP
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.posture import N_JOINTS, TORSO_X, TORSO_Z
 from cardbox_tracker.estimation.config import default_preset
@@ -29,8 +29,8 @@ def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:
     The cameras stand at the same distance from the person, and both trackers take turns at each
     frame. The shortest of several repetitions counts.
     """
-    other = _beside(scene)
-    silhouettes = _seen_by(scene, other)
+    other = beside(scene)
+    silhouettes = seen_by(scene, other)
     least_ms = np.full((2, len(silhouettes)), np.inf)
     for _ in range(repetitions):
         trackers = [
@@ -48,14 +48,14 @@ def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:
     return float(np.median(two_ms / one_ms))
 
 
-def _beside(scene: BenchmarkScene) -> OtherCamera:
+def beside(scene: BenchmarkScene) -> OtherCamera:
     """Return a camera like the first one, turned around the person."""
     turn = cv2.Rodrigues(np.array([0.0, _ASIDE_RAD, 0.0]))[0].astype(np.float64)
     person_m = np.array([0.0, 0.0, scene.body.placement.distance_m])
     return OtherCamera(scene.camera, Extrinsics(turn, person_m - turn @ person_m))
 
 
-def _seen_by(scene: BenchmarkScene, other: OtherCamera) -> list[NDArray[np.uint8]]:
+def seen_by(scene: BenchmarkScene, other: OtherCamera) -> list[NDArray[np.uint8]]:
     """Return the silhouettes (H, W) of the scene in the image of ``other``."""
     view = View.of(scene.body, scene.camera, other)
     states = [np.append(wave(i / 15.0 % WAVE_S), [0.0, 0.0]) for i in range(len(scene.images))]
@@ -66,13 +66,3 @@ def _drawn(view: View, state: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the silhouette (H, W) of a state (14,) of the view's person in its image."""
     patches = cardbox_patches(view.body, state[:N_JOINTS])
     return render(patches + np.array([state[TORSO_X], 0.0, state[TORSO_Z]]), view.camera)
-
-
-def main() -> None:
-    """Print the ratio for images of 320x240."""
-    with pinned(1):
-        print(f"two cameras take {measure_two_views(make_scene(320, 240, 150)):.2f} times as long")
-
-
-if __name__ == "__main__":
-    main()
