@@ -51,10 +51,10 @@ def measure_ratios(has_ros: bool) -> dict[str, Any]:
     }
 
 
-def measure_folder(repetitions: int = 3) -> float:
+def measure_folder(repetitions: int = 1) -> float:
     """Return how many times faster two processes track a folder of eight recordings than one.
 
-    The medians are compared, and the numbers of processes take turns.
+    The medians of the repetitions are compared, and the numbers of processes take turns.
     """
     spent_s: dict[int, list[float]] = {1: [], 2: []}
     with TemporaryDirectory() as temporary:

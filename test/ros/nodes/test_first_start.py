@@ -35,6 +35,7 @@ def test_the_tracker_tells_that_it_compiles_and_takes_calls_of_reset(
 
     monkeypatch.setattr(tracker_node, "told", telling)
     monkeypatch.setattr(tracker_node.TrackerNode, "offer", offer)
+
     def compile_all(**needed: bool) -> None:
         seen.append((telling.text, list(offered), needed))
 
