@@ -70,6 +70,7 @@ def report(results: Mapping[str, Any]) -> str:
             ("particles in all filters", "median"),
             [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
         ),
+        *_ratios(results.get("ratios")),
         *_nodes(results["nodes"]),
         *_way(results["way"]),
         "A live node waits between images; meanwhile the processor slows down and its caches lose "
@@ -104,6 +105,35 @@ def readme_section(results: Mapping[str, Any]) -> str:
         text = f"{stream['p50_ms']:.1f} ms median, {stream['p95_ms']:.1f} ms p95"
         rows.append((f"image stamp to JointState over DDS, {_STREAM}, {words}", text))
     return _table(("speed", f"on {results['cpu']}"), rows)
+
+
+def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
+    if ratios is None:
+        return []
+    silhouette = ratios["silhouette"]
+    without = silhouette["ratios_without"]
+    rows = [
+        ("silhouette with all steps / by brightness alone", f"{silhouette['ratio']:.2f}"),
+        *((f"without {name} / by brightness alone", f"{of:.2f}") for name, of in without.items()),
+        ("a frame with two cameras / with one, preset `default`", f"{ratios['two_views']:.2f}"),
+        *(
+            (f"start of `{name}` ({start['seconds']:.2f} s) / imports", f"{start['ratio']:.1f}")
+            for name, start in (ratios["start"] or {}).items()
+        ),
+        (
+            "`cardbox track FOLDER` of eight recordings with one process / with two, once",
+            f"{ratios['folder']:.2f}",
+        ),
+    ]
+    return [
+        "## Ratios",
+        f"`python -m benchmarks.ratios` measures this table (commit {ratios['commit']}): times "
+        "that took turns in one run, on one core except the last. The silhouettes are those of "
+        "colour images. A start lasts until all nodes of a process wait for their input, with "
+        "compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and numpy. "
+        "`python -m benchmarks.silhouette RECORDING` measures the silhouettes of a recording.",
+        _table(("ratio", "median"), rows),
+    ]
 
 
 def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from benchmarks.core import measure_core
 from benchmarks.nodes import measure_nodes
+from benchmarks.ratios import measure_ratios
 from benchmarks.report import PICTURE_OF_WAY, write_report
 from benchmarks.way import measure_way, plot_way
 from cardbox_tracker.errors import CardboxError
@@ -39,6 +40,7 @@ def run_benchmark(
         core = measure_core(frames, lambda done: show(0.4 * done))
         nodes = measure_nodes(seconds, lambda done: show(0.4 + 0.5 * done))
         way = measure_way(seconds) if nodes else None
+        ratios = measure_ratios(nodes is not None)
         show(1.0)
     results = {
         **{name: core.pop(name) for name in list(core) if not isinstance(core[name], dict)},
@@ -46,6 +48,7 @@ def run_benchmark(
         "cores": len(os.sched_getaffinity(0)),
         "measured_frames": frames,
         **core,
+        "ratios": ratios,
         "nodes": nodes,
         "way": way,
     }

@@ -25,15 +25,28 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 
 
-def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
-    """Track a drawn person with each of ``presets``, which compiles all their kernels."""
+def compile_all(
+    presets: Sequence[str] = tuple(PRESETS),
+    *,
+    several_cameras: bool = True,
+    points: bool = True,
+) -> None:
+    """Track a drawn person with each of ``presets``, which compiles all their kernels.
+
+    Args:
+        presets: names of the presets.
+        several_cameras: also with a further camera, if the preset allows it.
+        points: also with the 2D points of a detector.
+    """
     background.warm_up()
     person_region.warm_up()
     body = BodyModel()
     camera = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
-    points = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
+    some = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
+    # With points, the learned correction may not run.
+    found = (None, None, some, some) if points else (None, None)
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.
         for shape in (silhouette.shape, (*silhouette.shape, 3)):
@@ -43,12 +56,12 @@ def compile_all(presets: Sequence[str] = tuple(PRESETS)) -> None:
             )
             config = quickest(PRESETS[name]())
             image = np.full(shape, 128, np.uint8)
-            for others in ((), (beside,)) if config.has_several_views else ((),):
+            is_several = several_cameras and config.has_several_views
+            for others in ((), (beside,)) if is_several else ((),):
                 person = body.with_values(appearance=looks)
                 tracker = Tracker(person, camera, config, others=others)
-                # With points, the learned correction may not run.
-                for found in (None, None, points, points):
-                    one = Observation(silhouette, image, points=found)
+                for given in found:
+                    one = Observation(silhouette, image, points=given)
                     tracker.track([one] * (1 + len(others)))
 
 

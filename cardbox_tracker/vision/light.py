@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.chroma import bgr_of
-from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, sum_cells
+from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, limit_channels, sum_cells
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -31,6 +31,7 @@ _DARKEST = 10.0
 _SAME = 0.004
 # Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
+_GREY = np.ones(1, np.float32)
 # The field is estimated in every third image, and in every one after a step; the level always.
 _EVERY = 3
 # Share of the new estimate in the field, an exponential moving average.
@@ -150,7 +151,6 @@ class LightFollower:
         self._estimate(brightness)
         if self.level * self._highest_field * self._highest < CUT_OFF:
             return self._relative, self.level
-        np.multiply(self._relative, np.float32(self.level), out=self._now)
         self._cut_off()
         return self._now, 1.0
 
@@ -160,13 +160,12 @@ class LightFollower:
         return self._settling > 0
 
     def _cut_off(self) -> None:
-        """Limit the expected brightness to the range of the camera's channels."""
-        factor = self.level * self._highest_field
-        where = np.flatnonzero(self._brightest > CUT_OFF / factor)
-        now = self._now.ravel()
-        factors = now[where] / np.maximum(self._mean.ravel()[where], 1.0)
-        channels = np.minimum(self._channels[:, where] * factors, 255.0)
-        now[where] = _WEIGHTS @ channels if len(channels) == 3 else channels[0]
+        """Compute the expected brightness, limited to the range of the camera's channels."""
+        limit = np.float32(CUT_OFF / (self.level * self._highest_field))
+        light = self._relative.ravel(), np.float32(self.level), limit
+        parts = self._mean.ravel(), self._channels, self._brightest
+        weights = _WEIGHTS if len(self._channels) == 3 else _GREY
+        limit_channels(light, *parts, weights, self._now.ravel())
 
     def _estimate(self, brightness: ImageArray) -> None:
         small = np.ascontiguousarray(brightness[_GRID])

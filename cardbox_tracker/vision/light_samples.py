@@ -1,4 +1,4 @@
-"""Compiled kernels that measure the light in every fourth pixel of an image."""
+"""Compiled kernels of the light: measured in every fourth pixel, limited in all pixels."""
 
 from __future__ import annotations
 
@@ -75,3 +75,30 @@ def sum_cells(
                 row, column = v * rows // height, u * columns // width
                 cells[0, row, column] += share * (relative / base[v, u] - 1)
                 cells[1, row, column] += share
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def limit_channels(
+    light: Any, mean: Any, channels: Any, brightest: Any, weights: Any, now: Any
+) -> None:
+    """Write the present brightness, with each channel limited to 255, to ``now``, (n,).
+
+    Args:
+        light: the background with the light's field, (n,), the level of the light, and the
+            brightness above which a channel may be cut off.
+        mean: learned background, (n,).
+        channels: its channels, (k, n).
+        brightest: its brightest channel, (n,).
+        weights: of the channels in the brightness, (k,).
+        now: result, (n,).
+    """
+    relative, level, limit = light
+    one, most = np.float32(1), np.float32(255)
+    for i in range(len(now)):
+        value = relative[i] * level
+        if brightest[i] > limit:
+            factor = value / max(mean[i], one)
+            value = np.float32(0)
+            for k in range(len(weights)):
+                value += weights[k] * min(channels[k, i] * factor, most)
+        now[i] = value

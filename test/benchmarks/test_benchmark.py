@@ -12,8 +12,11 @@ import pytest
 from benchmarks import core as benchmark_core
 from benchmarks import report as benchmark_report
 from benchmarks import run as benchmark
+from benchmarks import views
 from benchmarks.default_stages import WHOLE
 from benchmarks.scene import make_scene
+from benchmarks.silhouette import WITHOUT, colored, measure_silhouettes
+from benchmarks.views import measure_two_views
 from benchmarks.way import STEPS, steps_of
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.evaluation.results import read_json
@@ -57,6 +60,14 @@ NODES = {
             }
         },
     },
+}
+
+RATIOS = {
+    "commit": "0" * 40,
+    "silhouette": {"ratio": 1.5, "ratios_without": {"colours": 1.25}},
+    "two_views": 1.75,
+    "start": {"tracker": {"seconds": 1.25, "ratio": 2.5}},
+    "folder": 1.9,
 }
 
 
@@ -114,6 +125,23 @@ def test_the_compiled_cost_is_the_faster_one(core: dict[str, Any]) -> None:
     assert core["ratio_volumetric"] > 1
 
 
+def test_all_steps_of_the_silhouette_cost_more_than_brightness_alone() -> None:
+    scene = make_scene(80, 64, 12, 5)
+    empty, images = colored(scene)
+    assert np.unique(images[0][scene.silhouettes[0] == 0] // 16).size > 1
+    costs, again = (measure_silhouettes(empty, images, 2) for _ in range(2))
+    assert costs.ratio > 1.0
+    assert set(costs.ratios_without) == set(WITHOUT)
+    assert costs.digest == again.digest
+    assert costs.digest != measure_silhouettes(empty, images[::-1], 1).digest
+
+
+def test_a_second_camera_costs_time_and_sees_the_person() -> None:
+    scene = make_scene(160, 120, 8, 2)
+    assert all(silhouette.any() for silhouette in views.seen_by(scene, views.beside(scene)))
+    assert measure_two_views(scene, 1) > 1.0
+
+
 def test_particles_at_30hz_by_hand() -> None:
     measured = {
         "600": 1.0,
@@ -150,6 +178,7 @@ def test_files_hold_what_is_promised(
 ) -> None:
     monkeypatch.setattr(benchmark, "measure_core", lambda *_: dict(core))
     monkeypatch.setattr(benchmark, "measure_nodes", lambda *_: nodes)
+    monkeypatch.setattr(benchmark, "measure_ratios", lambda _: RATIOS)
     monkeypatch.setattr(benchmark, "measure_way", lambda _: {"one process": steps_of(NOTES, ENDS)})
     json_path, report_path = tmp_path / "b.json", tmp_path / "b.md"
     assert main(["benchmark", "--json", str(json_path), "--report", str(report_path)]) == 0
@@ -158,6 +187,7 @@ def test_files_hold_what_is_promised(
     assert {"versions", "commit", "cpu", "cores"} <= set(results)
     text = report_path.read_text()
     assert results["cpu"] in text
+    assert "| start of `tracker` (1.25 s) / imports | 2.5 |" in text
     assert ("Not measured" in text) == (nodes is None)
     assert ("299/300" in text) == (nodes is not None)
     assert ("| posture | 4.00 ms, 4.00 ms |" in text) == (nodes is not None)

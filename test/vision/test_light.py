@@ -13,7 +13,7 @@ from cardbox_tracker.vision.background import SilhouetteExtractor
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.light import LightFollower
-from cardbox_tracker.vision.light_samples import collect_ratios, sum_cells
+from cardbox_tracker.vision.light_samples import collect_ratios, limit_channels, sum_cells
 
 H, W = 120, 160
 PERSON = (slice(30, 120), slice(60, 95))
@@ -200,3 +200,15 @@ def test_the_sums_are_those_of_numpy(seed: int, shape: tuple[int, int]) -> None:
     assert cells[0].sum() == pytest.approx(
         share * (ratio / 1.2 / base - 1)[used].sum(), abs=1e-2, rel=1e-4
     )
+
+
+def test_bright_channels_are_limited_by_hand() -> None:
+    """The first pixel stays below the limit; of the second, the brightest channel is cut off."""
+    mean = np.array([100.0, 200.0], np.float32)
+    channels = np.array([[90.0, 150.0], [100.0, 200.0], [110.0, 250.0]], np.float32)
+    weights = np.array([0.25, 0.5, 0.25], np.float32)
+    now = np.empty(2, np.float32)
+    light = mean, np.float32(1.2), np.float32(240.0)
+    limit_channels(light, mean, channels, channels.max(axis=0), weights, now)
+    # 0.25 * 180 + 0.5 * 240 + 0.25 * 255, where 1.2 * 250 is more than 255
+    np.testing.assert_allclose(now, [120.0, 228.75])

@@ -62,8 +62,12 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
     rng = np.random.default_rng(seed)
     shares = np.array(data["shares"])
     chosen = rng.choice(len(shares), count, p=shares / shares.sum())
-    means, covariances = data["means"], data["covariances"]
-    drawn = np.array([rng.multivariate_normal(means[k], covariances[k]) for k in chosen])
+    means = np.array(data["means"])
+    # Like rng.multivariate_normal, which would decompose the covariance of every sample again.
+    axes, squares, _ = np.linalg.svd(np.array(data["covariances"]))
+    factors = axes * np.sqrt(squares)[:, None, :]
+    noise = rng.standard_normal((count, _D))
+    drawn = np.array([means[k] + factors[k] @ one for k, one in zip(chosen, noise, strict=True)])
     limbs = drawn.reshape(count, 2, 3)
     limbs /= np.linalg.norm(limbs, axis=2, keepdims=True)
     return drawn

@@ -44,16 +44,16 @@ class TrackerNode(CardboxNode):
         self.parameters = LiveParameters(self, TrackerParameters, self._changed)
         # Calls that come while the code is compiled are answered afterwards.
         self.offer("~/reset", self._reset)
-        # The code is compiled before the first image arrives, unless the cache has it.
+        settings = self.parameters.value
+        # The code that these settings need is ready before the first image arrives.
         with told(self.get_logger().info, _PREPARING):
-            compile_all()
+            compile_all(several_cameras=len(settings.cameras) > 1, points=bool(settings.keypoints))
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
         self._tracker: Tracker | None = None
         self._report = TrackingReport()
 
-        settings = self.parameters.value
         self._outputs = TrackerOutputs(self, settings)
         self._model_topic = self.resolve("body_model")
         self.subscribe(String, "body_model", self._on_model, qos.LATCHED)

@@ -35,11 +35,14 @@ def test_the_tracker_tells_that_it_compiles_and_takes_calls_of_reset(
 
     monkeypatch.setattr(tracker_node, "told", telling)
     monkeypatch.setattr(tracker_node.TrackerNode, "offer", offer)
-    monkeypatch.setattr(
-        tracker_node, "compile_all", lambda: seen.append((telling.text, list(offered)))
-    )
+
+    def compile_all(**needed: bool) -> None:
+        seen.append((telling.text, list(offered), needed))
+
+    monkeypatch.setattr(tracker_node, "compile_all", compile_all)
     bus.start(tracker_node.TrackerNode)
-    ((text, services),) = seen
+    ((text, services, needed),) = seen
+    assert needed == {"several_cameras": False, "points": False}
     assert "compiles" in text
     assert services == ["~/reset"]
 
