@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.output_paths import add_force, body_beside, check_outputs
 
 NAME = "export"
 HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
@@ -42,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         metavar="MODEL.yaml",
         help="the person with whom the results were tracked, which bvh needs; trc and c3d take "
-        "the pitch of the camera from it, and get markers at hips and neck. A bag contains it",
+        "the pitch of the camera from it, and get markers at hips and neck. A bag contains it, and "
+        "OUT.body.yaml beside the table OUT.csv is found",
     )
     add_force(parser)
 
@@ -62,11 +63,15 @@ def run(options: argparse.Namespace) -> None:
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)
-    check_outputs((output,), options.force, inputs=(options.results, options.model))
+    beside = body_beside(options.results)
+    check_outputs((output,), options.force, inputs=(options.results, options.model, beside))
     chosen.check()
     given = None if options.model is None else load_body_model(options.model)
     motion, recorded = read_motion(options.results)
     body = given or recorded
+    if body is None and chosen.has_places and beside.is_file():
+        body = load_body_model(beside)
+        print(f"took the body of {beside}; --model gives another")
     images, seen = len(motion.state), int(motion.is_seen.sum())
     if body is not None and chosen.has_places:
         motion = images_of_body(motion, body)

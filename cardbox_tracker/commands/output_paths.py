@@ -53,6 +53,11 @@ def check_outputs(
             raise CardboxError(f"{path} exists; choose another name, or give --force to replace it")
 
 
+def body_beside(table: Path) -> Path:
+    """Return the file beside a table of ``cardbox track --stature`` with the body that it used."""
+    return table.with_name(f"{table.stem}.body.yaml")
+
+
 def _is_something(path: Path) -> bool:
     """Return whether there is a file, or a folder with content, that would be lost."""
     if path.is_dir():

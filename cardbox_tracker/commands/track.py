@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cardbox_tracker.commands.arguments import at_least
 from cardbox_tracker.commands.camera_arguments import check_alone
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.output_paths import add_force, body_beside, check_outputs
 from cardbox_tracker.commands.tracking import (
     ResultFiles,
     add_inputs,
@@ -101,7 +101,7 @@ def _track_one(options: argparse.Namespace) -> None:
     if options.stature is not None:
         # There is no place for a further file beside a pipe.
         beside = Path(_name(options.recording)) if is_written_in_place(table) else table
-        model = beside.with_name(f"{beside.stem}.body.yaml")
+        model = body_beside(beside)
     files = ResultFiles(table, options.video, options.bag, model)
     check_outputs(
         (table, model, options.video),

@@ -75,6 +75,7 @@ def track_folder(options: argparse.Namespace) -> None:
     _check_output(output, folder, recordings, options.force)
     before = read_rows(output / SUMMARY)
     jobs, rows = _jobs(options, recordings, formats)
+    _check_reasons(rows, len(recordings))
     if not options.force:
         kept = [job for job in jobs if _is_finished(job, before, output, formats)]
         jobs = [job for job in jobs if job not in kept]
@@ -153,6 +154,13 @@ def _jobs(
         except (CardboxError, OSError) as error:
             rows[name] = Row(name, FAILED, reason=_one_line(error))
     return jobs, rows
+
+
+def _check_reasons(rows: Mapping[str, Row], count: int) -> None:
+    """Refuse options that are wrong for the same reason in each of several recordings."""
+    reasons = {row.reason for row in rows.values()}
+    if len(rows) == count > 1 and len(reasons) == 1:
+        raise CardboxError(f"{reasons.pop()} (the same for all {count} recordings)")
 
 
 def _is_finished(job: Job, before: Mapping[str, Row], output: Path, formats: Sequence[str]) -> bool:

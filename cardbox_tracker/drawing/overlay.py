@@ -89,14 +89,17 @@ def draw_camera_overlay(
 ) -> ImageArray:
     """Return a picture with the model over it; that of a further camera is turned upright.
 
+    A small picture is enlarged by a whole factor, so that lines and text are readable.
+
     Args:
         picture: (H, W) grey or (H, W, 3) bgr, of the camera.
         number: of the camera; 0 is the first one.
         estimate: what ``tracker`` found at that time.
         tracker: it knows the person and the cameras.
     """
+    scale = readable_scale(picture)
     if number == 0:
-        return draw_overlay(picture, tracker.body, tracker.camera, estimate)
+        return draw_overlay(picture, tracker.body, tracker.camera, estimate, scale)
     view = tracker.views[number - 1]
     if estimate.posture is not None and estimate.keypoints_m is not None:
         place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
@@ -108,12 +111,12 @@ def draw_camera_overlay(
             offset_m=state[PLACE],
             keypoints_m=view.camera.reference_to_optical(points_m),
         )
-    return draw_overlay(view.upright(picture), view.body, view.camera, estimate)
+    return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
 def draw_message(image: ImageArray, text: str) -> ImageArray:
-    """Return a colour image (H, W, 3) bgr of ``image`` with ``text`` written over it."""
-    canvas = _bgr(image).copy()
+    """Return a bgr image with ``text`` over ``image`` (H, W) or (H, W, 3), enlarged if small."""
+    canvas = enlarged(image, readable_scale(image))
     draw_text(canvas, text)
     return canvas
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -88,6 +89,21 @@ def test_without_a_model_the_camera_is_taken_as_level(
     assert "the camera is taken as level; --model gives its pitch" in done.out
     done = cardbox("export", results / "person.csv", "--to", "isb", "--output", tmp_path / "a.csv")
     assert "level" not in done.out
+
+
+def test_the_body_beside_the_table_is_found(
+    results: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    """'cardbox track --stature' writes it there, and nobody has to name it."""
+    for name in ("person.csv", "person.yaml"):
+        shutil.copy(results / name, tmp_path / name.replace(".yaml", ".body.yaml"))
+    made, named = tmp_path / "made.bvh", tmp_path / "named.bvh"
+    words = ("export", tmp_path / "person.csv", "--to", "bvh", "--output")
+    done = cardbox(*words, made)
+    assert done.code == 0, done.err
+    assert "took the body of " in done.out
+    assert cardbox(*words, named, "--model", results / "person.yaml").code == 0
+    assert made.read_bytes() == named.read_bytes()
 
 
 @pytest.mark.parametrize(

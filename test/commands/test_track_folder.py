@@ -190,6 +190,17 @@ def test_mistakes_in_the_options_of_one_do_not_stop_the_others(
     assert "b.options" in track.done.err
 
 
+def test_an_option_that_all_recordings_lack_is_named_once(
+    files: Path, tmp_path: Path, cardbox: Callable, tracked: Tracked
+) -> None:
+    for name in "abc":
+        (tmp_path / f"{name}.mp4").write_text(name)
+    done = cardbox("track", tmp_path, "--background=0:3.9", "--output", tmp_path / "out")
+    done.assert_refused("track", "arguments --model --stature is required (the same for all 3")
+    assert done.err.count("--stature") == 1
+    assert tracked.names == []
+
+
 def test_an_interrupted_run_leaves_nothing_half_done(
     track: Callable, tracked: Tracked, tmp_path: Path
 ) -> None:

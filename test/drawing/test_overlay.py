@@ -18,12 +18,15 @@ from cardbox_tracker.drawing.overlay import (
     OUTLINE_BGR,
     SKELETON_BGR,
     UNCERTAIN_BGR,
+    draw_camera_overlay,
+    draw_message,
     draw_model,
     draw_overlay,
 )
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel()
@@ -85,6 +88,20 @@ def test_raised_arms_are_drawn_where_the_filter_has_them() -> None:
     skeleton = marker_shapes(BODY, CAMERA, state[:12], lifted)[1].points_m
     for point in lifted:
         assert np.linalg.norm(skeleton - point, axis=1).min() < 1e-9
+
+
+@pytest.mark.parametrize(("width", "expected"), [(320, 640), (500, 1000), (640, 640), (800, 800)])
+def test_live_overlays_of_small_images_are_enlarged(width: int, expected: int) -> None:
+    """At 320 px letters are 8 px high and blur when the window enlarges them."""
+    grey = np.full((width * 3 // 4, width), 90, np.uint8)
+    camera = CAMERA.scaled(width, width * 3 // 4)
+    overlay = draw_camera_overlay(grey, 0, FOUND, Tracker(BODY, camera))
+    assert overlay.shape == (expected * 3 // 4, expected, 3)
+    view = camera.scaled(expected, expected * 3 // 4)
+    pixels = view.project(view.reference_to_optical(keypoints_m(BODY, FRONT)))
+    for u, v in pixels.round().astype(int):
+        assert near(overlay, JOINT_BGR)[v, u]
+    assert draw_message(grey, "waiting for a body model").shape == overlay.shape
 
 
 def test_what_may_be_wrong_is_amber() -> None:
