@@ -109,7 +109,7 @@ def simulate(
             scene.room.image(rendering) if has_images else None,
             _depth_image(rendering, rng) if has_depth else None,
             stamp_ns,
-            _points(scene, posed, pose[0], rendering, detector) if detector else None,
+            simulated_points(viewpoint, posed, pose[0], rendering, detector) if detector else None,
         )
         tracker.track(observation)
         # The filter changes when a size of an unmeasured person is found.
@@ -188,19 +188,28 @@ def _depth_image(rendering: Rendering, rng: np.random.Generator) -> NDArray[np.f
     return np.asarray(depth_m + noise * depth_m * depth_m, np.float32)
 
 
-def _points(
-    scene: Scene,
+def simulated_points(
+    viewpoint: Viewpoint,
     posed: Posed,
     turns: FloatArray,
     rendering: Rendering,
     detector: SimulatedDetector,
 ) -> ImagePoints:
-    optical = scene.viewpoint.optical
+    """Return the points that a detector finds in an image.
+
+    Args:
+        viewpoint: of the camera.
+        posed: the person in the world.
+        turns: rotations of the person's segments in the world, (n, 3, 3).
+        rendering: the person's image.
+        detector: of the recording.
+    """
+    optical = viewpoint.optical
     joints_m = dict(zip(KEYPOINT_NAMES, optical(posed.keypoints), strict=True))
     joints_m |= {"head": optical(posed.head), "hips": optical(posed.hips)}
     columns = {"head": 1, "face": 0, "hips": 1, "left_hand": 0, "right_hand": 0}
     axes = {
-        name: scene.viewpoint.camera.reference_to_optical(
+        name: viewpoint.camera.reference_to_optical(
             turns[INDEX["head" if name == "face" else name]][:, column]
         )
         for name, column in columns.items()

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from cardbox_tracker.commands.output_paths import add_force, body_beside, check_outputs
+from cardbox_tracker.errors import CardboxError
 
 NAME = "export"
 HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
@@ -69,12 +70,19 @@ def run(options: argparse.Namespace) -> None:
     given = None if options.model is None else load_body_model(options.model)
     motion, recorded = read_motion(options.results)
     body = given or recorded
-    if body is None and chosen.has_places and beside.is_file():
-        body = load_body_model(beside)
-        print(f"took the body of {beside}; --model gives another")
     images, seen = len(motion.state), int(motion.is_seen.sum())
     if body is not None and chosen.has_places:
         motion = images_of_body(motion, body)
+    elif chosen.has_places and beside.is_file():
+        found = load_body_model(beside)
+        try:
+            motion, body = images_of_body(motion, found), found
+        except CardboxError:
+            if chosen.needs_body:
+                raise
+            print(f"most images were tracked with another body than that of {beside}: not used")
+        else:
+            print(f"took the body of {beside}; --model gives another")
     chosen.write(output, motion, body)
     print(
         f"exported {seen} of {images} images, {motion.state.count(UNCERTAIN)} of them uncertain; "

@@ -63,9 +63,10 @@ def images_of_body(motion: Motion, body: BodyModel) -> Motion:
     is_other = motion.is_seen & ((apart_m > _MOST_APART_M) | (lift_m > _MOST_LIFT_M))
     if 2 * is_other.sum() > motion.is_seen.sum():
         raise CardboxError(
-            f"the results are not those of the given body: joints differ by {max(apart_m):.3f} m, "
-            f"shoulders by {max(lift_m):.3f} m; give the model with which they were tracked (with "
-            "--stature that is OUT.body.yaml), or a bag of results, which contains it"
+            f"the results are not those of the body: joints differ by {max(apart_m):.3f} m, "
+            f"shoulders by {max(lift_m):.3f} m; give the model with which they were tracked. With "
+            "--stature that is OUT.body.yaml, unless most images were tracked before the last fit "
+            "of the sizes, as with several people in turn: then track each person alone"
         )
     return replace(
         motion,

@@ -106,13 +106,27 @@ def test_the_body_beside_the_table_is_found(
     assert made.read_bytes() == named.read_bytes()
 
 
+@pytest.mark.parametrize(("to", "code"), [("trc", 0), ("bvh", 1)])
+def test_a_body_beside_the_table_that_is_anothers(
+    results: Path, tmp_path: Path, cardbox: Callable, to: str, code: int
+) -> None:
+    """A tracker that fits sizes writes its last body, which need not be that of most images."""
+    shutil.copy(results / "person.csv", tmp_path)
+    save_body_model(BodyModel.of(hip_height_m=0.2), tmp_path / "person.body.yaml")
+    made = tmp_path / f"made.{to}"
+    done = cardbox("export", tmp_path / "person.csv", "--to", to, "--output", made)
+    assert done.code == code
+    assert made.exists() == (code == 0)
+    assert "another body than that of" in done.out if code == 0 else "last fit" in done.err
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
         (("person.csv", "--to", "bvh"), "BVH needs the bones of the person: give --model"),
         (("person.csv", "--to", "fbx"), "--to: invalid choice: 'fbx'"),
         (("person.csv",), "the following arguments are required: --to"),
-        (("person.csv", "--to", "trc", "--model", "FOLDER/other.yaml"), "not those of the given"),
+        (("person.csv", "--to", "trc", "--model", "FOLDER/other.yaml"), "not those of the body"),
         (
             ("person.csv", "--to", "trc", "--model", "FOLDER/none.yaml"),
             "cannot read the body model",

@@ -9,8 +9,9 @@ The directions are used for people who were not measured; for measured people th
 correction, which is trained on such, estimates the depth.
 
 Without new points, the last ones count for up to a second, less and less, because joints may have
-moved. Points that fit the last posture only with left and right exchanged are exchanged; points far
-from the last posture belong to somebody else and are not used, unless this lasts.
+moved. Points that fit the last posture only with left and right exchanged are exchanged; if this
+lasts, the person has turned the back to the camera. Points far from the last posture belong to
+somebody else and are not used, unless this lasts.
 """
 
 from __future__ import annotations
@@ -68,6 +69,8 @@ _ELSEWHERE_M, _ELSEWHERE_FRAMES = 0.4, 10
 # Left and right are exchanged if this makes the squared distances this much smaller, and they were
 # larger than this in the mean.
 _EXCHANGED, _EXCHANGED_M = 0.3, 0.1
+# A detector that mistakes left for right soon corrects itself; after this time it is right.
+_BACK_S = 0.5
 
 _SIDES = tuple(ARMS)
 _OTHER_SIDE = [
@@ -101,6 +104,7 @@ class JointPointsTerm:
         self._uses_bones = body.source != MEASURED
         self.body = body_tuple(body, camera, WholeBodyCostConfig())
         self._elsewhere = 0
+        self._exchanged_s = 0.0
         self._newest_points: ImagePoints | None = None
         self._age_s = 0.0
 
@@ -111,28 +115,31 @@ class JointPointsTerm:
             return _SILENCE
         weight = self.config.weight * max(frame.foreground_px, 1)
         evidence = self._evidence(points, self._age_s)
-        return JointPointsObservation(self.body, evidence, weight, before)
+        shows_back = self._exchanged_s > _BACK_S
+        return JointPointsObservation(self.body, evidence, weight, before, shows_back)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
         self._age_s += frame.interval_s
         before, points = frame.posture, frame.points
         if before is None:
-            self._newest_points, self._elsewhere = None, 0
+            self._newest_points, self._elsewhere, self._exchanged_s = None, 0, 0.0
         if points is not None and not points.is_empty:
             age_s = 0.0
             if points.stamp_ns is not None and frame.stamp_ns is not None:
                 age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
             if age_s <= _OLDEST_S and before is not None:
-                points = self._checked(points, _whole(before[None])[0])
+                points = self._checked(points, _whole(before[None])[0], frame.interval_s)
             if age_s <= _OLDEST_S and points is not None:
                 self._newest_points, self._age_s = points, age_s
         return self._newest_points if self._age_s <= _OLDEST_S else None
 
-    def _checked(self, points: ImagePoints, before: FloatArray) -> ImagePoints | None:
+    def _checked(
+        self, points: ImagePoints, before: FloatArray, interval_s: float
+    ) -> ImagePoints | None:
         """Return the points, with left and right exchanged if necessary; None if not this person's.
 
-        ``before`` is the last state, (14,).
+        ``before`` is the state (14,) of the last frame, ``interval_s`` before this one.
         """
         pixels = np.empty((N_POINTS, 3))
         kernels.project(before, self.body, pixels)
@@ -149,6 +156,9 @@ class JointPointsTerm:
         square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
         if square > _EXCHANGED_M**2 and other < _EXCHANGED * square:
             points, away_m = exchanged, other_m
+            self._exchanged_s += interval_s
+        else:
+            self._exchanged_s = 0.0
         self._elsewhere = self._elsewhere + 1 if np.nanmedian(away_m) > _ELSEWHERE_M else 0
         is_elsewhere = 0 < self._elsewhere <= _ELSEWHERE_FRAMES
         return None if is_elsewhere else points
@@ -188,12 +198,14 @@ class JointPointsObservation:
         evidence: fields of :class:`~.joint_points_kernels.Evidence`.
         weight_px: cost of a squared residual of 1, px.
         before: state of the previous frame; None at the start of tracking.
+        shows_back: whether left and right have been exchanged for long: the person's back is seen.
     """
 
     body: BodyTuple
     evidence: EvidenceTuple
     weight_px: float
     before: FloatArray | None
+    shows_back: bool = False
 
     def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
         """See :class:`~.terms.TermObservation`."""

@@ -164,7 +164,7 @@ class PointFit:
             # Without points for a while, the depth of such a person in one camera is a guess.
             return self.is_leading and len(cost.seeing) == 1
         farthest_m = self._farthest_m(state)
-        if farthest_m > point_doubt.FAR_M:
+        if farthest_m > point_doubt.FAR_M or any(one.shows_back for one in self._observations):
             return True
         if not self.is_leading or len(cost.seeing) > 1 or self._numbers != [0]:
             return False

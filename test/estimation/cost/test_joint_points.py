@@ -372,3 +372,19 @@ def test_one_frame_of_the_person_begins_the_count_anew(detected: Detect) -> None
 def test_a_jump_of_one_joint_is_no_other_person(detected: Detect) -> None:
     points = moved(detected(BODY, CAMERA, STATE), "left_wrist", 200.0)
     assert observed(points, STATE).postures(STATE[None])[0] == pytest.approx(0.9 * 16.0 * WEIGHT_PX)
+
+
+def test_points_that_stay_exchanged_show_the_persons_back(detected: Detect) -> None:
+    """A detector errs for an image or two; after half a second it is right."""
+    term = JointPointsTerm(JointPoints(), BODY, CAMERA)
+    points = detected(BODY, CAMERA, STATE)
+    back = exchanged(points)
+
+    def shown(given: ImagePoints) -> bool:
+        seen = term.observe(replace(frame(given, STATE), interval_s=0.1))
+        assert isinstance(seen, JointPointsObservation)
+        return seen.shows_back
+
+    assert [shown(back) for _ in range(8)] == [False] * 5 + [True] * 3
+    assert not shown(points)
+    assert not shown(back)
