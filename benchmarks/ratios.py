@@ -51,7 +51,7 @@ def measure_ratios(has_ros: bool) -> dict[str, Any]:
     }
 
 
-def measure_folder(repetitions: int = 1) -> float:
+def measure_folder(repetitions: int = 3) -> float:
     """Return how many times faster two processes track a folder of eight recordings than one.
 
     The medians of the repetitions are compared, and the numbers of processes take turns.

@@ -121,7 +121,7 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
             for name, start in (ratios["start"] or {}).items()
         ),
         (
-            "`cardbox track FOLDER` of eight recordings with one process / with two, once",
+            "`cardbox track FOLDER` of eight recordings with one process / with two",
             f"{ratios['folder']:.2f}",
         ),
     ]

@@ -35,7 +35,7 @@ class Start(NamedTuple):
     ratio: float
 
 
-def measure_start(repetitions: int = 3) -> dict[str, Start]:
+def measure_start(repetitions: int = 5) -> dict[str, Start]:
     """Return the medians for each process of ``PROCESSES``.
 
     Raises:
