@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import index
 
 import numpy as np
@@ -37,6 +37,11 @@ knuckles at the base."""
 _FARTHEST = 1e6
 
 POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
+
+_OTHER_SIDE = [
+    POINT_INDEX[name.replace("left", "right") if "left" in name else name.replace("right", "left")]
+    for name in POINT_NAMES
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +99,15 @@ class ImagePoints:
                 place = POINT_INDEX[name]
                 px[place], scores[place] = (column, row), score
         return cls(px, scores, stamp_ns)
+
+    def exchanged(self) -> ImagePoints:
+        """Return the points with left and right exchanged."""
+        return replace(
+            self,
+            px=self.px[_OTHER_SIDE],
+            scores=self.scores[_OTHER_SIDE],
+            spatial_m=None if self.spatial_m is None else self.spatial_m[_OTHER_SIDE],
+        )
 
     @property
     def is_empty(self) -> bool:

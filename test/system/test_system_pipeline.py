@@ -313,7 +313,8 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     kinds = {marker.ns: marker.type for marker in markers[-1].markers}
     assert kinds == {"patches": Marker.TRIANGLE_LIST, "skeleton": Marker.LINE_LIST}
     assert markers[-1].markers[0].header.frame_id == "test_optical"
-    assert (overlays[-1].width, overlays[-1].height, overlays[-1].encoding) == (320, 240, "bgr8")
+    # Small pictures are enlarged, so that the text is readable.
+    assert (overlays[-1].width, overlays[-1].height, overlays[-1].encoding) == (640, 480, "bgr8")
     assert np.all(np.array(deviations[-1].position) >= 0)
 
     before = len(session.joint_states)

@@ -85,8 +85,14 @@ def test_a_node_that_has_ended_has_left_the_graph(own_graph: Any) -> None:
     def listed() -> bool:
         return "stereo_depth" in own_graph.node.get_node_names()
 
-    process = own_graph.start("stereo_depth")
-    own_graph.wait(listed, "the node")
-    assert process.stop() == 0
-    # A participant that is not taken off the network stays for its lease of 20 s.
-    own_graph.wait(lambda: not listed(), "leaving the graph", timeout_s=8.0)
+    # A participant that is not taken off the network stays for its lease of 20 s. The message that
+    # takes it off is sent once, and a busy machine may lose it.
+    for _ in range(3):
+        process = own_graph.start("stereo_depth")
+        own_graph.wait(listed, "the node")
+        assert process.stop() == 0
+        begun_s = time.monotonic()
+        own_graph.wait(lambda: not listed(), "leaving the graph", timeout_s=60.0)
+        if time.monotonic() - begun_s < 8.0:
+            return
+    pytest.fail("the node stayed in the graph for its lease, three times")

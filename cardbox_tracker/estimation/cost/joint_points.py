@@ -16,14 +16,14 @@ somebody else and are not used, unless this lasts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import N_STATE, TORSO, TORSO_X
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
+from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.joint_points_kernels import (
@@ -73,10 +73,6 @@ _EXCHANGED, _EXCHANGED_M = 0.3, 0.1
 _BACK_S = 0.5
 
 _SIDES = tuple(ARMS)
-_OTHER_SIDE = [
-    POINT_INDEX[name.replace("left", "right") if "left" in name else name.replace("right", "left")]
-    for name in POINT_NAMES
-]
 _SILENCE = Silence()
 
 
@@ -103,8 +99,7 @@ class JointPointsTerm:
         self.config, self._camera = config, camera
         self._uses_bones = body.source != MEASURED
         self.body = body_tuple(body, camera, WholeBodyCostConfig())
-        self._elsewhere = 0
-        self._exchanged_s = 0.0
+        self._elsewhere, self._exchanged_s = 0, 0.0
         self._newest_points: ImagePoints | None = None
         self._age_s = 0.0
 
@@ -115,8 +110,8 @@ class JointPointsTerm:
             return _SILENCE
         weight = self.config.weight * max(frame.foreground_px, 1)
         evidence = self._evidence(points, self._age_s)
-        shows_back = self._exchanged_s > _BACK_S
-        return JointPointsObservation(self.body, evidence, weight, before, shows_back)
+        back = self._exchanged_s > _BACK_S
+        return JointPointsObservation(self.body, evidence, weight, before, shows_back=back)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
@@ -137,28 +132,19 @@ class JointPointsTerm:
     def _checked(
         self, points: ImagePoints, before: FloatArray, interval_s: float
     ) -> ImagePoints | None:
-        """Return the points, with left and right exchanged if necessary; None if not this person's.
-
-        ``before`` is the state (14,) of the last frame, ``interval_s`` before this one.
-        """
+        """Return the points, left and right exchanged if necessary; None if not this person's."""
         pixels = np.empty((N_POINTS, 3))
         kernels.project(before, self.body, pixels)
         found = points_of(points)
-        exchanged = replace(
-            points,
-            px=points.px[_OTHER_SIDE],
-            scores=points.scores[_OTHER_SIDE],
-            spatial_m=None if points.spatial_m is None else points.spatial_m[_OTHER_SIDE],
-        )
+        exchanged = points.exchanged()
         away_m, other_m = (self._distances(one, pixels) for one in (found, points_of(exchanged)))
         if not np.isfinite(away_m).any():
             return points
         square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
-        if square > _EXCHANGED_M**2 and other < _EXCHANGED * square:
+        is_exchanged = square > _EXCHANGED_M**2 and other < _EXCHANGED * square
+        self._exchanged_s = self._exchanged_s + interval_s if is_exchanged else 0.0
+        if is_exchanged:
             points, away_m = exchanged, other_m
-            self._exchanged_s += interval_s
-        else:
-            self._exchanged_s = 0.0
         self._elsewhere = self._elsewhere + 1 if np.nanmedian(away_m) > _ELSEWHERE_M else 0
         is_elsewhere = 0 < self._elsewhere <= _ELSEWHERE_FRAMES
         return None if is_elsewhere else points
