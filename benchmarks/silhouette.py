@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import sys
 import time
 from collections.abc import Callable
 from itertools import islice
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scene import BenchmarkScene
 from benchmarks.tools import WARM_UP, pinned
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.vision.background import SilhouetteExtractor
@@ -113,7 +115,7 @@ def _turns(
     return times, digest.hexdigest()[:16]
 
 
-def main() -> None:
+def main() -> int:
     """Measure the recordings of the command line, on one core."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", nargs="+", help="recordings of one camera")
@@ -121,7 +123,11 @@ def main() -> None:
     parser.add_argument("--images", type=int, default=200, help="number of images to measure")
     given = parser.parse_args()
     for path in given.recordings:
-        empty, images = _recorded(path, given.background, given.images)
+        try:
+            empty, images = _recorded(path, given.background, given.images)
+        except CardboxError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return 1
         with pinned(1):
             costs = measure_silhouettes(empty, images)
         without = ", ".join(f"{ratio:.2f} without {s}" for s, ratio in costs.ratios_without.items())
@@ -129,6 +135,7 @@ def main() -> None:
             f"{path}: {costs.ratio:.2f} times brightness alone ({without}), "
             f"{costs.median_ms:.3f} ms, silhouettes {costs.digest}"
         )
+    return 0
 
 
 def _recorded(path: str, background: TimeSpan, count: int) -> tuple[Images, Images]:
@@ -144,4 +151,4 @@ def _recorded(path: str, background: TimeSpan, count: int) -> tuple[Images, Imag
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -99,7 +99,9 @@ class JointPointsTerm:
         self.config, self._camera = config, camera
         self._uses_bones = body.source != MEASURED
         self.body = body_tuple(body, camera, WholeBodyCostConfig())
-        self._elsewhere, self._exchanged_s = 0, 0.0
+        self._elsewhere = 0
+        # Time since left and right were first exchanged, s; None if they are not.
+        self._exchanged_s: float | None = None
         self._newest_points: ImagePoints | None = None
         self._age_s = 0.0
 
@@ -110,28 +112,28 @@ class JointPointsTerm:
             return _SILENCE
         weight = self.config.weight * max(frame.foreground_px, 1)
         evidence = self._evidence(points, self._age_s)
-        back = self._exchanged_s > _BACK_S
+        back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
         return JointPointsObservation(self.body, evidence, weight, before, shows_back=back)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
         self._age_s += frame.interval_s
+        if self._exchanged_s is not None:
+            self._exchanged_s += frame.interval_s
         before, points = frame.posture, frame.points
         if before is None:
-            self._newest_points, self._elsewhere, self._exchanged_s = None, 0, 0.0
+            self._newest_points, self._elsewhere, self._exchanged_s = None, 0, None
         if points is not None and not points.is_empty:
             age_s = 0.0
             if points.stamp_ns is not None and frame.stamp_ns is not None:
                 age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
             if age_s <= _OLDEST_S and before is not None:
-                points = self._checked(points, _whole(before[None])[0], frame.interval_s)
+                points = self._checked(points, _whole(before[None])[0])
             if age_s <= _OLDEST_S and points is not None:
                 self._newest_points, self._age_s = points, age_s
         return self._newest_points if self._age_s <= _OLDEST_S else None
 
-    def _checked(
-        self, points: ImagePoints, before: FloatArray, interval_s: float
-    ) -> ImagePoints | None:
+    def _checked(self, points: ImagePoints, before: FloatArray) -> ImagePoints | None:
         """Return the points, left and right exchanged if necessary; None if not this person's."""
         pixels = np.empty((N_POINTS, 3))
         kernels.project(before, self.body, pixels)
@@ -141,13 +143,13 @@ class JointPointsTerm:
         if not np.isfinite(away_m).any():
             return points
         square, other = np.nanmean(away_m**2), np.nanmean(other_m**2)
-        is_exchanged = square > _EXCHANGED_M**2 and other < _EXCHANGED * square
-        self._exchanged_s = self._exchanged_s + interval_s if is_exchanged else 0.0
-        if is_exchanged:
+        if square > _EXCHANGED_M**2 and other < _EXCHANGED * square:
             points, away_m = exchanged, other_m
+            self._exchanged_s = self._exchanged_s or 0.0
+        else:
+            self._exchanged_s = None
         self._elsewhere = self._elsewhere + 1 if np.nanmedian(away_m) > _ELSEWHERE_M else 0
-        is_elsewhere = 0 < self._elsewhere <= _ELSEWHERE_FRAMES
-        return None if is_elsewhere else points
+        return None if 0 < self._elsewhere <= _ELSEWHERE_FRAMES else points
 
     def _distances(self, found: FloatArray, pixels: FloatArray) -> FloatArray:
         """Return the distance of each point (10, 3) from the projected joint, m; nan if unknown."""

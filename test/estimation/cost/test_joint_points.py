@@ -380,7 +380,7 @@ def test_points_that_stay_exchanged_show_the_persons_back(detected: Detect) -> N
     points = detected(BODY, CAMERA, STATE)
     back = exchanged(points)
 
-    def shown(given: ImagePoints) -> bool:
+    def shown(given: ImagePoints | None) -> bool:
         seen = term.observe(replace(frame(given, STATE), interval_s=0.1))
         assert isinstance(seen, JointPointsObservation)
         return seen.shows_back
@@ -388,3 +388,5 @@ def test_points_that_stay_exchanged_show_the_persons_back(detected: Detect) -> N
     assert [shown(back) for _ in range(8)] == [False] * 5 + [True] * 3
     assert not shown(points)
     assert not shown(back)
+    # A detector that is slower than the camera is right after the same time.
+    assert [shown(one) for one in (None, None, back, None, back)] == [False] * 4 + [True]
