@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import TypeVar
+from warnings import catch_warnings, simplefilter
 
 from cardbox_tracker import interrupts
 from cardbox_tracker.errors import CardboxError
 
 A = TypeVar("A")
 R = TypeVar("R")
+
+_TAKEN_UP_S = 0.05
+"""Time in which loky's thread puts the first calls into the queue of the processes (s)."""
 
 
 def cores() -> int:
@@ -44,13 +49,25 @@ def results_of(
     resource_tracker.ensure_running()
     # numba, BLAS and OpenMP read their number of threads when a process begins.
     with parallel_config("loky", inner_max_num_threads=1):
+        # loky's thread fails with a KeyError if it is ended while calls wait that it has not yet
+        # put into the queue of the processes: no more are given than the queue holds.
         parallel = Parallel(
-            jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="all", max_nbytes=None
+            jobs,
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch="2*n_jobs",
+            max_nbytes=None,
         )
         with interrupts.withheld():
             results = parallel(delayed(function)(argument) for argument in arguments)
-    with closing(results):
+            time.sleep(_TAKEN_UP_S)
+    try:
         yield _checked(results)
+    finally:
+        with catch_warnings():
+            # joblib advises to submit fewer calls when it is left before the end.
+            simplefilter("ignore", UserWarning)
+            results.close()
 
 
 def _checked(results: Iterator[R]) -> Iterator[R]:

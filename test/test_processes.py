@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 import os
 import signal
+import threading
+import time
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -39,6 +42,16 @@ def test_a_killed_process_is_told() -> None:
         list(found)
     with results_of(math.factorial, [3, 3], 2) as found:
         assert list(found) == [6, 6]
+
+
+def test_leaving_before_the_end_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    failed: list[threading.ExceptHookArgs] = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    for count in range(12):
+        with results_of(time.sleep, [0.002 * (i % 3) for i in range(60)], 2) as found:
+            for _ in islice(found, count):
+                pass
+    assert not [repr(one.exc_value) for one in failed]
 
 
 def test_a_withheld_ctrl_c_comes_at_the_end() -> None:
