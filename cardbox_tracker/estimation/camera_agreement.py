@@ -7,7 +7,8 @@ degree in pitch or yaw from the extrinsics is reported.
 
 A roll of the camera hardly changes the fit, because the model leans with it. It is estimated from
 the planes through both cameras that touch the person
-(:mod:`cardbox_tracker.estimation.silhouette_tangents`).
+(:mod:`cardbox_tracker.estimation.silhouette_tangents`). The same planes show an inverted pose and
+exchanged images within seconds (:mod:`cardbox_tracker.estimation.pose_direction`).
 ``docs/research/two-cameras.md`` has detection rates.
 """
 
@@ -24,6 +25,7 @@ from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
 from cardbox_tracker.estimation.cost.terms import Silhouette
 from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.pose_direction import PoseDirection, PoseFault
 from cardbox_tracker.estimation.silhouette_tangents import TopTangents, roll_of
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -49,8 +51,22 @@ class CameraAgreement:
     camera; call it when :attr:`is_due`, in any thread.
     """
 
-    def __init__(self, body: BodyModel, first: Camera, views: Sequence[View]) -> None:
-        """Begin with the ``views`` of further cameras on ``body``, measured by ``first``."""
+    def __init__(
+        self,
+        body: BodyModel,
+        first: Camera,
+        views: Sequence[View],
+        earlier: CameraAgreement | None = None,
+    ) -> None:
+        """Begin to compare.
+
+        Args:
+            body: the body, measured by the first camera.
+            first: the first camera, including its pitch.
+            views: views of further cameras on ``body``.
+            earlier: comparison of the same cameras with another body; tops need no body, so their
+                samples remain.
+        """
         self._body, self._first, self._views = body, first, tuple(views)
         self._kept = [deque[Sighting](maxlen=_WINDOW) for _ in views]
         self._missing = [_WINDOW] * len(self._views)
@@ -58,6 +74,27 @@ class CameraAgreement:
         self._found = [deque[float](maxlen=_REMEMBERED) for _ in views]
         self._tops = [TopTangents(first, view.camera, most=_TOPS) for view in views]
         self._rolls = [deque[float](maxlen=_REMEMBERED) for _ in views]
+        self._directions: list[PoseDirection] = (
+            [PoseDirection(first, v.camera, self._upright(v), v.roll_rad) for v in self._views]
+            if earlier is None
+            else earlier._directions
+        )
+
+    def look(self, first: Silhouette, others: Sequence[Silhouette | None]) -> None:
+        """Compare the silhouettes of a frame with a person, whether or not a posture fits them.
+
+        Args:
+            first: the person's silhouette in the first camera, (H, W), 0 or 255.
+            others: upright silhouettes of the further cameras; None for a missing image.
+        """
+        for direction, other in zip(self._directions, others, strict=False):
+            if other is not None:
+                direction.see(first, other)
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether the silhouettes show a gross error of a pose, so that no result is reliable."""
+        return any(direction.fault is not None for direction in self._directions)
 
     def see(
         self, state: FloatArray, first: Silhouette, others: Sequence[Silhouette | None]
@@ -125,21 +162,27 @@ class CameraAgreement:
         Args:
             names: names of the further cameras.
         """
+        gross = [
+            _gross(name, direction)
+            for name, direction in zip(names, self._directions, strict=True)
+            if direction.fault is not None
+        ]
+        is_gross = [direction.fault is not None for direction in self._directions]
         turned = [
             f"the extrinsics of {name} seem to be wrong by {_shown(degrees)} degrees: the "
             "silhouettes of the cameras contradict each other. Was a camera moved? Calibrate them "
             "again. A wrong distance of the person has the same effect"
-            for name, degrees in zip(names, self.turned_deg, strict=True)
-            if degrees is not None and degrees > DOUBTFUL_DEG
+            for name, degrees, told in zip(names, self.turned_deg, is_gross, strict=True)
+            if degrees is not None and degrees > DOUBTFUL_DEG and not told
         ]
         rolled = [
             f"{name} seems to be turned about its own axis by {_shown(abs(degrees))} degrees "
             "against its extrinsics: head and hands have other heights than in the first camera. "
             "Was a camera moved? Calibrate them again"
-            for name, degrees in zip(names, self.rolled_deg, strict=True)
-            if degrees is not None and abs(degrees) > DOUBTFUL_ROLL_DEG
+            for name, degrees, told in zip(names, self.rolled_deg, is_gross, strict=True)
+            if degrees is not None and abs(degrees) > DOUBTFUL_ROLL_DEG and not told
         ]
-        return turned + rolled
+        return gross + turned + rolled
 
     def _turn_of(self, view: View, sightings: Sequence[Sighting]) -> float:
         """Return pitch and yaw of a camera as one angle, degrees; inf if no pose fits."""
@@ -157,6 +200,23 @@ class CameraAgreement:
         """Return the pose of a camera without its roll."""
         axes = view.level_axes() @ self._first.reference_to_optical_rotation().T
         return Extrinsics(axes, view.camera.reference_to_optical_rotation() @ view.offset_m)
+
+
+def _gross(name: str, direction: PoseDirection) -> str:
+    """Return the warning about a gross error of a camera's pose."""
+    degrees = f"{np.degrees(direction.height_rad):.1f} degrees"
+    if direction.fault is PoseFault.INVERTED:
+        return (
+            f"the extrinsics of {name} seem to be inverted, or the images of the two cameras "
+            f"exchanged: head and hands differ by {degrees} in height, and the inverse pose fits "
+            "the silhouettes. The pose has to take points of the first camera's frame to that of "
+            f"{name}; check its direction and the topics' order"
+        )
+    return (
+        f"the extrinsics of {name} contradict the silhouettes: head and hands differ by {degrees} "
+        "in height. Were the images of two cameras exchanged, or was a camera moved? Check the "
+        "topics' order, or calibrate the cameras again"
+    )
 
 
 def _shown(degrees: float) -> str:

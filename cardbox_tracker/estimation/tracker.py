@@ -25,6 +25,7 @@ from cardbox_tracker.estimation.estimate import (
     Estimate,
 )
 from cardbox_tracker.estimation.filtering.cycles import Cycles
+from cardbox_tracker.estimation.filtering.keypoint_states import doubted
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Presence
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
@@ -83,6 +84,7 @@ class Tracker:
         if others and (make_filter or not self.config.has_several_views):
             raise ValueError("several cameras need the filter whole_body: the preset default")
         self._fitting = None
+        self.agreement: CameraAgreement | None = None
         if body.unknown:
             fits = self._rng.spawn(1)[0]
             self._fitting = Fitting(body, self.camera, self.config, fits)
@@ -95,7 +97,8 @@ class Tracker:
             TrackedCamera(body, self.camera, self.config, other) for other in (None, *self._others)
         ]
         views = self.views
-        self.agreement = CameraAgreement(body, self.camera, views) if views else None
+        earlier = self.agreement
+        self.agreement = CameraAgreement(body, self.camera, views, earlier) if views else None
         self.reset()
 
     def reset(self) -> None:
@@ -246,6 +249,8 @@ class Tracker:
         if presence is Presence.TOO_MUCH:
             # After a short change of the light, the person is still at the same place.
             return Estimate(LOST)
+        if self.agreement is not None:
+            self.agreement.look(*_silhouettes(frames))
         fit = self._filter.follow(frames, [camera.terms for camera in self._cameras])
         self._particles = fit.particles
         if not fit.is_finite:
@@ -259,10 +264,13 @@ class Tracker:
                 self._filter.recover()
             return Estimate(LOST)
         if self.agreement is not None and fit.offset_m is not None:
-            first, *others = (frame.silhouette for frame in frames)
-            self.agreement.see(self._before, first, others)
+            self.agreement.see(self._before, *_silhouettes(frames))
+        states = fit.keypoint_states
+        is_contradicted = self.agreement is not None and self.agreement.is_contradicted
+        if is_contradicted and states is not None:
+            states = doubted(states)
         return Estimate(
-            UNCERTAIN if fit.is_uncertain else TRACKING,
+            UNCERTAIN if fit.is_uncertain or is_contradicted else TRACKING,
             fit.posture,
             fit.posture_stddev,
             fit.keypoints_m,
@@ -270,6 +278,12 @@ class Tracker:
             fit.iou,
             fit.offset_m,
             fit.offset_stddev_m,
-            keypoint_states=fit.keypoint_states,
+            keypoint_states=states,
             keypoint_chances=fit.keypoint_chances,
         )
+
+
+def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:
+    """Return the silhouette of the first camera and those of the further ones."""
+    first, *others = (frame.silhouette for frame in frames)
+    return first, others

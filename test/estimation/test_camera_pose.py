@@ -42,9 +42,11 @@ def aside(angle_rad: float = 1.0) -> Extrinsics:
 TRUE = aside()
 
 
-def sightings(states: list[np.ndarray], body: BodyModel = BODY) -> list[Sighting]:
+def sightings(
+    states: list[np.ndarray], body: BodyModel = BODY, pose: Extrinsics = TRUE
+) -> list[Sighting]:
     """A round person, who is not the model, as both cameras see them."""
-    view = View.of(body, CAMERA, OtherCamera(OTHER, TRUE))
+    view = View.of(body, CAMERA, OtherCamera(OTHER, pose))
     scene, rng = Scene(), np.random.default_rng(0)
     first, other = Renderer(CAMERA, scene, rng), Renderer(view.camera, scene, rng)
     found = []

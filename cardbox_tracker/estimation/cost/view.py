@@ -54,6 +54,7 @@ class View:
         body: the person, placed before that camera.
         camera: that camera, turned upright.
         yaw_rad: rotation of its level frame about the vertical.
+        roll_rad: rotation of its image about the optical axis, which the upright camera lacks.
         offset_m: translation from the first level frame into its own, after the rotation, (3,).
         turn: pixel of the camera's image for each pixel of the upright image, (H, W, 2) int16; None
             if the camera stands upright.
@@ -65,6 +66,7 @@ class View:
     body: BodyModel
     camera: Camera
     yaw_rad: float
+    roll_rad: float
     offset_m: FloatArray
     turn: NDArray[np.int16] | None
     raw_px: FloatArray
@@ -116,7 +118,7 @@ class View:
         moved[TORSO_Y] = offset_m[1] + s * place.distance_m
         moved[TORSO_Z] = offset_m[2] + place.hip_height_m - there.placement.hip_height_m
         moved[YAW] = -yaw_rad
-        return cls(there, upright, yaw_rad, offset_m, turn, raw_px, turned, moved)
+        return cls(there, upright, yaw_rad, roll_rad, offset_m, turn, raw_px, turned, moved)
 
     def states(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) or (14,) of the first camera in the frame of this camera."""

@@ -7,6 +7,7 @@ deviation, and the keypoint's error to lie along one line.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import erfc, sqrt
 
 import numpy as np
@@ -106,6 +107,12 @@ def states_of(
         _state_of(chance, is_hidden)
         for chance, is_hidden in zip(chances.tolist(), hidden.tolist(), strict=True)
     )
+
+
+def doubted(states: Sequence[KeypointState]) -> tuple[KeypointState, ...]:
+    """Return the ``states`` of a result that is doubtful as a whole: nothing is tracked."""
+    doubt = {KeypointState.TRACKED: KeypointState.UNCERTAIN}
+    return tuple(doubt.get(state, state) for state in states)
 
 
 def _state_of(chance: float, is_hidden: bool) -> KeypointState:
