@@ -12,10 +12,9 @@ from urllib.parse import quote
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.files import atomic_path
+from cardbox_tracker.viewing.web_page import THIS_COMPUTER, web_page
 
 APPLICATION = "cardbox_tracker"
-
-_THIS_COMPUTER = "127.0.0.1"
 
 
 def rerun() -> Any:
@@ -66,10 +65,10 @@ def recording(blueprint: Any, save: Path | None, web: bool) -> Iterator[tuple[An
         try:
             sinks: list[Any] = [] if path is None else [rr.FileSink(path)]
             if web:
-                server = rr.GrpcServerSink(bind_ip=_THIS_COMPUTER)
+                server = rr.GrpcServerSink(bind_ip=THIS_COMPUTER)
                 sinks.append(server)
-                rr.serve_web_viewer(open_browser=False)
-                address = f"http://localhost:9090?url={quote(server.uri, safe='')}"
+                page = stack.enter_context(web_page(rr))
+                address = f"{page}?url={quote(server.uri, safe='')}"
             if sinks:
                 stream.set_sinks(*sinks, default_blueprint=blueprint)
             else:
