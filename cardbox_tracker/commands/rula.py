@@ -38,26 +38,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--csv",
         type=Path,
-        required=True,
+        default=None,
         metavar="OUT.csv",
         help="table to write, one row per image: the expected score and the chance of each",
     )
     parser.add_argument(
-        "--plot", type=Path, default=None, metavar="OUT.png", help="also draw the scores over time"
+        "--plot", type=Path, default=None, metavar="OUT.png", help="draw the scores over time"
     )
     parser.add_argument(
         "--shares",
         type=Path,
         default=None,
         metavar="SHARES.csv",
-        help="also write the time at each score of each part",
+        help="write the time at each score of each part",
     )
     parser.add_argument(
         "--html",
         type=Path,
         default=None,
         metavar="OUT.html",
-        help="also write one page that prints: scores, shares of time, and the worst moments",
+        help="write one page that prints: scores, shares of time, and the worst moments",
     )
     parser.add_argument(
         "--images",
@@ -101,7 +101,8 @@ def run(options: argparse.Namespace) -> None:
     summary = track_inputs(options, observers=(observer,))
     rows = observer.rows
     shares = score_shares(rows, config)
-    write_csv(rows, options.csv)
+    if options.csv is not None:
+        write_csv(rows, options.csv)
     for line in report_lines(summarize(rows), shares, config):
         print(line)
     if options.plot is not None:

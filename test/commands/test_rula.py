@@ -43,6 +43,10 @@ def test_a_recording_is_scored(files: Path, tmp_path: Path, cardbox: Callable) -
     assert done.code == 0, done.err
     assert (table.read_bytes(), shares.read_bytes()) == first
     assert "data:image" not in page.read_text(encoding="utf-8")
+    only = tmp_path / "only.html"
+    done = cardbox("rula", *options(files), "--html", only, "--title", "Packing")
+    assert done.code == 0, done.err
+    assert [line for line in done.out.splitlines() if "wrote" in line] == [f"wrote {only}"]
 
 
 @pytest.mark.parametrize(
