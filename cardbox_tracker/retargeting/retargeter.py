@@ -110,7 +110,7 @@ class Retargeter:
         commanded_ns, self._commanded_ns = self._commanded_ns, now_ns
         reason = self._reason(state, posture, stddev)
         if reason or body is None or posture is None or stddev is None:
-            return self._stop(reason or "nobody", now_ns)
+            return self._stop(reason or "no body model", now_ns)
         whole = with_neck(posture, stddev, self._config.max_stddev_rad)
         target = self._method.target(body, whole, self.at(now_ns).positions)
         if not np.isfinite(target).all():

@@ -139,6 +139,12 @@ class RetargetNode(CardboxNode):
             stamp_ns, self._state, self._body, posture, stddev, self._heard_ns
         )
         self._send(command)
+        if self._body is None:
+            self.diagnostics.wait_for(
+                f"the body model on {self.resolve('body_model')}; the node initializer sends it "
+                "when it starts with its parameter model_file, or after it has measured the person"
+            )
+            return
         self.diagnostics.working(sent_ns)
 
     def _check(self) -> None:

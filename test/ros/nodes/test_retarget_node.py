@@ -95,6 +95,25 @@ def test_an_uncertain_posture_moves_nothing(robot: Any, send: Any) -> None:
     assert robot.texts(SAID) == ["moving", "frozen: too uncertain", "frozen: uncertain"]
 
 
+def test_without_a_body_model_the_robot_stands_still_and_the_node_says_why(
+    bus: Any, joints: Any
+) -> None:
+    joint_map = str(CONFIG / "example_joint_map.yaml")
+    node = bus.start(RetargetNode, robot_file=str(ARM), joint_map_file=joint_map)
+    for tenth in range(2):
+        bus.send("/tracking_state", String(data="tracking"))
+        bus.send("/joint_states", joints(tenth, {}))
+        bus.send("/joint_states_stddev", joints(tenth, {}, other=0.1))
+    assert bus.texts(SAID) == ["frozen: no body model"]
+    assert "the body model on /body_model; the node initializer" in node.diagnostics._waiting
+    bus.send("/body_model", MODEL)
+    bus.send("/tracking_state", String(data="tracking"))
+    bus.send("/joint_states", joints(2, {}))
+    bus.send("/joint_states_stddev", joints(2, {}, other=0.1))
+    assert bus.texts(SAID)[-1] == "moving"
+    assert not node.diagnostics._waiting
+
+
 def test_silence_is_a_dead_man_too(robot: Any, send: Any, clock: Clock) -> None:
     send(0)
     robot.tick()
