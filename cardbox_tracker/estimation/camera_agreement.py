@@ -162,27 +162,25 @@ class CameraAgreement:
         Args:
             names: names of the further cameras.
         """
-        gross = [
-            _gross(name, direction)
-            for name, direction in zip(names, self._directions, strict=True)
-            if direction.fault is not None
-        ]
-        is_gross = [direction.fault is not None for direction in self._directions]
-        turned = [
-            f"the extrinsics of {name} seem to be wrong by {_shown(degrees)} degrees: the "
-            "silhouettes of the cameras contradict each other. Was a camera moved? Calibrate them "
-            "again. A wrong distance of the person has the same effect"
-            for name, degrees, told in zip(names, self.turned_deg, is_gross, strict=True)
-            if degrees is not None and degrees > DOUBTFUL_DEG and not told
-        ]
-        rolled = [
-            f"{name} seems to be turned about its own axis by {_shown(abs(degrees))} degrees "
-            "against its extrinsics: head and hands have other heights than in the first camera. "
-            "Was a camera moved? Calibrate them again"
-            for name, degrees, told in zip(names, self.rolled_deg, is_gross, strict=True)
-            if degrees is not None and abs(degrees) > DOUBTFUL_ROLL_DEG and not told
-        ]
-        return gross + turned + rolled
+        told = []
+        measured = zip(names, self._directions, self.turned_deg, self.rolled_deg, strict=True)
+        for name, direction, turned, rolled in measured:
+            if direction.fault is not None:
+                told.append(_gross(name, direction))
+                continue
+            if turned is not None and turned > DOUBTFUL_DEG:
+                told.append(
+                    f"the extrinsics of {name} seem to be wrong by {_shown(turned)} degrees: the "
+                    "silhouettes of the cameras contradict each other. Was a camera moved? "
+                    "Calibrate them again. A wrong distance of the person has the same effect"
+                )
+            if rolled is not None and abs(rolled) > DOUBTFUL_ROLL_DEG:
+                told.append(
+                    f"{name} seems to be turned about its own axis by {_shown(abs(rolled))} "
+                    "degrees against its extrinsics: head and hands have other heights than in "
+                    "the first camera. Was a camera moved? Calibrate them again"
+                )
+        return told
 
     def _turn_of(self, view: View, sightings: Sequence[Sighting]) -> float:
         """Return pitch and yaw of a camera as one angle, degrees; inf if no pose fits."""
@@ -209,8 +207,8 @@ def _gross(name: str, direction: PoseDirection) -> str:
         return (
             f"the extrinsics of {name} seem to be inverted, or the images of the two cameras "
             f"exchanged: head and hands differ by {degrees} in height, and the inverse pose fits "
-            "the silhouettes. The pose has to take points of the first camera's frame to that of "
-            f"{name}; check its direction and the topics' order"
+            "the silhouettes. The pose must transform points from the first camera's frame into "
+            f"that of {name}; check its direction and the topics' order"
         )
     return (
         f"the extrinsics of {name} contradict the silhouettes: head and hands differ by {degrees} "

@@ -22,10 +22,10 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 _WINDOW, _LEAST = 15, 6
 # Frames between samples, and between those of the first frames, so that a verdict comes early.
 _EVERY, _EVERY_AT_FIRST, _FIRST = 6, 2, 60
-# Median height of an inverted pose at least, of any wrong pose at least, rad. Measured: at most
-# 0.7 degrees for right poses (docs/research/two-cameras.md).
+# Least median heights of an inverted pose and of any wrong pose, rad. Right poses have at most
+# 0.7 degrees (docs/research/two-cameras.md).
 _INVERTED_RAD, _WRONG_RAD = np.radians(0.3), np.radians(2.5)
-# Ratio of the inverse pose's height to the given one's, at most, for an inverted pose.
+# An inverted pose's height is more than that of its inverse divided by this.
 _BETTER = 0.25
 
 

@@ -6,10 +6,12 @@ restricts the browser to this computer, so nothing of a session is sent out.
 
 from __future__ import annotations
 
+import errno
 import socket
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from http.client import HTTPConnection, HTTPException
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -36,8 +38,7 @@ def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
         OSError: the port is in use.
     """
     files_port = _free_port()
-    page = type("Page", (_Page,), {"files_port": files_port})
-    with ThreadingHTTPServer((THIS_COMPUTER, port), page) as server:
+    with _server(port, partial(_Page, files_port)) as server:
         rr.serve_web_viewer(web_port=files_port, open_browser=False)
         thread = threading.Thread(target=server.serve_forever, name="web page", daemon=True)
         thread.start()
@@ -51,11 +52,13 @@ def web_page(rr: Any, port: int = PORT) -> Iterator[str]:
 class _Page(BaseHTTPRequestHandler):
     """Passes files on from Rerun's own server, with the policy."""
 
-    files_port: int
+    def __init__(self, files_port: int, *of_server: Any) -> None:
+        self._files_port = files_port
+        super().__init__(*of_server)
 
     def do_GET(self) -> None:
         """Answer with the file."""
-        connection = HTTPConnection(THIS_COMPUTER, self.files_port, timeout=_TIMEOUT_S)
+        connection = HTTPConnection(THIS_COMPUTER, self._files_port, timeout=_TIMEOUT_S)
         try:
             connection.request("GET", self.path)
             answer = connection.getresponse()
@@ -72,11 +75,23 @@ class _Page(BaseHTTPRequestHandler):
                 self.send_header(name, value)
         self.send_header("Content-Length", str(len(content)))
         self.send_header("Content-Security-Policy", _POLICY)
-        self.end_headers()
-        self.wfile.write(content)
+        # A browser that closes its page ends the transfer.
+        with suppress(ConnectionError):
+            self.end_headers()
+            self.wfile.write(content)
 
     def log_message(self, format: str, *args: object) -> None:
         """Write nothing to the terminal for each request."""
+
+
+def _server(port: int, page: Callable[..., BaseHTTPRequestHandler]) -> ThreadingHTTPServer:
+    try:
+        return ThreadingHTTPServer((THIS_COMPUTER, port), page)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        message = f"port {port} is in use; end the other 'cardbox view --web' or program there"
+        raise OSError(error.errno, message) from error
 
 
 def _free_port() -> int:

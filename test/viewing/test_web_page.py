@@ -61,5 +61,8 @@ def test_files_are_passed_on_with_a_policy(library: Library) -> None:
 def test_a_port_in_use_is_an_error(library: Library) -> None:
     with web_page(library, port=0) as address:
         port = int(address.rpartition(":")[2])
-        with pytest.raises(OSError, match="in use"), web_page(Library(), port=port):
+        with (
+            pytest.raises(OSError, match=f"port {port} is in use; end"),
+            web_page(Library(), port=port),
+        ):
             pass

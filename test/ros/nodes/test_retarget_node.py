@@ -105,13 +105,15 @@ def test_without_a_body_model_the_robot_stands_still_and_the_node_says_why(
         bus.send("/joint_states", joints(tenth, {}))
         bus.send("/joint_states_stddev", joints(tenth, {}, other=0.1))
     assert bus.texts(SAID) == ["frozen: no body model"]
-    assert "the body model on /body_model; the node initializer" in node.diagnostics._waiting
+    assert (
+        "the body model on /body_model; the node initializer" in node.diagnostics.status().message
+    )
     bus.send("/body_model", MODEL)
     bus.send("/tracking_state", String(data="tracking"))
     bus.send("/joint_states", joints(2, {}))
     bus.send("/joint_states_stddev", joints(2, {}, other=0.1))
     assert bus.texts(SAID)[-1] == "moving"
-    assert not node.diagnostics._waiting
+    assert "body model" not in node.diagnostics.status().message
 
 
 def test_silence_is_a_dead_man_too(robot: Any, send: Any, clock: Clock) -> None:
