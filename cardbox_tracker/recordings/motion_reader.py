@@ -18,19 +18,17 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BagError, CardboxError, quoted
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 from cardbox_tracker.exporting.motion import Motion
-from cardbox_tracker.outputs import neck_from, place_from, posture_from, unit_of
+from cardbox_tracker.outputs import neck_from, place_from, posture_from
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
 from cardbox_tracker.recordings.result_reader import MODEL, joints_of, namespace_of, points_of
-from cardbox_tracker.recordings.result_table import PARQUET, pyarrow_or_error
+from cardbox_tracker.recordings.result_table import PARQUET, POINT_COLUMNS, pyarrow_or_error
 
 _STATE, _JOINTS, _KEYPOINTS = "/tracking_state", "/joint_states", "/keypoints"
 _STDDEV = "/joint_states_stddev"
-_STATES = tuple(f"{name}_{unit_of(name)}" for name in (*JOINT_NAMES, *PLACE_NAMES))
-_POINTS = tuple(f"{name}_{axis}_m" for name in KEYPOINT_NAMES for axis in "xyz")
-_NECK = tuple(f"{name}_rad" for name in NECK_NAMES)
-_NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *_POINTS)
-_VALUES = N_STATE + len(NECK_NAMES) + len(_POINTS)
+_STATES = (*JOINT_NAMES, *PLACE_NAMES)
+_NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *POINT_COLUMNS)
+_VALUES = N_STATE + len(NECK_NAMES) + len(POINT_COLUMNS)
 _GAP: FloatArray = np.full(_VALUES, np.nan)
 
 
@@ -103,8 +101,8 @@ def _row_of(row: Mapping[str, Any]) -> _Row:
     values = _GAP
     if state in (TRACKING, UNCERTAIN):
         # The face is not seen in every image, and not sought without a detector.
-        neck = ["nan" if row.get(name) in (None, "") else row[name] for name in _NECK]
-        known = [float(row[name]) for name in (*_STATES, *_POINTS)]
+        neck = ["nan" if row.get(name) in (None, "") else row[name] for name in NECK_NAMES]
+        known = [float(row[name]) for name in (*_STATES, *POINT_COLUMNS)]
         if not np.isfinite(known).all():
             raise ValueError("a value is not finite")
         values = np.array([*known[:N_STATE], *map(float, neck), *known[N_STATE:]])
@@ -194,7 +192,7 @@ class _Results:
         elif stamp_ns_of(message) in self._found:
             values = self._found[stamp_ns_of(message)][1]
             if topic == _KEYPOINTS:
-                values[N_STATE + 2 :] = points_of(message).reshape(len(_POINTS))
+                values[N_STATE + 2 :] = points_of(message).reshape(len(POINT_COLUMNS))
             elif neck_from(joints_of(message)) is None:
                 # The joint states have a straight neck where the face is not seen.
                 values[N_STATE : N_STATE + 2] = np.nan

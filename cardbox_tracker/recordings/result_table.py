@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ from cardbox_tracker.keypoint_status import keypoint_states
 from cardbox_tracker.outputs import METRICS, joint_deviations, joint_values, positions_of, unit_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
-Cell = int | float | str | None
-"""A value of the table; None is unknown."""
+Cell = int | float | str | Decimal | None
+"""A value of the table; None is unknown. A Decimal keeps the nine decimals of a stamp."""
 
 PARQUET = ".parquet"
 """Suffix of the tables that are not CSV."""
@@ -29,57 +30,68 @@ PARQUET = ".parquet"
 _BODY_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 
 
+POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
+"""Columns of the keypoints, m in the optical frame of the first camera."""
+
+
 def columns(has_points: bool = False) -> tuple[str, ...]:
-    """Return the names of the columns, which end in their unit.
+    """Return the names of the columns, see :func:`units`."""
+    return tuple(units(has_points))
 
-    With ``has_points``, for recordings with points of the person, the neck is among them.
+
+def units(has_points: bool = False) -> dict[str, str]:
+    """Return the unit of each column by its name, in their order; empty for none.
+
+    The names up to the person's place are fixed, because scripts read them; the others end in their
+    unit. With ``has_points``, for recordings with points of the person, the neck is among them.
     """
-    # New columns are appended, because scripts read these by their position.
-    return (
-        *("stamp_ns", "time_s", "state"),
-        *_joints(JOINT_NAMES),
-        *(f"{name}_{axis}_m" for name in KEYPOINT_NAMES for axis in "xyz"),
-        *(f"{metric.name}_{metric.unit}".rstrip("_") for metric in METRICS),
-        *_joints(PLACE_NAMES),
-        *_joints(_BODY_NAMES, "_stddev"),
-        *(f"{name}_{what}" for what in ("state", "chance") for name in KEYPOINT_NAMES),
-        *(_joints(NECK_NAMES) + _joints(NECK_NAMES, "_stddev") if has_points else ()),
-    )
+    return {
+        "stamp": "s",
+        "state": "",
+        **_units(JOINT_NAMES),
+        **dict.fromkeys(POINT_COLUMNS, "m"),
+        **{metric.name: metric.unit for metric in METRICS},
+        **_units(PLACE_NAMES),
+        "stamp_ns": "ns",
+        "time_s": "s",
+        **_deviation_units(_BODY_NAMES),
+        **{f"{name}_{what}": "" for what in ("state", "chance") for name in KEYPOINT_NAMES},
+        **(_units(NECK_NAMES) | _deviation_units(NECK_NAMES) if has_points else {}),
+    }
 
 
-def _joints(names: tuple[str, ...], what: str = "") -> tuple[str, ...]:
-    return tuple(f"{name}{what}_{unit_of(name)}" for name in names)
+def _units(joints: Iterable[str]) -> dict[str, str]:
+    return {name: unit_of(name) for name in joints}
+
+
+def _deviation_units(joints: Iterable[str]) -> dict[str, str]:
+    return {f"{name}_stddev_{unit_of(name)}": unit_of(name) for name in joints}
 
 
 def row_of(
     stamp_ns: int, time_s: float, estimate: Estimate, has_points: bool = False
 ) -> list[Cell]:
     """Return the row of one image, in the order of :func:`columns`."""
-    known: list[Cell] = [stamp_ns, time_s, estimate.state]
+    names = columns(has_points)
+    stamp = Decimal(stamp_ns).scaleb(-9)
+    known: dict[str, Cell] = {"stamp": stamp, "state": estimate.state}
+    known |= {"stamp_ns": stamp_ns, "time_s": time_s}
     joints, deviations = joint_values(estimate), joint_deviations(estimate)
     if joints is None or estimate.keypoints_m is None:
-        return known + [None] * (len(columns(has_points)) - len(known))
-    values = positions_of(joints)
+        return [known.get(name) for name in names]
+    known |= positions_of(joints)
+    if estimate.neck is None:
+        known |= dict.fromkeys(NECK_NAMES)
+    points_m = np.asarray(estimate.keypoints_m, float).ravel()
+    known |= zip(POINT_COLUMNS, points_m.tolist(), strict=True)
+    known |= {metric.name: metric.of(estimate) for metric in METRICS}
     stddevs = {} if deviations is None else positions_of(deviations)
-    known += [values[name] for name in JOINT_NAMES]
-    known += np.asarray(estimate.keypoints_m, float).ravel().tolist()
-    known += [metric.of(estimate) for metric in METRICS]
-    known += [values[name] for name in PLACE_NAMES]
-    known += [stddevs.get(name) for name in _BODY_NAMES]
-    known += _states_of(estimate)
-    if has_points:
-        is_seen = estimate.neck is not None
-        known += [values[name] if is_seen else None for name in NECK_NAMES]
-        known += [stddevs.get(name) for name in NECK_NAMES]
-    return known
-
-
-def _states_of(estimate: Estimate) -> list[Cell]:
-    """Return states and probabilities of the keypoints; unknown ones without such states."""
-    found = keypoint_states(estimate)
-    if found is None:
-        return [None] * (2 * len(KEYPOINT_NAMES))
-    return [*map(str, found.states), *found.chances.tolist()]
+    known |= zip(_deviation_units(stddevs), stddevs.values(), strict=True)
+    states = keypoint_states(estimate)
+    if states is not None:
+        for name, state, chance in zip(*states, strict=True):
+            known |= {f"{name}_state": str(state), f"{name}_chance": float(chance)}
+    return [known.get(name) for name in names]
 
 
 def check_table(path: Path) -> None:
@@ -115,7 +127,12 @@ def result_table(
             )
             texts = ("state", *(f"{name}_state" for name in KEYPOINT_NAMES))
             types = {"stamp_ns": arrow.int64()} | dict.fromkeys(texts, arrow.string())
-            schema = arrow.schema([(name, types.get(name, arrow.float64())) for name in names])
+            schema = arrow.schema(
+                arrow.field(name, types.get(name, arrow.float64()), metadata={"unit": unit})
+                for name, unit in units(has_points).items()
+            )
+            for row in rows:
+                row[0] = float(row[0] or 0)
             found = [dict(zip(names, row, strict=True)) for row in rows]
             parquet.write_table(arrow.Table.from_pylist(found, schema), temporary)
         return
@@ -128,9 +145,14 @@ def result_table(
 
 
 def _text(cell: Cell) -> str:
-    if cell is None:
-        return ""
-    return f"{cell:.6f}" if isinstance(cell, float) else str(cell)
+    match cell:
+        case None:
+            return ""
+        case Decimal():
+            return f"{cell:.9f}"
+        case float():
+            return f"{cell:.6f}"
+    return str(cell)
 
 
 def pyarrow_or_error() -> tuple[Any, Any]:

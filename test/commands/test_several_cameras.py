@@ -55,7 +55,7 @@ def test_a_synthetic_recording_is_measured_and_tracked(
     with table.open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             frame = truth.frames[int(row["stamp_ns"])]
-            found = [[float(row[f"{name}_{axis}_m"]) for axis in "xyz"] for name in KEYPOINT_NAMES]
+            found = [[float(row[f"{name}_{axis}"]) for axis in "xyz"] for name in KEYPOINT_NAMES]
             errors.append(np.linalg.norm(np.array(found) - frame.keypoints_m, axis=1).mean())
     assert len(errors) > 30
     assert np.mean(errors) < 0.06

@@ -71,7 +71,7 @@ def test_a_recorded_session_is_measured_and_tracked_to_its_end(
                 > UNCERTAIN_FROM
             ):
                 doubted.add(stamp_ns)
-            points = [float(row[f"{joint}_{axis}_m"]) for joint in KEYPOINT_NAMES for axis in "xyz"]
+            points = [float(row[f"{joint}_{axis}"]) for joint in KEYPOINT_NAMES for axis in "xyz"]
             estimates_m[stamp_ns] = np.array(points).reshape(6, 3)
     # Every image with somebody in it, to the last one.
     expected = [s for s in truth.frames if s >= truth.start_ns + round(start_s * 1e9)]

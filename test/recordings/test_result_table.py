@@ -6,6 +6,7 @@ import csv
 import re
 import sys
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,13 @@ import pytest
 from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
-from cardbox_tracker.recordings.result_table import check_table, columns, result_table, row_of
+from cardbox_tracker.recordings.result_table import (
+    check_table,
+    columns,
+    result_table,
+    row_of,
+    units,
+)
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 ROOT = Path(__file__).parents[2]
@@ -26,16 +33,19 @@ ANGLES = (
     *("right_shoulder_abduction", "right_shoulder_flexion"),
     *("right_elbow_abduction", "right_elbow_flexion"),
 )
+FIXED = (
+    *("stamp", "state", "torso_y", *ANGLES),
+    *("left_shoulder_x", "left_shoulder_y", "left_shoulder_z"),
+    *("left_elbow_x", "left_elbow_y", "left_elbow_z"),
+    *("left_hand_x", "left_hand_y", "left_hand_z"),
+    *("right_shoulder_x", "right_shoulder_y", "right_shoulder_z"),
+    *("right_elbow_x", "right_elbow_y", "right_elbow_z"),
+    *("right_hand_x", "right_hand_y", "right_hand_z"),
+    *("cost", "iou", "torso_x", "torso_z"),
+)
 HEADER = (
-    *("stamp_ns", "time_s", "state", "torso_y_m"),
-    *(f"{name}_rad" for name in ANGLES),
-    *("left_shoulder_x_m", "left_shoulder_y_m", "left_shoulder_z_m"),
-    *("left_elbow_x_m", "left_elbow_y_m", "left_elbow_z_m"),
-    *("left_hand_x_m", "left_hand_y_m", "left_hand_z_m"),
-    *("right_shoulder_x_m", "right_shoulder_y_m", "right_shoulder_z_m"),
-    *("right_elbow_x_m", "right_elbow_y_m", "right_elbow_z_m"),
-    *("right_hand_x_m", "right_hand_y_m", "right_hand_z_m"),
-    *("cost_px", "iou", "torso_x_m", "torso_z_m", "torso_y_stddev_m"),
+    *FIXED,
+    *("stamp_ns", "time_s", "torso_y_stddev_m"),
     *(f"{name}_stddev_rad" for name in ANGLES),
     *("torso_x_stddev_m", "torso_z_stddev_m"),
     *("left_shoulder_state", "left_elbow_state", "left_hand_state"),
@@ -43,36 +53,48 @@ HEADER = (
     *("left_shoulder_chance", "left_elbow_chance", "left_hand_chance"),
     *("right_shoulder_chance", "right_elbow_chance", "right_hand_chance"),
 )
-NECK = ("neck_yaw_rad", "neck_pitch_rad", "neck_yaw_stddev_rad", "neck_pitch_stddev_rad")
+NECK = ("neck_yaw", "neck_pitch", "neck_yaw_stddev_rad", "neck_pitch_stddev_rad")
 POINTS_M = np.arange(18).reshape(6, 3) / 4
 FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
 PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
 SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.2, 0.3]))
-STAMP_NS = 1_700_000_000_000_000_005
+STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 
 
-def test_the_columns_have_their_units() -> None:
+def test_scripts_find_the_columns_that_they_know() -> None:
     assert columns() == HEADER
     assert columns(has_points=True) == HEADER + NECK
+
+
+def test_each_column_has_its_unit() -> None:
+    found = units(has_points=True)
+    expected = {"stamp": "s", "torso_y": "m", "torso_yaw": "rad", "left_hand_x": "m", "cost": "px"}
+    assert {name: found[name] for name in expected} == expected
+    for name, unit in found.items():
+        later = name not in FIXED + NECK
+        assert not (later and unit) or name.endswith(f"_{unit}")
 
 
 @pytest.mark.parametrize("state", ["no_person", "lost"])
 def test_a_row_without_an_estimate_by_hand(state: str) -> None:
     row = row_of(STAMP_NS, 2.5, Estimate(state), has_points=True)
-    assert row == [STAMP_NS, 2.5, state, *[None] * (len(HEADER) + len(NECK) - 3)]
+    cells = dict(zip(HEADER + NECK, row, strict=True))
+    known = {"stamp": STAMP, "state": state, "stamp_ns": STAMP_NS, "time_s": 2.5}
+    assert cells == dict.fromkeys(HEADER + NECK) | known
 
 
 @pytest.mark.parametrize("state", ["tracking", "uncertain"])
 def test_a_row_by_hand(state: str) -> None:
     row = dict(zip(HEADER, row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
-    assert [row[name] for name in HEADER[:5]] == [42, 1.5, state, 0.0, 0.1]
-    assert (row["right_elbow_flexion_rad"], row["right_elbow_flexion_stddev_rad"]) == (1.1, 0.11)
-    assert (row["left_shoulder_y_m"], row["right_hand_z_m"]) == (0.25, 4.25)
-    assert (row["cost_px"], row["iou"]) == (812, 0.87654)
-    assert (row["torso_x_m"], row["torso_z_m"]) == (0.25, -0.05)
+    assert [row[name] for name in HEADER[:4]] == [Decimal("0.000000042"), state, 0.0, 0.1]
+    assert (row["stamp_ns"], row["time_s"]) == (42, 1.5)
+    assert (row["right_elbow_flexion"], row["right_elbow_flexion_stddev_rad"]) == (1.1, 0.11)
+    assert (row["left_shoulder_y"], row["right_hand_z"]) == (0.25, 4.25)
+    assert (row["cost"], row["iou"]) == (812, 0.87654)
+    assert (row["torso_x"], row["torso_z"]) == (0.25, -0.05)
     assert (row["torso_x_stddev_m"], row["torso_z_stddev_m"]) == (0.03, 0.01)
     still = dict(zip(HEADER, row_of(42, 1.5, FOUND), strict=True))
-    assert (still["torso_x_m"], still["torso_x_stddev_m"]) == (0.0, 0.0)
+    assert (still["torso_x"], still["torso_x_stddev_m"]) == (0.0, 0.0)
     unsure = row_of(42, 1.5, replace(FOUND, posture_stddev=None))
     first = HEADER.index("torso_y_stddev_m")
     assert unsure[first : first + 14] == [None] * 14
@@ -109,6 +131,8 @@ def test_both_formats_have_the_same_content(tmp_path: Path) -> None:
     table: Any = parquet.read_table(tmp_path / "a.parquet")
     assert tuple(table.column_names) == tuple(rows[0]) == HEADER + NECK
     assert len(rows) == table.num_rows == 2
+    assert [row["stamp"] for row in rows] == [f"{STAMP}", "1700000000.000000006"]
+    assert table.schema.field("left_hand_x").metadata == {b"unit": b"m"}
     for row, other in zip(rows, table.to_pylist(), strict=True):
         assert (row["stamp_ns"], row["state"]) == (str(other["stamp_ns"]), other["state"])
         for name in set(row) - {"stamp_ns", "state"}:
