@@ -163,11 +163,9 @@ class LiveParameters(Generic[T]):
             if known or name.startswith(_OF_QOS):
                 continue
             self._node.get_logger().warning(
-                f"{self._no_parameter(name)} and has no effect; {self._names_like(name)}"
+                f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
+                f"effect; {self._names_like(name)}"
             )
-
-    def _no_parameter(self, name: str) -> str:
-        return f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}'"
 
     def _names_like(self, name: str) -> str:
         near = suggestion(name, self._specs)
@@ -177,7 +175,8 @@ class LiveParameters(Generic[T]):
         """Return the answer to a change of a parameter that does not exist."""
         if name in self._kind.retired:
             return f"'{name}' was removed: {self._kind.retired[name]}"
-        return f"{self._no_parameter(name)}; {self._names_like(name)}"
+        node = self._node.get_name()
+        return f"'{cut(name)}' is not a parameter of node '{node}'; {self._names_like(name)}"
 
     def _refusal(self, problem: str) -> CardboxError:
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
