@@ -56,7 +56,7 @@ def camera_of_standing(
         detections = source.detections(span.start_s, max(span.end_s, until_s))
         timed = ((prepared.time_s, person) for prepared, person in detections)
         for searched, people in _spans(timed, span):
-            # Who comes into view is seen in a part of the span only.
+            # Somebody who comes into view is seen in a part of the span only.
             there = [person for person in people if person is not None]
             is_first = searched == span
             if there and (is_first or len(there) == len(people)):
