@@ -1,8 +1,9 @@
 """Build with colcon (ament_python) or with pip; package.xml lists what ROS provides."""
 
 from glob import glob
+from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Distribution, find_packages, setup
 
 NAME = "cardbox_tracker"
 SHARE = f"share/{NAME}"
@@ -43,6 +44,43 @@ DETECTOR = ["ai-edge-litert>=1.4,<3"]
 DOCS = ["furo>=2024.5", "myst-parser>=3,<6", "sphinx>=7.3,<10", "sphinxcontrib-mermaid>=0.9,<3"]
 # Newer setuptools lack 'setup.py develop', which 'colcon build --symlink-install' calls.
 COLCON = ["colcon-common-extensions>=0.3", "setuptools>=70.1,<80"]
+
+# 'ros2 run' and launch look for executables in lib/NAME, pip puts them into bin/.
+TO_BIN = """#!/bin/sh
+exec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"
+"""
+
+
+class InstallData(Distribution().get_command_class("install_data")):
+    """In a wheel, also install a script in lib/NAME for each executable that pip puts into bin/."""
+
+    def run(self):
+        """Install the data; colcon puts the executables themselves into lib/NAME."""
+        super().run()
+        if self.distribution.get_command_obj("bdist_wheel", create=False) is None:
+            return
+        folder = Path(self.install_dir, "lib", NAME)
+        folder.mkdir(parents=True, exist_ok=True)
+        for script in SCRIPTS:
+            path = folder / script.split(" = ")[0]
+            path.write_text(TO_BIN)
+            path.chmod(0o755)
+            self.outfiles.append(str(path))
+
+
+SCRIPTS = [
+    f"cardbox = {NAME}.start:cardbox",
+    f"background = {NAME}.start:background",
+    f"initializer = {NAME}.start:initializer",
+    f"tracker = {NAME}.start:tracker",
+    f"camera = {NAME}.start:camera",
+    f"play_bag = {NAME}.start:play_bag",
+    f"detector = {NAME}.start:detector",
+    f"stereo_depth = {NAME}.start:stereo_depth",
+    f"rula = {NAME}.start:rula",
+    f"retarget = {NAME}.start:retarget",
+    f"cardbox_nodes = {NAME}.start:cardbox_nodes",
+]
 
 setup(
     name=NAME,
@@ -106,19 +144,6 @@ setup(
         "docs": DOCS,
         "export": EXPORT,
     },
-    entry_points={
-        "console_scripts": [
-            f"cardbox = {NAME}.start:cardbox",
-            f"background = {NAME}.start:background",
-            f"initializer = {NAME}.start:initializer",
-            f"tracker = {NAME}.start:tracker",
-            f"camera = {NAME}.start:camera",
-            f"play_bag = {NAME}.start:play_bag",
-            f"detector = {NAME}.start:detector",
-            f"stereo_depth = {NAME}.start:stereo_depth",
-            f"rula = {NAME}.start:rula",
-            f"retarget = {NAME}.start:retarget",
-            f"cardbox_nodes = {NAME}.start:cardbox_nodes",
-        ],
-    },
+    entry_points={"console_scripts": SCRIPTS},
+    cmdclass={"install_data": InstallData},
 )

@@ -6,6 +6,7 @@ import ast
 import importlib
 import re
 import runpy
+import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -153,6 +154,41 @@ def test_every_executable_is_a_function(script: str) -> None:
     if ".ros." in module:
         pytest.importorskip("rclpy", reason="rclpy is not installed")
     assert callable(getattr(importlib.import_module(module), function))
+
+
+def installed_data(folder: Path, *, in_wheel: bool) -> list[str]:
+    """Install the data of setup.py in ``folder``, as pip and colcon do; return the files."""
+    arguments = setup_arguments()
+    distribution = setuptools.Distribution(
+        {name: arguments[name] for name in ("name", "version", "cmdclass")}
+    )
+    if in_wheel:
+        distribution.get_command_obj("bdist_wheel")
+    command = distribution.get_command_obj("install_data")
+    command.install_dir = str(folder)
+    command.data_files = []
+    command.ensure_finalized()
+    command.run()
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert sorted(command.get_outputs()) == sorted(map(str, files))
+    return sorted(path.relative_to(folder).as_posix() for path in files)
+
+
+@pytest.mark.filterwarnings("ignore:setup.py install is deprecated")
+def test_ros2_run_finds_what_pip_installs(tmp_path: Path) -> None:
+    """It looks for executables in lib/cardbox_tracker, where colcon puts them."""
+    scripts = setup_arguments()["entry_points"]["console_scripts"]
+    names = sorted(script.split(" = ")[0] for script in scripts)
+    found = installed_data(tmp_path / "an environment", in_wheel=True)
+    assert found == [f"lib/cardbox_tracker/{name}" for name in names]
+    assert installed_data(tmp_path / "colcon", in_wheel=False) == []
+    program = tmp_path / "an environment" / "bin" / "tracker"
+    program.parent.mkdir()
+    program.write_text('#!/bin/sh\nprintf "%s," "$@"\nexit 3\n')
+    program.chmod(0o755)
+    words = [str(program.parents[1] / "lib" / "cardbox_tracker" / "tracker"), "a b", "--ros-args"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.returncode) == ("a b,--ros-args,", 3)
 
 
 def test_every_node_of_the_design_is_an_executable() -> None:

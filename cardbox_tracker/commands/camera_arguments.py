@@ -82,12 +82,12 @@ def camera_of(options: argparse.Namespace) -> GivenCamera:
 
 
 def pitch_of(
-    options: argparse.Namespace, detector: Detector | None, span: TimeSpan
+    options: argparse.Namespace, detector: Detector | None, span: TimeSpan, until_s: float = 0.0
 ) -> tuple[float, GivenCamera]:
     """Return the camera's pitch, rad, and the camera, whose roll is found unless it is given.
 
     Without ``--camera-pitch-deg``, both are found from the person who stands upright in ``span``,
-    if there is a detector.
+    or later up to ``until_s``, if there is a detector.
 
     Raises:
         CardboxError: the recording cannot be read, or the detector cannot be loaded.
@@ -102,11 +102,15 @@ def pitch_of(
     if detector is None:
         return 0.0, camera
     name = options.cameras[0] if options.cameras else None
-    found = camera_of_standing(options.recording, detector, span, camera, name)
+    standing = camera_of_standing(options.recording, detector, span, camera, name, until_s)
     advice = "give --camera-pitch-deg if it is known"
-    if found is None:
-        _say(f"nobody stands upright at {span} s, so the camera's pitch is taken as 0; {advice}")
+    if standing is None:
+        searched = span._replace(end_s=max(span.end_s, until_s))
+        _say(
+            f"nobody stands upright at {searched} s, so the camera's pitch is taken as 0; {advice}"
+        )
         return 0.0, camera
+    found, span = standing
     if not found.is_pitch_found:
         _say(f"the camera's pitch does not show without the feet and is taken as 0; {advice}")
     else:
@@ -114,7 +118,7 @@ def pitch_of(
         _say(
             f"camera pitch {abs(degrees):.0f} degrees {'down' if degrees >= 0 else 'up'} (standard "
             f"deviation {math.degrees(found.pitch_stddev_rad):.0f}), found from the person "
-            f"standing upright; {advice}"
+            f"standing upright at {span} s; {advice}"
         )
     if found.roll_rad and options.camera_roll_deg is None and len(options.cameras) < 2:
         _say(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 TRACKED, FAILED = "tracked", "failed"
 # Options of the command that change no result of a recording.
 _NO_SETTINGS = ("command", "run", "recording", "output", "jobs", "force", "csv", "bag", "video")
+# Most names of recordings in a line; the table has all.
+_MOST_NAMES = 10
 _SOURCES = ("*.py", "*.json", "*.npz")
 
 
@@ -112,6 +114,25 @@ def text_of(rows: Sequence[Row]) -> Iterator[str]:
                 f"{row.recording:{width}}  {row.images:>6}  {row.images_tracked:>7}  "
                 f"{row.images_uncertain:>9}  {row.mean_iou:>8}"
             )
+
+
+def text_of_failures(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[str]:
+    """Yield a line for each reason of failures, with the recordings that failed for it.
+
+    Args:
+        rows: all rows.
+        paths: each recording's path by its name. Reasons that differ only in it are one, and the
+            line has the first recording's.
+    """
+    reasons: dict[str, list[Row]] = {}
+    for row in sorted(rows):
+        if row.status == FAILED:
+            common = row.reason.replace(str(paths[row.recording]), "")
+            reasons.setdefault(common, []).append(row)
+    for failed in reasons.values():
+        listed = ", ".join(row.recording for row in failed[:_MOST_NAMES])
+        more = f" and {len(failed) - _MOST_NAMES} more" if len(failed) > _MOST_NAMES else ""
+        yield f"{listed}{more}: {failed[0].reason}"
 
 
 def digest_of_inputs(options: argparse.Namespace, formats: Sequence[str], program: str) -> str:

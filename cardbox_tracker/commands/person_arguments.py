@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 STANDING_S = 1.0
 """Time for which a person of a given stature stands upright at the start, seconds."""
+COMES_WITHIN_S = 30.0
+"""Time after the start within which a person of a given stature is sought, seconds."""
 
 
 def add_person(parser: argparse.ArgumentParser, required: bool = True) -> None:

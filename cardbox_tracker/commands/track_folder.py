@@ -64,6 +64,7 @@ def track_folder(options: argparse.Namespace) -> None:
         FAILED,
         read_rows,
         text_of,
+        text_of_failures,
         write_rows,
     )
     from cardbox_tracker.recordings.folder import SUMMARY, recordings_in
@@ -93,9 +94,10 @@ def track_folder(options: argparse.Namespace) -> None:
             print(f"{name}: {line.removeprefix('cardbox: ')}", file=sys.stderr)
     print(*text_of(in_order), sep="\n")
     print(f"wrote {output}, with this table as {SUMMARY}")
-    failed = [f"\n  {row.recording}: {row.reason}" for row in in_order if row.status == FAILED]
+    failed = sum(row.status == FAILED for row in in_order)
     if failed:
-        raise CardboxError(f"{len(failed)} of {len(rows)} recordings failed{''.join(failed)}")
+        reasons = "".join(f"\n  {line}" for line in text_of_failures(in_order, recordings))
+        raise CardboxError(f"{failed} of {len(rows)} recordings failed{reasons}")
 
 
 def _formats(given: Sequence[str] | None) -> tuple[str, ...]:

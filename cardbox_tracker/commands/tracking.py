@@ -27,6 +27,7 @@ from cardbox_tracker.commands.camera_arguments import (
     pitch_of,
 )
 from cardbox_tracker.commands.person_arguments import (
+    COMES_WITHIN_S,
     STANDING_S,
     add_person,
     measured_person,
@@ -143,7 +144,9 @@ def track_inputs(
     camera = camera_of(options)
     if not is_measured:
         standing = TimeSpan(start_s, start_s + STANDING_S)
-        pitch_rad, camera = pitch_of(options, detector_among(silhouettes, points), standing)
+        detector = detector_among(silhouettes, points)
+        # The person may come later.
+        pitch_rad, camera = pitch_of(options, detector, standing, start_s + COMES_WITHIN_S)
         body = person_of_stature(options, pitch_rad)
     with open_recording(
         options.recording,

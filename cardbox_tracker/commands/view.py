@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,8 +85,8 @@ def run(options: argparse.Namespace) -> None:
         elif not results:
             count = _track(options, Feed(Scene(stream), truth))
             print(f"shown: {count} images with a posture", flush=True)
-        for path, column in zip(results, shown, strict=False):
-            count = _show_results(path, Feed(Scene(stream, column, first_ns), truth))
+        feeds = [Feed(Scene(stream, column, first_ns), truth) for column in shown[: len(results)]]
+        for column, count in zip(shown, _show_results(results, feeds), strict=False):
             print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
@@ -162,14 +162,18 @@ def _truth_of(
     return None
 
 
-def _show_results(path: Path, feed: Feed) -> int:
-    """Show the results in the bag ``path``; return the number of images with a posture."""
+def _show_results(paths: Sequence[Path], feeds: Sequence[Feed]) -> list[int]:
+    """Show the results in bags; return the number of images with a posture of each."""
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.viewing.result_bag import show_results
+    from cardbox_tracker.viewing.result_bag import show_together
 
-    with BagReader(path) as bag, progress_bar("view") as show:
-        return show_results(bag, feed, show)
+    if not paths:
+        return []
+    with ExitStack() as stack:
+        bags = [stack.enter_context(BagReader(path)) for path in paths]
+        show = stack.enter_context(progress_bar("view"))
+        return show_together(list(zip(bags, feeds, strict=False)), show)
 
 
 def _track(options: argparse.Namespace, feed: Feed) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from cardbox_tracker.errors import BagError
@@ -19,22 +19,43 @@ from cardbox_tracker.vision.encodings import decode_bgr, image_parts
 _ROBOT, _JOINTS = "/robot_description", "/joint_states"
 
 
-def show_results(
-    bag: BagReader, feed: Feed, progress: Callable[[float], None] = lambda _: None
-) -> int:
-    """Show every message of a bag of results; return the number of images with joints.
+def show_together(
+    results: Sequence[tuple[BagReader, Feed]], progress: Callable[[float], None] = lambda _: None
+) -> list[int]:
+    """Show bags of results of one recording at the same time, each to its receiver.
+
+    A viewer that plays while it is sent the data has an image of each from the beginning on.
 
     Args:
-        bag: an open recording.
-        feed: receiver of the results.
+        results: open recordings and their receivers.
         progress: called with the finished fraction, 0 to 1.
 
+    Returns:
+        The number of images with joints of each.
+
     Raises:
-        BagError: the bag has no results of the tracker, or is damaged.
+        BagError: a bag has no results of the tracker, or is damaged.
     """
+    counts = [0] * len(results)
+    running = {number: _shown(*one) for number, one in enumerate(results)}
+    finished = dict.fromkeys(running, 0.0)
+    while running:
+        number = min(running, key=finished.__getitem__)
+        try:
+            finished[number], has_joints = next(running[number])
+        except StopIteration:
+            del running[number]
+            continue
+        counts[number] += has_joints
+        progress(min(finished[one] for one in running))
+    return counts
+
+
+def _shown(bag: BagReader, feed: Feed) -> Iterator[tuple[float, bool]]:
+    """Show the messages; yield the finished fraction after each, and whether it had joints."""
     space = namespace_of(bag)
     handlers = _handlers(bag, feed, space) | _robots(bag, feed, space)
-    count, total_s = 0, max(bag.duration_s, 1e-9)
+    total_s = max(bag.duration_s, 1e-9)
     for message in bag.messages([topic for topic in bag.topics if topic in handlers]):
         content = bag.deserialize(message)
         try:
@@ -44,9 +65,7 @@ def show_results(
             raise BagError(
                 f"{message.topic} of {bag.path} has a malformed message: {error}; record it again"
             ) from None
-        count += message.topic == space + _JOINTS
-        progress((message.time_ns - bag.start_ns) / 1e9 / total_s)
-    return count
+        yield (message.time_ns - bag.start_ns) / 1e9 / total_s, message.topic == space + _JOINTS
 
 
 Handler = Callable[[BagMessage, Any], None]

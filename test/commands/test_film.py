@@ -162,10 +162,14 @@ def test_somebody_is_measured_in_a_film(
     [
         (
             StandingCamera(np.radians(12.0), np.radians(5.0), np.radians(4.0), 2.0, True),
-            ("pitch 12 degrees down (standard deviation 5)", "roll 4.0 degrees"),
+            (
+                "pitch 12 degrees down (standard deviation 5)",
+                "upright at 20:21 s",
+                "roll 4.0 degrees",
+            ),
         ),
         (StandingCamera(0.0, 0.2, 0.0, 2.0, False), ("taken as 0",)),
-        (None, ("nobody stands upright at 16:17 s",)),
+        (None, ("nobody stands upright at 16:46 s",)),
     ],
 )
 def test_the_cameras_pitch_is_found_from_who_stands_upright(
@@ -178,7 +182,8 @@ def test_the_cameras_pitch_is_found_from_who_stands_upright(
 ) -> None:
     """The detector, an optional library, is replaced by the silhouettes of the empty scene."""
     monkeypatch.setattr(detector_module, "installed_models", lambda: ModelFiles(film, film))
-    monkeypatch.setattr(standing, "camera_of_standing", lambda *_: found)
+    stood = None if found is None else standing.Standing(found, TimeSpan(20.0, 21.0))
+    monkeypatch.setattr(standing, "camera_of_standing", lambda *_: stood)
 
     def opened(bag: Any, detector: Any, camera: Any, points: Any) -> SilhouetteSource:
         rolls.append(bag.calibration().roll_rad)

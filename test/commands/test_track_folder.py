@@ -15,6 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from cardbox_tracker.commands import track_folder
@@ -70,10 +72,9 @@ def test_two_processes_write_the_bytes_of_one_after_the_other(
     # The others are done, and the failures are told at the end.
     assert many.code == 1
     assert "Traceback" not in many.err
-    *_, failed, first, second = many.err.replace("\r", "\n").splitlines()
+    *_, failed, reason = many.err.replace("\r", "\n").splitlines()
     assert failed == "cardbox track: 2 of 4 recordings failed"
-    assert first.startswith("  cut: cannot read the recording")
-    assert second.startswith("  cut2: cannot read the recording")
+    assert reason.startswith("  cut, cut2: cannot read the recording")
     assert re.search(r"(?m)^a +\d+ +\d+ +\d+ +0\.\d+$", many.out)
     assert re.search(r"(?m)^cut +failed$", many.out)
     status = {name: row["status"] for name, row in rows(both).items()}
@@ -199,6 +200,27 @@ def test_an_option_that_all_recordings_lack_is_named_once(
     done.assert_refused("track", "arguments --model --stature is required (the same for all 3")
     assert done.err.count("--stature") == 1
     assert tracked.names == []
+
+
+def test_a_field_of_view_that_all_films_lack_is_named_once(
+    files: Path, tmp_path: Path, cardbox: Callable
+) -> None:
+    """The camera is known to be missing only when a film is opened, in a process of its own."""
+    films = tmp_path / "films"
+    films.mkdir()
+    for number in range(12):
+        code = cv2.VideoWriter.fourcc(*"mp4v")
+        film = cv2.VideoWriter(str(films / f"film_{number:02}.mp4"), code, 15.0, (64, 48))
+        for _ in range(20):
+            film.write(np.zeros((48, 64, 3), np.uint8))
+        film.release()
+    given = ("--stature=1.7", "--background=0:1", "--jobs=1", "--output", tmp_path / "out")
+    done = cardbox("track", films, *given)
+    assert done.code == 1
+    assert done.err.count("does not tell the camera's field of view") == 1
+    assert "12 of 12 recordings failed\n  film_00, film_01" in done.err
+    assert f"film_09 and 2 more: {films / 'film_00.mp4'} does not tell" in done.err
+    assert all("field of view" in row["reason"] for row in rows(tmp_path / "out").values())
 
 
 def test_an_interrupted_run_leaves_nothing_half_done(

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 
 # The limit must only end tests that hang, not slow ones.
@@ -48,6 +50,31 @@ class Scene:
             posture = reference_posture(posture)
             posture[0] = self.body.placement.lateral_m
         return render(cardbox_patches(self.body, posture), self.camera)
+
+    def outlines(
+        self, other: Camera, pose: NDArray[np.float64], nearer_m: float = 0.0
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return the silhouettes of the front posture in this camera and in another one.
+
+        Args:
+            other: the other camera.
+            pose: (4, 4) transform of points from this camera's frame to the other's.
+            nearer_m: how much nearer than measured the person stands.
+        """
+        view = View.of(self.body, self.camera, OtherCamera(other, Extrinsics.of(pose)))
+        state = np.append(reference_posture("front"), [nearer_m, 0.0])
+        state[0] = self.body.placement.lateral_m
+        seen = (self.body, self.camera, state), (view.body, view.camera, view.states(state))
+
+        def outline(body: Any, camera: Camera, state: NDArray[np.float64]) -> NDArray[np.uint8]:
+            place = body.placement
+            placed = body.with_values(
+                distance_m=place.distance_m - state[12], hip_height_m=place.hip_height_m + state[13]
+            )
+            return render(cardbox_patches(placed, state[:12]), camera)
+
+        first, second = (outline(*one) for one in seen)
+        return first, second
 
     def image(self, posture: NDArray[np.float64] | str | None) -> NDArray[np.uint8]:
         """Return the noisy image (H, W) of a posture (12,) or a reference; None for nobody."""

@@ -10,15 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model_file import loads_body_model, save_body_model
-from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.evaluation.recorded.session import load_session
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.vision.camera import Camera
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.rasterisation import render
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
@@ -56,19 +51,7 @@ def recorded(scene: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     """Record an empty scene and then a person 20 cm nearer than measured; return the files."""
     folder = tmp_path_factory.mktemp("two")
     pose, other = aside()
-    view = View.of(scene.body, scene.camera, OtherCamera(other, Extrinsics.of(pose)))
-    state = np.append(reference_posture("front"), [NEARER_M, 0.0])
-    state[0] = scene.body.placement.lateral_m
-    there = view.states(state)
-
-    def outline(body: Any, camera: Camera, seen: np.ndarray) -> np.ndarray:
-        place = body.placement
-        nearer = body.with_values(
-            distance_m=place.distance_m - seen[12], hip_height_m=place.hip_height_m + seen[13]
-        )
-        return render(cardbox_patches(nearer, seen[:12]), camera)
-
-    outlines = outline(scene.body, scene.camera, state), outline(view.body, view.camera, there)
+    outlines = scene.outlines(other, pose, NEARER_M)
     rng = np.random.default_rng(0)
     with BagWriter(folder / "bag") as bag:
         for number in range(EMPTY + SEEN):

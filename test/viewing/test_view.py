@@ -19,11 +19,13 @@ from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.simulation.motions import wave
 from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
+from cardbox_tracker.viewing.result_bag import show_together
 from cardbox_tracker.vision.camera import Camera
 
 BODY = BodyModel.of(hip_height_m=-0.51)
@@ -152,6 +154,32 @@ def test_two_results_have_a_column_each_and_one_time_line(tmp_path: Path) -> Non
     assert [title for title in found if ":" in title] == [
         *("b: image", "b: measured body", "a: image", "a: measured body"),
     ]
+
+
+def test_two_results_are_sent_at_the_same_time(tmp_path: Path) -> None:
+    """A browser plays what has arrived, so the second result must not wait for the first."""
+    paths = write_results(tmp_path / "a"), write_results(tmp_path / "b")
+    sent: list[int] = []
+    fractions: list[float] = []
+
+    class Receiver:
+        def __init__(self, number: int) -> None:
+            self.number = number
+
+        def __getattr__(self, name: str) -> Any:
+            def receive(*_: Any) -> None:
+                if name == "image":
+                    sent.append(self.number)
+
+            return receive
+
+    with BagReader(paths[0]) as first, BagReader(paths[1]) as second:
+        results: Any = [(first, Receiver(0)), (second, Receiver(1))]
+        assert show_together(results, fractions.append) == [IMAGES, IMAGES]
+    assert sorted(sent) == [0] * (IMAGES + 1) + [1] * (IMAGES + 1)
+    ahead = np.cumsum([1 if number else -1 for number in sent])
+    assert np.abs(ahead).max() <= 2
+    assert fractions == sorted(fractions)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -36,6 +37,17 @@ _TYPE_TEXTS = {
     list[int]: "a list of whole numbers",
     list[str]: "a list of texts",
 }
+
+
+class NotDeclared(ParameterNotDeclaredException):
+    """A name that is not declared; rclpy answers a request to set it with this text.
+
+    The text of its own exception contains no name.
+    """
+
+    def __init__(self, text: str) -> None:
+        """Keep ``text`` as it is, without the words of the base class."""
+        Exception.__init__(self, text)
 
 
 class LiveParameters(Generic[T]):
@@ -117,13 +129,13 @@ class LiveParameters(Generic[T]):
         return value
 
     def _given_before(self, name: str, was: str, given: Any) -> Any:
-        """Return the value given under the old or the new name, and declare the old name too."""
+        """Return the value given under the old or the new name.
+
+        The old name is not declared: it would have no value, and 'ros2 param dump' would write it.
+        """
         old = self._given(was)
-        # The old name has no value, but 'ros2 param dump' writes it.
-        old = None if old == "null" else old
-        any_type = ParameterDescriptor(dynamic_typing=True, description=f"renamed to {name}")
-        self._node.declare_parameter(was, None, any_type, ignore_override=True)
-        if old is None:
+        # Files that 'ros2 param dump' wrote for a former version have the name without a value.
+        if old is None or old == "null":
             return given
         if given is not None:
             raise self._refusal(_both_names(was, name))
@@ -146,28 +158,45 @@ class LiveParameters(Generic[T]):
         given = getattr(self._node, "_parameter_overrides", {})
         for name in given:
             if name in self._kind.retired:
-                raise self._refusal(f"'{name}' was removed: {self._kind.retired[name]}")
-            if self._node.has_parameter(name) or name.startswith(_OF_QOS):
+                raise self._refusal(self._unknown(name))
+            known = self._node.has_parameter(name) or name in self._new_names
+            if known or name.startswith(_OF_QOS):
                 continue
             self._node.get_logger().warning(
                 f"'{cut(name)}' is not a parameter of node '{self._node.get_name()}' and has no "
-                f"effect; {suggestion(name, self._specs)}see 'ros2 param list' or "
-                "docs/parameters.md for all names"
+                f"effect; {self._names_like(name)}"
             )
+
+    def _names_like(self, name: str) -> str:
+        near = suggestion(name, self._specs)
+        return f"{near}see 'ros2 param list' or docs/parameters.md for all names"
+
+    def _unknown(self, name: str) -> str:
+        """Return the answer to a change of a parameter that does not exist."""
+        if name in self._kind.retired:
+            return f"'{name}' was removed: {self._kind.retired[name]}"
+        node = self._node.get_name()
+        return f"'{cut(name)}' is not a parameter of node '{node}'; {self._names_like(name)}"
 
     def _refusal(self, problem: str) -> CardboxError:
         return CardboxError(f"parameters of node '{self._node.get_name()}': {problem}")
 
     def _translate(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Replace old names by new ones, and integers by floats where these are expected."""
+        """Replace old names by new ones, and integers by floats where these are expected.
+
+        Raises:
+            NotDeclared: a name is unknown, or old and new name of a parameter are given together.
+        """
         names = {p.name for p in parameters}
         translated = []
         for given in parameters:
             name = self._new_names.get(given.name, given.name)
-            if name != given.name and name in names:
-                name = given.name  # the validation refuses both names together
-            elif name != given.name:
+            if name != given.name:
+                if name in names:
+                    raise NotDeclared(_both_names(given.name, name))
                 self._warn_of(given.name, name)
+            elif not self._node.has_parameter(name):
+                raise NotDeclared(self._unknown(name))
             value = _as_type(self._types.get(name), given.value)
             # Only the original parameter has the type of an empty list.
             same = name == given.name and value is given.value
@@ -178,10 +207,6 @@ class LiveParameters(Generic[T]):
         return {p.name: _plain(p.value) for p in parameters if p.name in self._specs}
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
-        for given in parameters:
-            if given.name in self._new_names:
-                reason = _both_names(given.name, self._new_names[given.name])
-                return SetParametersResult(successful=False, reason=reason)
         changed = self._changed(parameters)
         if not changed:
             return SetParametersResult(successful=True)

@@ -8,6 +8,8 @@ PATIENCE = 5
 """Number of checks, one a second, after which a topic without a publisher is reported."""
 
 _MOST_NAMED = 5
+# Drawings are no camera's images.
+_DRAWN = "/overlay"
 
 
 class SinglePublisher:
@@ -45,7 +47,9 @@ class SinglePublisher:
         others = [
             name
             for name, kinds in types.items()
-            if set(kinds) & set(types.get(topic, ())) and {*self._publishers(name)} - {own}
+            if not name.endswith(_DRAWN)
+            and set(kinds) & set(types.get(topic, ()))
+            and {*self._publishers(name)} - {own}
         ]
         there = ", ".join(others[:_MOST_NAMED]) or "none at all"
         return (

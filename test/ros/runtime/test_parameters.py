@@ -116,7 +116,6 @@ def test_live_change_is_seen_and_announced(make_node: Callable) -> None:
         ({"fixed": True}, "read-only"),
         ({"low": 3.0}, "low is 3, above high 2; lower it"),
         ({"stale": 2.0}, "out of range"),
-        ({"stale": 0.1, "fresh": 0.2}, "'stale' and 'fresh' are the old and the new name"),
     ],
 )
 def test_wrong_value_is_refused_with_the_reason_and_the_old_one_stays(
@@ -223,6 +222,44 @@ def test_a_dumped_file_has_an_old_name_without_value(make_node: Callable, tmp_pa
     assert LiveParameters(node, Sample).value == Sample(fresh=0.2)
 
 
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"lo": 1.5}, ("'lo' is not a parameter of node 'tested'", "did you mean 'low'")),
+        ({"nothing_like_it": 1}, ("'nothing_like_it'", "ros2 param list")),
+        ({"middle": 1.0}, ("'middle' was removed", "give low and high")),
+        ({"stale": 0.1, "fresh": 0.2}, ("'stale' and 'fresh' are the old and the new name",)),
+    ],
+)
+def test_a_request_to_set_what_is_no_parameter_is_answered_with_the_name_and_the_nearest(
+    make_node: Callable, values: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    """'ros2 param set' sends this request; rclpy's own answer names nothing."""
+    node = make_node()
+    live = LiveParameters(node, Sample)
+    client = AsyncParameterClient(node, "tested")
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    assert client.wait_for_services(10.0)
+    answer = client.set_parameters_atomically([Parameter(k, value=v) for k, v in values.items()])
+    executor.spin_until_future_complete(answer, 10.0)
+    result = answer.result().result
+    assert not result.successful
+    assert all(word in result.reason for word in words), result.reason
+    assert live.value == Sample()
+
+
+def test_a_dump_of_a_former_version_has_the_old_name_without_a_value(
+    make_node: Callable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node("-p", "stale:=null", "-p", "fresh:=0.75")
+    said: list[str] = []
+    monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=said.append))
+    assert LiveParameters(node, Sample).value == Sample(fresh=0.75)
+    assert not node.has_parameter("stale")
+    assert said == []
+
+
 def test_the_tracker_still_knows_recover(make_node: Callable) -> None:
     live = LiveParameters(make_node("-p", "recover:=always"), TrackerParameters)
     assert live.value == TrackerParameters(relocalize="always")
@@ -289,6 +326,7 @@ def test_every_node_answers_with_the_values_of_all_its_parameters(
     values = [parameter_value_to_python(value) for value in answer.result().values]
     assert len(values) == len(names) > 0
     answered = dict(zip(names, values, strict=True))
+    assert [name for name, value in answered.items() if value is None] == []
     for entry in fields(expected):
         value = answered[entry.name]
         assert value == getattr(expected, entry.name), entry.name

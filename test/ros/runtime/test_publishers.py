@@ -44,6 +44,7 @@ def test_a_wrong_name_is_reported_with_the_topics_of_the_type(
     node, camera = make_node(), make_node(name="camera")
     node.create_subscription(String, "/kamera/image_raw", print, 1)
     node.create_publisher(String, "/own", 1)
+    camera.create_publisher(String, "/overlay", 1)
     camera.create_publisher(String, "/camera/image_raw", 1)
     wait_for(lambda: node.count_publishers("/camera/image_raw") == 1)
     watch = SinglePublisher(node, ("/kamera/image_raw",))
@@ -52,7 +53,8 @@ def test_a_wrong_name_is_reported_with_the_topics_of_the_type(
     ((kind, text),) = watch.remarks().items()
     assert kind == "no publisher of /kamera/image_raw"
     assert "nobody publishes /kamera/image_raw" in text
-    assert "/camera/image_raw" in text and "/own" not in text and "remap" in text
+    assert "/camera/image_raw" in text and "/own" not in text and "/overlay" not in text
+    assert "remap" in text
     late = camera.create_publisher(String, "/kamera/image_raw", 1)
     wait_for(lambda: watch.remarks() == {})
     # A publisher that ends is reported as silence of the images.
