@@ -30,6 +30,7 @@ _STATES = tuple(f"{name}_{unit_of(name)}" for name in (*JOINT_NAMES, *PLACE_NAME
 _POINTS = tuple(f"{name}_{axis}_m" for name in KEYPOINT_NAMES for axis in "xyz")
 _NECK = tuple(f"{name}_rad" for name in NECK_NAMES)
 _NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *_POINTS)
+_LATEST_NS = np.iinfo(np.int64).max
 _VALUES = N_STATE + len(NECK_NAMES) + len(_POINTS)
 _GAP: FloatArray = np.full(_VALUES, np.nan)
 
@@ -110,7 +111,10 @@ def _row_of(row: Mapping[str, Any]) -> _Row:
         values = np.array([*known[:N_STATE], *map(float, neck), *known[N_STATE:]])
     elif state not in (LOST, NO_PERSON):
         raise ValueError(f"the state is {quoted(state)}")
-    return _Row(int(row["stamp_ns"]), float(row["time_s"]), state, values)
+    stamp_ns = int(row["stamp_ns"])
+    if not 0 <= stamp_ns <= _LATEST_NS:
+        raise ValueError(f"the stamp is {quoted(stamp_ns)} ns")
+    return _Row(stamp_ns, float(row["time_s"]), state, values)
 
 
 def _csv_cells(path: Path) -> Iterator[Mapping[str, Any]]:

@@ -122,6 +122,9 @@ def without_postures(rows: list[list[str]]) -> None:
         (with_text, "image 3: .*much.*docs/results.md"),
         (with_state, "image 1: .*sleeping"),
         (with_empty_cell, "image 1: "),
+        (lambda rows: rows[2].__setitem__(0, str(10**30)), "the stamp is 1000"),
+        (lambda rows: rows[2].__setitem__(0, "-1"), "the stamp is -1"),
+        (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
         (without_postures, "no image with a posture"),
     ],
 )
