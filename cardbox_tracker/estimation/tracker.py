@@ -144,6 +144,11 @@ class Tracker:
         """Views of the body from the further cameras."""
         return tuple(camera.view for camera in self._cameras if camera.view is not None)
 
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about images that contradict each other, for diagnostics and logs."""
+        return [text for text in (camera.depth.remark for camera in self._cameras) if text]
+
     def camera_ious(self) -> list[float | None]:
         """Return the IoU of the last estimate with each camera's silhouette, the first one first.
 
