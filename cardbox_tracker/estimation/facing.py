@@ -6,7 +6,7 @@ share of hair between forehead and cheeks is compared with its usual value, whic
 second with the face: more by a quarter, and a third in all, shows the back of the head.
 
 Bald heads, hair in the colour of the skin, necks shaved to the height of the ears and grey images
-show nothing. Who leans forward shows the top of the head, so that nothing is said meanwhile.
+show nothing. A person who leans forward shows the top of the head, so nothing is said meanwhile.
 ``docs/research/deviations-and-loss.md`` has figures.
 """
 
