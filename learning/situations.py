@@ -309,7 +309,8 @@ Errors are in cm, absolute and after both skeletons are shifted to the middle of
 shares are of all images: those with the state `tracking` or `uncertain`, and those with `tracking`
 although the mean error, or a hand's, is beyond 30 cm. Deviations are means over the angles, deg.
 With points, the tracker also gets those of a simulated detector. An outline does not show whether
-a person's back is seen; points do, as left and right stay exchanged.
+a person's back is seen; points do, as left and right stay exchanged, and so does hair in images
+([figures](../research/deviations-and-loss.md#the-back-of-a-person)).
 Made by `python -m learning.situations`, see [learning](../research/learning.md).
 
 | situation | absolute | aligned | `tracking` | `uncertain` | mean far | hand far | deviation |
