@@ -36,7 +36,7 @@ _EVERY_S, _NOW_S, _USUAL_S = 0.2, 0.5, 4.0
 # Time with the face after which the usual share is known, s; its largest change by a sample.
 _KNOWN_S, _USUAL_CHANGE = 1.0, 0.1
 # Yaw of a person who faces the camera, and lean that shows the top of the head, rad.
-_FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(8.0)
+_FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(6.0)
 # Weight of a sample in the low-pass filter of the torso's brightness.
 _LIGHT = 0.5
 # Longest time that a sample stands for, s.
