@@ -1,6 +1,6 @@
 """Situations that the tracker is not made for, and what its states say about them.
 
-python -m learning.situations --rocketbox FOLDER --makehuman FOLDER --output FILE.md
+python -m learning.situations [--rocketbox FOLDER] [--makehuman FOLDER] --output FILE.md
 
 Simulated people who gesture are measured before a level camera, then one thing goes wrong. The
 table has the error, the state and the deviations; silhouettes are perfect but for the situation.
@@ -30,6 +30,7 @@ from cardbox_tracker.estimation.filtering.correction import FAR_M
 from cardbox_tracker.estimation.filtering.keypoint_states import HANDS
 from cardbox_tracker.estimation.initialization.config import InitializationConfig
 from cardbox_tracker.estimation.initialization.measure import initialize_body
+from cardbox_tracker.estimation.initialization.part_colors import LEARNED_FROM
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import beside_shoulders
@@ -43,13 +44,14 @@ from learning.motions.reference import Pose, poses, reference_pose
 from learning.motions.rotations import about_axis
 from learning.recording import simulated_points
 from learning.rendering import Rendering, render
-from learning.room import Viewpoint
+from learning.room import Room, Viewpoint
 from learning.simulated_points import SimulatedDetector
 
 FloatArray = NDArray[np.float64]
 Silhouette = NDArray[np.uint8]
 
 SEED, FPS, SECONDS = 29, 15.0, 20.0
+_REFERENCE_IMAGES = 5
 STANDING_S = 2.0
 """Time before the situation begins, s."""
 CAMERA = Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
@@ -78,6 +80,8 @@ class Situation:
         changed: changes each silhouette.
         other_m: path (2, 3) of a second person, from the first image to the last; None for nobody.
         has_points: whether the tracker also gets the points of a simulated detector.
+        has_images: whether it also gets images, from which the person's colours are learned.
+        turning_s: time in which the person turns after standing, s; 0 for at once.
     """
 
     name: str
@@ -88,6 +92,15 @@ class Situation:
     changed: Callable[[Silhouette], Silhouette] = unchanged
     other_m: FloatArray | None = None
     has_points: bool = False
+    has_images: bool = False
+    turning_s: float = 0.0
+
+    def turned_after(self, seconds: float) -> FloatArray:
+        """Return the rotation (3, 3) of the person some time after the situation began."""
+        if seconds >= self.turning_s:
+            return self.turned
+        share = seconds / self.turning_s
+        return cv2.Rodrigues(share * cv2.Rodrigues(self.turned)[0])[0].astype(np.float64)
 
 
 def shifted(silhouette: Silhouette, columns: int) -> Silhouette:
@@ -116,11 +129,15 @@ def with_chair(silhouette: Silhouette) -> Silhouette:
 
 
 _BACK = about_axis(2, np.array([np.pi]))[0]
+_TURNING_S = 1.2
 _LYING = about_axis(0, np.array([np.pi / 2]))[0]
 _TWO_DEGREES_PX = round(290.0 * np.tan(np.radians(2.0)))
 SITUATIONS = (
     Situation("none"),
     Situation("back to the camera", turned=_BACK),
+    Situation("none, with images", has_images=True),
+    Situation("back to the camera, with images", turned=_BACK, has_images=True),
+    Situation("turns round, with images", turned=_BACK, has_images=True, turning_s=_TURNING_S),
     Situation("none, with points", has_points=True),
     Situation("back to the camera, with points", turned=_BACK, has_points=True),
     Situation("lying on the side", turned=_LYING, moved_m=(0.0, 0.0, 0.2)),
@@ -172,19 +189,26 @@ def silhouette_of(rendering: Rendering) -> Silhouette:
     return 255 * rendering.silhouette.astype(np.uint8)
 
 
-def measured(body: RiggedBody, told: Camera, seed: int) -> BodyModel:
-    """Return the body measured before ``CAMERA`` by somebody who believes in ``told``."""
-    references = {
-        name: silhouette_of(rendered(body, reference_pose(name))[0])
-        for name in ("front", "side", "arms")
-    }
+def measured(body: RiggedBody, told: Camera, seed: int, room: Room | None = None) -> BodyModel:
+    """Return the body measured before ``CAMERA`` by somebody who believes in ``told``.
+
+    Colours are learned from images of ``room``; None for a body without colours.
+    """
+    shown = {name: rendered(body, reference_pose(name))[0] for name in ("front", "side", "arms")}
+    references = {name: silhouette_of(one) for name, one in shown.items()}
+    images = None
+    if room is not None:
+        images = {
+            name: [room.image(shown[name]) for _ in range(_REFERENCE_IMAGES)]
+            for name in LEARNED_FROM
+        }
     config = InitializationConfig(
         distance_m=float(PLACE_M[0]),
         camera_pitch_rad=told.pitch_rad,
         check_postures=False,
         seed=seed,
     )
-    return initialize_body(references, told, config).body
+    return initialize_body(references, told, config, images=images).body
 
 
 def measurable(family: str, folders: Mapping[str, Path], count: int) -> list[RiggedBody]:
@@ -210,7 +234,8 @@ def tracked(situation: Situation, people: Sequence[RiggedBody]) -> Row:
     off_m, states, deviations = [], [], []
     for seed, body in enumerate(people):
         motion = gestures("", SECONDS, np.random.default_rng((SEED, seed))).resampled(FPS)
-        person = scaled(measured(body, situation.told, seed), situation.size)
+        room = Room(CAMERA, np.random.default_rng((SEED, seed))) if situation.has_images else None
+        person = scaled(measured(body, situation.told, seed, room), situation.size)
         tracker = Tracker(person, situation.told, PRESETS["default"](), np.random.default_rng(seed))
         other = people[(seed + 1) % len(people)]
         standing = [reference_pose("front")] * round(STANDING_S * FPS)
@@ -218,7 +243,8 @@ def tracked(situation: Situation, people: Sequence[RiggedBody]) -> Row:
         detector = SimulatedDetector(CAMERA, FPS, np.random.default_rng((SEED, seed)))
         for number, pose in enumerate(every):
             is_standing = number < len(standing)
-            placed = () if is_standing else (situation.turned, situation.moved_m)
+            turned = situation.turned_after(max(number - len(standing), 0) / FPS)
+            placed = () if is_standing else (turned, situation.moved_m)
             rendering, posed = rendered(body, pose, *placed)
             silhouette = silhouette_of(rendering)
             if situation.other_m is not None and not is_standing:
@@ -230,10 +256,12 @@ def tracked(situation: Situation, people: Sequence[RiggedBody]) -> Row:
                 silhouette = np.ascontiguousarray(situation.changed(silhouette))
             points = None
             if situation.has_points:
-                turns = pose[0] if is_standing else situation.turned @ pose[0]
+                turns = pose[0] if is_standing else turned @ pose[0]
                 points = simulated_points(VIEWPOINT, posed, turns, rendering, detector)
             stamp_ns = round(number * 1e9 / FPS)
-            found = tracker.track(Observation(silhouette, stamp_ns=stamp_ns, points=points))
+            image = None if room is None else room.image(rendering)
+            seen = Observation(silhouette, image, stamp_ns=stamp_ns, points=points)
+            found = tracker.track(seen)
             if is_standing:
                 continue
             true_m = VIEWPOINT.optical(posed.keypoints)
@@ -281,7 +309,8 @@ Errors are in cm, absolute and after both skeletons are shifted to the middle of
 shares are of all images: those with the state `tracking` or `uncertain`, and those with `tracking`
 although the mean error, or a hand's, is beyond 30 cm. Deviations are means over the angles, deg.
 With points, the tracker also gets those of a simulated detector. An outline does not show whether
-a person's back is seen; points do, as left and right stay exchanged.
+a person's back is seen; points do, as left and right stay exchanged, and so does hair in images
+([figures](../research/deviations-and-loss.md#the-back-of-a-person)).
 Made by `python -m learning.situations`, see [learning](../research/learning.md).
 
 | situation | absolute | aligned | `tracking` | `uncertain` | mean far | hand far | deviation |
@@ -293,13 +322,15 @@ def main(args: list[str] | None = None) -> int:
     """Track all situations and write the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     for family in FAMILIES:
-        parser.add_argument(f"--{family}", type=Path, required=True)
+        parser.add_argument(f"--{family}", type=Path, help="folder of this family of bodies")
     parser.add_argument("--people", type=int, default=2, help="of each family (default: 2)")
     parser.add_argument("--only", nargs="*", help="names of situations")
     parser.add_argument("--output", type=Path)
     given = parser.parse_args(args)
-    folders = {family: getattr(given, family) for family in FAMILIES}
-    people = [one for family in FAMILIES for one in measurable(family, folders, given.people)]
+    folders = {name: path for name in FAMILIES if (path := getattr(given, name)) is not None}
+    if not folders:
+        parser.error(f"give a folder of bodies: {' or '.join(f'--{name}' for name in FAMILIES)}")
+    people = [one for family in folders for one in measurable(family, folders, given.people)]
     lines = []
     for situation in SITUATIONS:
         if given.only and situation.name not in given.only:

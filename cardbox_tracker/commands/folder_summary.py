@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -160,7 +161,9 @@ def digest_of_inputs(options: argparse.Namespace, formats: Sequence[str], progra
     networks = () if detector is None else detector.models
     for path in (*_files_of(options.recording), *networks):
         found = path.stat()
-        digest.update(f"\0{path.name} {found.st_size} {found.st_mtime_ns}".encode())
+        # Names inside of a recording may be no UTF-8.
+        digest.update(b"\0" + os.fsencode(path.name))
+        digest.update(f" {found.st_size} {found.st_mtime_ns}".encode())
     return digest.hexdigest()[:32]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import shutil
 import sys
@@ -281,7 +282,12 @@ def _remove(output: Path, name: str) -> None:
     """Remove the former results of a recording."""
     for ending in (*(f".{ending}" for ending in FORMATS), _BODY):
         path = output / f"{name}{ending}"
-        if path.is_dir():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
+        try:
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            # A name that is too long for a file has no results.
+            if error.errno != errno.ENAMETOOLONG:
+                raise

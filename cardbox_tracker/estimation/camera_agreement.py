@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CameraError
 from cardbox_tracker.estimation.camera_pose import ROTATION, PoseProblem, Sighting, turned_by
@@ -32,6 +32,9 @@ from cardbox_tracker.vision.extrinsics import Extrinsics
 
 DOUBTFUL_DEG, DOUBTFUL_ROLL_DEG = 0.85, 1.5
 """Pitch or yaw, and roll, beyond which extrinsics are reported as wrong."""
+DOUBTFUL_UNMEASURED_DEG, DOUBTFUL_HEIGHT_DEG = 6.0, 1.0
+"""Pitch or yaw, and heights of head and hands, for a person who was not measured: wrong sizes turn
+the estimate by up to 3.7 degrees, but not the heights."""
 
 # Frames between samples, samples in a window (12 s at 15 Hz), and samples between two checks.
 _EVERY, _WINDOW, _AGAIN = 12, 15, 60
@@ -168,11 +171,20 @@ class CameraAgreement:
             if direction.fault is not None:
                 told.append(_gross(name, direction))
                 continue
-            if turned is not None and turned > DOUBTFUL_DEG:
+            is_measured = self._body.source == MEASURED
+            if turned is not None and turned > (
+                DOUBTFUL_DEG if is_measured else DOUBTFUL_UNMEASURED_DEG
+            ):
                 told.append(
                     f"the extrinsics of {name} seem to be wrong by {_shown(turned)} degrees: the "
                     "silhouettes of the cameras contradict each other. Was a camera moved? "
                     "Calibrate them again. A wrong distance of the person has the same effect"
+                )
+            elif not is_measured and direction.height_rad > np.radians(DOUBTFUL_HEIGHT_DEG):
+                told.append(
+                    f"the extrinsics of {name} seem to be wrong: head and hands differ by "
+                    f"{np.degrees(direction.height_rad):.1f} degrees in height between the "
+                    "cameras. Was a camera moved? Calibrate them again"
                 )
             if rolled is not None and abs(rolled) > DOUBTFUL_ROLL_DEG:
                 told.append(

@@ -15,6 +15,7 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
 from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.depth_agreement import DepthAgreement
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.vision.camera import Camera
@@ -27,6 +28,7 @@ class TrackedCamera:
     Attributes:
         view: the body in the frame of a further camera; None for the first camera.
         terms: terms of its cost in addition to the silhouette.
+        depth: check that its depth images show the view of its silhouettes.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class TrackedCamera:
         self._rows = rows_above_hips(body, first) if self.view is None else self._camera.height
         self.configure(config)
         self._region: PersonRegion | None = None
+        self.depth = DepthAgreement()
 
     def configure(self, config: TrackerConfig) -> None:
         """Build the terms from other settings."""
@@ -106,6 +109,7 @@ class TrackedCamera:
                 points = replace(points, px=self.view.upright_px(points.px))
         if self._region is not None:
             silhouette = self._region.select(silhouette, posture, is_sure, image)
+        depth_m = self.depth.accepted(silhouette, depth_m)
         upper = np.ascontiguousarray(silhouette[: self._rows])
         foreground_px = cv2.countNonZero(upper)
         seen = silhouette, self._rows, foreground_px, image

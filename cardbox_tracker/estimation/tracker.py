@@ -24,6 +24,7 @@ from cardbox_tracker.estimation.estimate import (
     UNCERTAIN,
     Estimate,
 )
+from cardbox_tracker.estimation.facing import Facing
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.keypoint_states import doubted
 from cardbox_tracker.estimation.filtering.particles import Particles
@@ -109,6 +110,9 @@ class Tracker:
         rng = self._rng.spawn(1)[0]
         self._filter = make_filter(self.config, self._silhouette, rng, self.views)
         self._head = HeadTracker(self.body, self.camera)
+        # The outlines of several cameras determine the direction; the paper has no such doubt.
+        is_alone = self.config.has_several_views and not self._others
+        self._facing = Facing(self.body, self.camera) if is_alone else None
         self._poor_frames = 0
         self._last_ns: int | None = None
         self._particles: Particles | None = None
@@ -143,6 +147,11 @@ class Tracker:
     def views(self) -> tuple[View, ...]:
         """Views of the body from the further cameras."""
         return tuple(camera.view for camera in self._cameras if camera.view is not None)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Warnings about images that contradict each other, for diagnostics and logs."""
+        return [text for text in (camera.depth.remark for camera in self._cameras) if text]
 
     def camera_ious(self) -> list[float | None]:
         """Return the IoU of the last estimate with each camera's silhouette, the first one first.
@@ -242,6 +251,8 @@ class Tracker:
         presence = self._filter.look(frames)
         if presence is Presence.NOBODY:
             self._before = None
+            if self._facing is not None:
+                self._facing.forget()
             if self.config.relocalize:
                 # The person may come back at another place.
                 self._filter.forget()
@@ -265,12 +276,11 @@ class Tracker:
             return Estimate(LOST)
         if self.agreement is not None and fit.offset_m is not None:
             self.agreement.see(self._before, *_silhouettes(frames))
-        states = fit.keypoint_states
-        is_contradicted = self.agreement is not None and self.agreement.is_contradicted
-        if is_contradicted and states is not None:
+        states, is_doubtful = fit.keypoint_states, self._is_doubtful(frames[0])
+        if is_doubtful and states is not None:
             states = doubted(states)
         return Estimate(
-            UNCERTAIN if fit.is_uncertain or is_contradicted else TRACKING,
+            UNCERTAIN if fit.is_uncertain or is_doubtful else TRACKING,
             fit.posture,
             fit.posture_stddev,
             fit.keypoints_m,
@@ -281,6 +291,13 @@ class Tracker:
             keypoint_states=states,
             keypoint_chances=fit.keypoint_chances,
         )
+
+    def _is_doubtful(self, frame: Frame) -> bool:
+        """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
+        if self._facing is not None and self._before is not None:
+            self._facing.see(frame, self._before)
+            return self._facing.shows_back
+        return self.agreement is not None and self.agreement.is_contradicted
 
 
 def _silhouettes(frames: Sequence[Frame]) -> tuple[Silhouette, list[Silhouette]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import CardboxError
 
@@ -39,7 +40,7 @@ class Motion:
     @property
     def is_seen(self) -> NDArray[np.bool_]:
         """Whether each image has a posture, (n,)."""
-        keypoints = self.keypoints_m.reshape(len(self.states), -1)
+        keypoints = self.keypoints_m.reshape(len(self.states), 3 * len(KEYPOINT_NAMES))
         known = np.isfinite(np.hstack([self.states, keypoints]))
         return np.asarray(known.all(axis=1))
 

@@ -7,12 +7,15 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from cardbox_tracker.errors import CardboxError, quoted
 from cardbox_tracker.recordings.bag_reader import FILE_ENDINGS
 from cardbox_tracker.recordings.image_folder import image_files
 from cardbox_tracker.recordings.video_reader import SUFFIXES as VIDEO_ENDINGS
 
 SUMMARY = "_summary.csv"
 """Name of the summary in a folder of results, by which such folders are left out."""
+
+_DEEPEST = 50
 
 
 def is_one_recording(path: Path) -> bool:
@@ -43,9 +46,13 @@ def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
     Args:
         folder: a folder that is no recording itself.
         output: a folder that is left out; None for none.
+
+    Raises:
+        CardboxError: a folder cannot be read, folders are nested too deep, or a name is not UTF-8,
+            so that no table could name it.
     """
     left_out = None if output is None else output.resolve()
-    paths = {path.relative_to(folder): path for path in _found(folder, left_out)}
+    paths = {path.relative_to(folder): path for path in _found(folder, left_out, 0)}
     short = {path: path if paths[path].is_dir() else path.with_suffix("") for path in paths}
     count = Counter([*short.values(), *paths])
     names = {
@@ -55,17 +62,39 @@ def recordings_in(folder: Path, output: Path | None = None) -> dict[str, Path]:
     return {name: paths[names[name]] for name in sorted(names)}
 
 
-def _found(folder: Path, left_out: Path | None) -> Iterator[Path]:
-    with os.scandir(folder) as entries:
-        names = sorted(entry.name for entry in entries if not entry.name.startswith("."))
-    if SUMMARY in names:
-        return
-    for path in (folder / name for name in names):
-        if path.is_file():
-            if path.suffix in FILE_ENDINGS or path.suffix.lower() in VIDEO_ENDINGS:
-                yield path
-        elif path.is_dir() and path.resolve() != left_out:
-            if is_one_recording(path):
-                yield path
-            elif not path.is_symlink():
-                yield from _found(path, left_out)
+def _found(folder: Path, left_out: Path | None, depth: int) -> Iterator[Path]:
+    if depth > _DEEPEST:
+        raise CardboxError(
+            f"{folder} is nested more than {_DEEPEST} folders deep; give the folder that "
+            "has the recordings"
+        )
+    try:
+        with os.scandir(folder) as entries:
+            names = sorted(entry.name for entry in entries if not entry.name.startswith("."))
+        if SUMMARY in names:
+            return
+        for path in (folder / _readable(name, folder) for name in names):
+            if path.is_file():
+                if path.suffix in FILE_ENDINGS or path.suffix.lower() in VIDEO_ENDINGS:
+                    yield path
+            elif path.is_dir() and path.resolve() != left_out:
+                if is_one_recording(path):
+                    yield path
+                elif not path.is_symlink():
+                    yield from _found(path, left_out, depth + 1)
+    except OSError as error:
+        raise CardboxError(
+            f"cannot read the folder {folder}: {error.strerror}; give a folder whose "
+            "folders can be read"
+        ) from None
+
+
+def _readable(name: str, folder: Path) -> str:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise CardboxError(
+            f"{folder} has the name {quoted(name)}, which is not UTF-8; rename it, or "
+            "give another folder"
+        ) from None
+    return name

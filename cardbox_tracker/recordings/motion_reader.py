@@ -29,6 +29,11 @@ _STDDEV = "/joint_states_stddev"
 _STATES = (*JOINT_NAMES, *PLACE_NAMES)
 _NEEDED = ("stamp_ns", "time_s", "state", *_STATES, *POINT_COLUMNS)
 _VALUES = N_STATE + len(NECK_NAMES) + len(POINT_COLUMNS)
+# A day at 30 Hz has 2.6 million images.
+_MOST_ROWS = 3_000_000
+# Rows that are read at once.
+_BATCH = 10_000
+_LATEST_NS = np.iinfo(np.int64).max
 _GAP: FloatArray = np.full(_VALUES, np.nan)
 
 
@@ -108,7 +113,10 @@ def _row_of(row: Mapping[str, Any]) -> _Row:
         values = np.array([*known[:N_STATE], *map(float, neck), *known[N_STATE:]])
     elif state not in (LOST, NO_PERSON):
         raise ValueError(f"the state is {quoted(state)}")
-    return _Row(int(row["stamp_ns"]), float(row["time_s"]), state, values)
+    stamp_ns = int(row["stamp_ns"])
+    if not 0 <= stamp_ns <= _LATEST_NS:
+        raise ValueError(f"the stamp is {quoted(stamp_ns)} ns")
+    return _Row(stamp_ns, float(row["time_s"]), state, values)
 
 
 def _csv_cells(path: Path) -> Iterator[Mapping[str, Any]]:
@@ -127,17 +135,25 @@ def _csv_cells(path: Path) -> Iterator[Mapping[str, Any]]:
         ) from None
 
 
-def _parquet_cells(path: Path) -> list[Mapping[str, Any]]:
+def _parquet_cells(path: Path) -> Iterator[Mapping[str, Any]]:
     arrow, parquet = pyarrow_or_error()
     try:
-        table = parquet.read_table(path)
+        with parquet.ParquetFile(path) as file:
+            rows, names = file.metadata.num_rows, file.schema_arrow.names
+            # A small file can claim any number of equal rows.
+            if rows > _MOST_ROWS:
+                raise CardboxError(
+                    f"{path} has {rows} images, expected at most {_MOST_ROWS}; give a table that "
+                    "'cardbox track' wrote"
+                )
+            _check(path, names)
+            read = [name for name in (*_NEEDED, *_NECK) if name in names]
+            for batch in file.iter_batches(_BATCH, columns=read):
+                yield from batch.to_pylist()
     except (OSError, arrow.ArrowException) as error:
         raise CardboxError(
             f"cannot read {path}: {quoted(str(error))}; give a table that 'cardbox track' wrote"
         ) from None
-    _check(path, table.column_names)
-    rows: list[Mapping[str, Any]] = table.to_pylist()
-    return rows
 
 
 def _check(path: Path, names: Sequence[str]) -> None:

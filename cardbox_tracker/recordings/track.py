@@ -49,7 +49,7 @@ class TrackSummary:
         mean_cost_px: mean cost over the tracked images; nan without any.
         mean_iou: mean overlap (IoU) over the tracked images; nan without any.
         frames_uncertain: number of tracked images whose posture may be wrong.
-        remarks: warnings about extrinsics that seem to be wrong.
+        remarks: warnings about extrinsics or depth that seem to be wrong.
         body: the body at the end, whose unknown values were fitted.
     """
 
@@ -116,8 +116,8 @@ def track_recording(
                 f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
     mean = (float(np.mean(costs)), float(np.mean(ious))) if costs else (float("nan"),) * 2
-    remarks: list[str] = []
+    remarks = tracker.remarks
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
-        remarks = tracker.agreement.remarks(recording.names[1:])
+        remarks += tracker.agreement.remarks(recording.names[1:])
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)

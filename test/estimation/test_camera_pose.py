@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import PROPORTIONS, BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation import camera_calibration, camera_guess
@@ -149,13 +149,15 @@ def test_only_the_latest_silhouettes_count() -> None:
     np.testing.assert_array_equal(latest.heights(TRUE), last)
 
 
-def agreement(extrinsics: Extrinsics, count: int) -> CameraAgreement:
-    view = View.of(BODY, CAMERA, OtherCamera(OTHER, extrinsics))
-    asked = CameraAgreement(BODY, CAMERA, [view])
+def agreement(extrinsics: Extrinsics, count: int, body: BodyModel = BODY) -> CameraAgreement:
+    view = View.of(body, CAMERA, OtherCamera(OTHER, extrinsics))
+    asked = CameraAgreement(body, CAMERA, [view])
     frames = sightings(waving(count))
     for frame in frames:
         for _ in range(12):
-            asked.see(frame.state, frame.first, [view.upright(frame.other, is_mask=True)])
+            other = view.upright(frame.other, is_mask=True)
+            asked.look(frame.first, [other])
+            asked.see(frame.state, frame.first, [other])
     return asked
 
 
@@ -173,6 +175,27 @@ def test_wrong_extrinsics_are_told_and_right_ones_are_not() -> None:
     assert right.turned_deg[0] is not None
     assert wrong.turned_deg[0] is not None
     assert wrong.turned_deg[0] > right.turned_deg[0] + 1.0
+
+
+def test_wrong_sizes_of_a_person_by_stature_are_no_wrong_extrinsics() -> None:
+    larger = BODY.with_values(sizes=1.1 * BODY.sizes)
+    measured, guessed = larger, larger.with_values(source=PROPORTIONS)
+    said = []
+    for body in (measured, guessed):
+        right = agreement(TRUE, 15, body)
+        right.check()
+        said.append(right.remarks(["cam1"]))
+        # The wrong sizes turn the estimate beyond the bound of measured people.
+        assert right.turned_deg[0] is not None
+        assert 0.85 < right.turned_deg[0] < 6.0
+    assert len(said[0]) == 1
+    assert said[1] == []
+    # The heights of head and hands need no sizes.
+    up = np.array([np.radians(2.0), *[0.0] * 5])
+    wrong = agreement(moved_by(TRUE, up), 15, guessed)
+    wrong.check()
+    (text,) = wrong.remarks(["cam1"])
+    assert "2.0 degrees in height" in text
 
 
 def test_a_camera_that_is_turned_about_its_own_axis_is_told() -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.folder import SUMMARY, is_one_recording, recordings_in
 
 
@@ -70,3 +72,37 @@ def test_results_hidden_entries_and_linked_folders_are_left_out(tmp_path: Path) 
     (tmp_path / "in" / "linked").symlink_to(tmp_path / "session")
     (tmp_path / "in" / "circle").symlink_to(tmp_path / "in")
     assert list(recordings_in(tmp_path / "in", tmp_path / "in" / "new")) == ["a", "linked"]
+
+
+def test_folders_that_are_nested_too_deep_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "/".join("d" * 60)).mkdir(parents=True)
+    with pytest.raises(CardboxError, match="more than 50 folders deep"):
+        recordings_in(tmp_path)
+    (tmp_path / "d").rename(tmp_path / ".d")
+    make(tmp_path, "/".join("d" * 49) + "/a.mp4")
+    assert list(recordings_in(tmp_path)) == ["/".join("d" * 49) + "/a"]
+
+
+def test_a_name_that_no_table_can_hold_is_refused_with_its_folder(tmp_path: Path) -> None:
+    try:
+        (Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.mp4"))).touch()
+    except OSError:
+        pytest.skip("this file system has UTF-8 names only")
+    with pytest.raises(CardboxError, match="not UTF-8; rename it"):
+        recordings_in(tmp_path)
+
+
+def test_a_folder_that_cannot_be_read_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(tmp_path, "a/b.txt")
+    scan = os.scandir
+
+    def refusing(path: Path) -> object:
+        if Path(path).name == "a":
+            raise PermissionError(13, "Permission denied")
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", refusing)
+    with pytest.raises(CardboxError, match="a: Permission denied"):
+        recordings_in(tmp_path)

@@ -16,6 +16,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.exporting.motion import Motion
+from cardbox_tracker.recordings import motion_reader
 from cardbox_tracker.recordings.motion_reader import read_motion
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_table import result_table
@@ -122,6 +123,9 @@ def without_postures(rows: list[list[str]]) -> None:
         (with_text, "image 3: .*much.*docs/results.md"),
         (with_state, "image 1: .*sleeping"),
         (with_empty_cell, "image 1: "),
+        (lambda rows: rows[2].__setitem__(0, str(10**30)), "the stamp is 1000"),
+        (lambda rows: rows[2].__setitem__(0, "-1"), "the stamp is -1"),
+        (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
         (without_postures, "no image with a posture"),
     ],
 )
@@ -155,3 +159,31 @@ def test_other_files(name: str, content: bytes | None, expected: str, tmp_path: 
         (tmp_path / name).write_bytes(content)
     with pytest.raises(CardboxError, match=expected):
         read_motion(tmp_path / name)
+
+
+def test_a_parquet_table_that_claims_too_many_rows_is_refused_before_they_are_built(
+    tmp_path: Path,
+) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    nothing = arrow.nulls(3_000_001)
+    path = tmp_path / "bomb.parquet"
+    parquet.write_table(arrow.table({"stamp_ns": nothing}), path)
+    assert path.stat().st_size < 100_000
+    with pytest.raises(CardboxError, match="3000001 images"):
+        read_motion(path)
+
+
+def test_a_parquet_table_of_several_batches_is_read_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    expected, _ = read_motion(write_table(tmp_path / "a.csv"))
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    parquet.write_table(arrow.Table.from_pylist(rows), tmp_path / "a.parquet")
+    monkeypatch.setattr(motion_reader, "_BATCH", 2)
+    found, _ = read_motion(tmp_path / "a.parquet")
+    np.testing.assert_array_equal(found.stamp_ns, expected.stamp_ns)
+    np.testing.assert_array_equal(found.states, expected.states)

@@ -169,17 +169,11 @@ class InnerCueTerm:
 
     def _follow_light(self, image: Image, silhouette: Silhouette, zones: FloatArray) -> None:
         """Update the torso's brightness from the chest, below the head."""
-        u, v, half_width, half_height, hips, _ = zones.tolist()
-        top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
-        left, right = max(int(u - 1.2 * half_width), 0), int(u + 1.2 * half_width)
-        if min(bottom - top, right - left) < _LEAST_SIDE_PX or self.config.light <= 0:
-            return
-        some = (slice(top, bottom, _STRIDE), slice(left, right, _STRIDE))
-        chest = image[some][silhouette[some] > 0]
-        if len(chest) < _LEAST_PX:
+        chest = chest_levels(image, silhouette, zones) if self.config.light > 0 else None
+        if chest is None:
             return
         learned = self._appearance.brightness
-        now = np.clip(np.median(chest, axis=0), _DARKEST * learned, _BRIGHTEST * learned)
+        now = np.clip(chest, _DARKEST * learned, _BRIGHTEST * learned)
         self._brightness += self.config.light * (now - self._brightness)
 
     def _maps(
@@ -207,6 +201,24 @@ class InnerCueTerm:
         for one in maps:
             cv2.blur(one, (3, 3), one)
         return maps
+
+
+def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> FloatArray | None:
+    """Return the median (channels,) over the chest, below the head; None if it is not visible.
+
+    Args:
+        image: (H, W, channels).
+        silhouette: (H, W), 0 or 255.
+        zones: (6,), see :meth:`~.inner_cue_arms.ArmView.zones`.
+    """
+    u, v, half_width, half_height, hips, _ = zones.tolist()
+    top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
+    left, right = max(int(u - 1.2 * half_width), 0), int(u + 1.2 * half_width)
+    if min(bottom - top, right - left) < _LEAST_SIDE_PX:
+        return None
+    some = (slice(top, bottom, _STRIDE), slice(left, right, _STRIDE))
+    chest = image[some][silhouette[some] > 0]
+    return None if len(chest) < _LEAST_PX else np.asarray(np.median(chest, axis=0))
 
 
 def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:

@@ -1,13 +1,10 @@
 """Doubt about a result from the points of a detector.
 
 A hand or elbow far from its point is wrong, with any number of cameras. In one camera, the depth of
-a person who was not measured is estimated from the lengths of the bones. The chance that a joint is
-wrong by more than 20 cm is then a logistic regression of four features, fitted to recordings of
-people of whom only the stature was given.
-
-The coefficients come from an earlier fit to 3,600 images, which no command of the repository
-repeats. ``learning/point_doubt.py`` makes such a fit; its own coefficients for 1,861 images
-differ, and separate these images about as well (``docs/research/points.md``).
+a person who was not measured is estimated from the lengths of the bones. Whether a hand is wrong by
+more than 30 cm is then a logistic regression of four features, fitted to simulated people of whom
+stature and distance were stated (``learning/simulated_doubt.py``). Wrong and right images weighed
+alike, so the chance is that among as many of both. ``docs/research/points.md`` has figures.
 """
 
 from __future__ import annotations
@@ -33,9 +30,9 @@ FEATURES = ("hand_depth_m", "upper_arm_depth", "distance_to_point_m", "distance_
 """Largest difference of a hand's depth from the detector's; largest component of an upper arm along
 the line of sight, as a fraction; largest distance of an elbow, wrist or hand from its point at the
 person's depth; distance of the person."""
-INTERCEPT = -5.3
-COEFFICIENTS = (7.3, 3.7, 46.0, 1.17)
-UNCERTAIN_FROM = 0.25
+INTERCEPT = -1.19
+COEFFICIENTS = (15.24, 2.71, -5.77, -0.78)
+UNCERTAIN_FROM = 0.2
 """Chance above which a result of one camera is uncertain."""
 FAR_M = 0.15
 """Distance of a point from its joint that makes any result uncertain."""
@@ -102,6 +99,6 @@ def features_of(
 
 
 def chance_of_error(features: FloatArray) -> float:
-    """Return the chance that a joint is wrong by more than 20 cm."""
+    """Return the chance that a hand is wrong by more than 30 cm, among as many right ones."""
     logit = INTERCEPT + float(np.dot(COEFFICIENTS, features))
     return 1.0 / (1.0 + exp(-min(max(logit, -50.0), 50.0)))

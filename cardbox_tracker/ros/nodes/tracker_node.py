@@ -158,7 +158,10 @@ class TrackerNode(CardboxNode):
 
     def _warnings(self) -> dict[str, str]:
         """Return warnings for the diagnostics."""
-        return self._inputs.warnings() | self._agreement.warnings() | self._report.warnings()
+        remarks = [] if self._tracker is None else self._tracker.remarks
+        images = {f"images {number}": text for number, text in enumerate(remarks)}
+        told = self._inputs.warnings() | self._agreement.warnings() | self._report.warnings()
+        return told | images
 
     def _values(self) -> dict[str, str]:
         """Return the values of the diagnostics."""

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from learning.bodies import draw
+from cardbox_tracker.errors import CardboxError
+from learning.bodies import FAMILIES, draw
 from learning.bodies.picture import row
 from learning.bodies.rigged import RiggedBody
 
@@ -24,8 +25,15 @@ def test_equal_generators_give_equal_bodies(stick: RiggedBody, tmp_path: Path) -
 def test_unknown_families_and_empty_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="martians"):
         draw(np.random.default_rng(0), ["martians"], {"martians": tmp_path})
-    with pytest.raises(ValueError, match="no bodies"):
+    with pytest.raises(CardboxError, match="no bodies"):
         draw(np.random.default_rng(0), ["rocketbox"], {"rocketbox": tmp_path})
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_missing_folder_is_named_with_what_it_should_have(family: str, tmp_path: Path) -> None:
+    missing = tmp_path / "missing"
+    with pytest.raises(CardboxError, match=f"{missing}.*learning.md"):
+        draw(np.random.default_rng(0), [family], {family: missing})
 
 
 def test_a_picture_shows_four_views(stick: RiggedBody) -> None:
