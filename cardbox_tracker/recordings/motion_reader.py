@@ -147,7 +147,7 @@ def _parquet_cells(path: Path) -> Iterator[Mapping[str, Any]]:
                     "'cardbox track' wrote"
                 )
             _check(path, names)
-            read = [name for name in (*_NEEDED, *_NECK) if name in names]
+            read = [name for name in (*_NEEDED, *NECK_NAMES) if name in names]
             for batch in file.iter_batches(_BATCH, columns=read):
                 yield from batch.to_pylist()
     except (OSError, arrow.ArrowException) as error:

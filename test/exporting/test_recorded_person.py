@@ -93,7 +93,7 @@ def test_joints_have_the_error_of_the_table_in_all_formats(
     exported: Path, joints_of_bvh: Callable[[Path], dict[str, np.ndarray]]
 ) -> None:
     table = table_of(exported / "person.csv")
-    columns = [[f"{name}_{axis}_m" for axis in "xyz"] for name in KEYPOINT_NAMES]
+    columns = [[f"{name}_{axis}" for axis in "xyz"] for name in KEYPOINT_NAMES]
     tracked = np.array([[table[c] for c in three] for three in columns]).astype(float)
     tracked_m = tracked.transpose(2, 0, 1)
     truth_m = true_points_m(table["stamp_ns"].astype(np.int64))

@@ -19,7 +19,7 @@ from cardbox_tracker.exporting.motion import Motion
 from cardbox_tracker.recordings import motion_reader
 from cardbox_tracker.recordings.motion_reader import read_motion
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.result_table import result_table
+from cardbox_tracker.recordings.result_table import columns, result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.vision.camera import Camera
 
@@ -94,6 +94,9 @@ def test_a_bag_is_read_with_its_body(tmp_path: Path) -> None:
     assert body.sizes == pytest.approx(BODY.sizes)
 
 
+STAMP_NS = columns().index("stamp_ns")
+
+
 def without_column(rows: list[list[str]]) -> None:
     for row in rows:
         del row[11]
@@ -123,8 +126,8 @@ def without_postures(rows: list[list[str]]) -> None:
         (with_text, "image 3: .*much.*docs/results.md"),
         (with_state, "image 1: .*sleeping"),
         (with_empty_cell, "image 1: "),
-        (lambda rows: rows[2].__setitem__(0, str(10**30)), "the stamp is 1000"),
-        (lambda rows: rows[2].__setitem__(0, "-1"), "the stamp is -1"),
+        (lambda rows: rows[2].__setitem__(STAMP_NS, str(10**30)), "the stamp is 1000"),
+        (lambda rows: rows[2].__setitem__(STAMP_NS, "-1"), "the stamp is -1"),
         (lambda rows: rows.__delitem__(slice(1, None)), "no image with a posture"),
         (without_postures, "no image with a posture"),
     ],
