@@ -42,7 +42,8 @@ def report_lines(
     inputs = unseen(config, summary)
     for title, is_default in ((NOT_SEEN, False), (f"{NOT_SEEN}, with the default value", True)):
         found = [one.words for one in inputs if one.is_default == is_default]
-        yield f"{title}: {', '.join(found) or 'nothing'}"
+        if found:
+            yield f"{title}: {', '.join(found)}"
     if summary.neck_measured_s:
         yield neck_words(summary)
 

@@ -116,6 +116,8 @@ def test_the_report_names_what_was_not_seen() -> None:
     assert re.search(r"grand score +4\.5 +mixed +3: 50%, 6: 50%", text)
     assert "declared, not seen: wrist 2, arm load 3\n" in text
     assert "with the default value: neck 1, wrist twist 1, legs 1" in text
+    text = "\n".join(report_lines(summarize(rows), score_shares(rows, config), RulaConfig()))
+    assert "not seen, with the default value: neck 1" in text and "not seen: " not in text
     nothing = [row(0, None, "lost")]
     lines = list(report_lines(summarize(nothing), score_shares(nothing, config), config))
     assert [line.split(":")[0] for line in lines] == [
