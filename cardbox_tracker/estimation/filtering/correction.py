@@ -38,6 +38,7 @@ from cardbox_tracker.estimation.filtering.networks import (
     load_network,
     load_recurrent_network,
 )
+from cardbox_tracker.estimation.filtering.packed_network import PackedNetwork
 from cardbox_tracker.estimation.filtering.point_features import POINT_FEATURES, features_of_points
 from cardbox_tracker.estimation.filtering.result_features import FEATURES, features_of
 from cardbox_tracker.estimation.filtering.search_features import SEARCH_FEATURES, features_of_search
@@ -99,12 +100,23 @@ def limited(answers_m: FloatArray, spread_m: FloatArray, doubt: float = DOUBT) -
         spread_m: their standard deviation, (2, 9).
         doubt: weight of the spread; 0 for the answers as they are.
     """
-    each, spread = answers_m.reshape(2, 3, 3), spread_m.reshape(2, 3, 3)
-    squares = np.sum(each * each, axis=2, keepdims=True)
-    doubts = doubt * np.sum(spread * spread, axis=2, keepdims=True)
-    gains = squares / (squares + doubts + _LEAST_M2)
-    shortened: FloatArray = (gains * each).reshape(2, 9)
+    shortened = np.empty((2, 9))
+    _shorten(answers_m, spread_m, doubt, shortened)
     return shortened
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shorten(answers_m: Any, spread_m: Any, doubt: float, shortened: Any) -> None:
+    """Write :func:`limited` to ``shortened``."""
+    for arm in range(2):
+        for first in range(0, 9, 3):
+            squares, doubts = 0.0, 0.0
+            for i in range(first, first + 3):
+                squares += answers_m[arm, i] ** 2
+                doubts += spread_m[arm, i] ** 2
+            gain = squares / (squares + doubt * doubts + _LEAST_M2)
+            for i in range(first, first + 3):
+                shortened[arm, i] = gain * answers_m[arm, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -143,9 +155,9 @@ class NetworkCorrector:
 
     def __init__(self, cost: WholeBodyCost, camera: Camera, network: RecurrentNetwork) -> None:
         """Prepare for the body of ``cost`` before the first camera ``camera``."""
-        self._cost, self._camera, self._network = cost, camera, network
+        self._cost, self._camera, self._network = cost, camera, PackedNetwork(network)
         # A person who comes back is the same one, so the hidden state is never reset.
-        self._hidden = network.initial_hidden(2)
+        self._hidden = self._network.initial_hidden()
         self._deviations = load_network(DATA_OF_DEVIATIONS)
         self.features = self.result_features = np.empty((2, 0))
         self._log_odds: FloatArray = np.empty(0)
