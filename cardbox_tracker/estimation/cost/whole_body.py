@@ -74,7 +74,8 @@ class WholeBodyCost:
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
         self._rules = _rules(config)
-        self._gmm = np.array(load_gmm())
+        self._waist_m = float(body.size("waist_width"))
+        self._gaussians = np.ascontiguousarray(load_gmm().T)
         # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
         kind = np.int16 if camera.width < 2**15 else np.int32
         shape = (camera.height, camera.width + 1)
@@ -231,7 +232,7 @@ class WholeBodyCost:
 
     @property
     def _prior(self) -> priors.PriorTuple:
-        return self.anchor, self._rules, self._gmm
+        return self.anchor, self._rules, self._gaussians
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
