@@ -194,6 +194,8 @@ def rate_bodies(take: Take, _: Iterator[int]) -> None:
     whole = terms().whole
     whole.see(take("u1", SIZE), STATE)
     whole.bodies(STATE + 0.01 * np.arange(3)[:, None])
+    whole.fix_torso(STATE)
+    whole.pairs(np.tile(STATE, (3, 1)))
     whole.bearing()
 
 

@@ -148,6 +148,10 @@ class MultiViewCost:
         joints = self.costs[0].joints(arms, arm)
         return self._sum(lambda cost, _: cost.arms_by_points(joints, arm))
 
+    def pairs(self, states: FloatArray) -> FloatArray:
+        """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""
+        return self._sum(lambda cost, to_view: cost.pairs(to_view(states)))
+
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels of all cameras, (N,)."""
         ratings, costs_px, areas_px = self.costs[0].bodies(states)

@@ -188,6 +188,15 @@ class WholeBodyCost:
             ratings += self._scale * costs(SIDES[arm], arms)
         return ratings
 
+    def pairs(self, states: FloatArray) -> FloatArray:
+        """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
+        ratings = np.empty(len(states))
+        observed = self._beside_trunk, self._base_px, self._scale
+        kernels.rate_pairs(states, self.body, observed, self._prior, ratings)
+        for term in self.terms:
+            ratings += self._scale * term.postures(states)
+        return ratings
+
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels, each (N,)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))

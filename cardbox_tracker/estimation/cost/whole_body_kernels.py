@@ -133,6 +133,33 @@ def rate_bodies(
 
 
 @kernel
+def rate_pairs(
+    states: Floats, body: BodyTuple, observed: ObservedTuple, prior: PriorTuple, ratings: Floats
+) -> None:
+    """Write ratings (N,) of states (N, 14) that all have the trunk of the first one.
+
+    ``observed`` is the silhouette with that trunk drawn, so only the arms are.
+    """
+    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
+    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
+    work, arm = new_workspace(2 * ARM_PATCHES, rows), new_arm()
+    logs = np.empty(given.gaussians.shape[1])
+    state_pose(states[0], of.place, of.camera, work.torso, work.hip)
+    of_torso = torso_prior(states[0], given)
+    for i in range(states.shape[0]):
+        rated = of_torso
+        for k in range(2):
+            angles, side = angles_in(states[i], k), side_of(k)
+            pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
+            turn_arm(arm, work.torso, work.hip)
+            place_arm(arm, ARM_PATCHES * k, of.drawn, work.corners)
+            rated += arm_prior(arm, side, of.parts, given, logs)
+        draw(work, of.camera, rows, width)
+        gain = sum_union(work, 2 * ARM_PATCHES, seen.row_sums)[0]
+        ratings[i] = (seen.base_px + gain) * seen.scale + rated
+
+
+@kernel
 def cover(state: Floats, drawn: Drawn, body: BodyTuple, row_sums: RowSums, covered: RowSums) -> int:
     """Write the row sums outside of the ``drawn`` parts of a state; return the gain of the parts.
 

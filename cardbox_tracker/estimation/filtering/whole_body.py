@@ -185,7 +185,7 @@ class WholeBodyFilter:
         left, right = (self._arm(by_rating, arm, draws) for arm in (0, 1))
         pairs = joint_moves.combine(best, *left, *right, config.paired_arms)
         states = np.concatenate([pool, pairs])
-        ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
+        ratings = np.concatenate([ratings, cost.pairs(pairs)])
         self._together(frames, states, ratings, draws)
 
     def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:

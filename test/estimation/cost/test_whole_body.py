@@ -177,6 +177,18 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     assert both == pytest.approx(share)
 
 
+@given(st.integers(0, 10_000))
+@settings(max_examples=25, deadline=None)
+def test_pairs_of_arms_beside_a_trunk_are_rated_as_whole_bodies(seed: int) -> None:
+    of = cost()
+    rng = np.random.default_rng(seed)
+    of.see(rng.integers(0, 2, (120, 160)).astype(np.uint8) * 255, state())
+    states = random_states(6, seed)
+    states[:, [0, 1, 2, 3, 12, 13]] = states[0, [0, 1, 2, 3, 12, 13]]
+    of.fix_torso(states[0])
+    np.testing.assert_array_equal(of.pairs(states), of.bodies(states)[0])
+
+
 def test_the_torsos_prior_by_hand() -> None:
     of = cost()
     of.see(np.full((120, 160), 255, np.uint8), state())
