@@ -18,7 +18,7 @@ that the corrected shoulder, elbow and hand are off by more than 30 cm.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import log2, sqrt
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ MIDDLE_Z = 2
 sources that were left out, it makes their distance worse."""
 DOUBT = 1.0
 """Weight of the networks' disagreement, which shortens the correction."""
-_NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
+_OF_SEARCH = slice(FEATURES, FEATURES + SEARCH_FEATURES)
 N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES + POINT_FEATURES + 1
 """Inputs of the network: features of the result, of the search, of the depth image and of the
 points, and the binary logarithm of the interval between frames."""
@@ -208,19 +208,15 @@ class NetworkCorrector:
 def inputs_of(found: Result, cost: WholeBodyCost, camera: Camera) -> FloatArray:
     """Return the inputs of the network (2, F) for the left arm and the mirrored right arm."""
     frame, keypoints_m = found.frame, found.keypoints_m
-    interval = np.full((2, 1), np.log2(max(frame.interval_s, _LEAST_S) / USUAL_INTERVAL_S))
-    return np.concatenate(
-        [
-            features_of_result(found),
-            features_of_search(found.search, cost, keypoints_m),
-            features_of_depth(frame, camera, keypoints_m)
-            if found.viewpoints.has_depth
-            else _NO_DEPTH,
-            features_of_points(frame.points, camera, keypoints_m),
-            interval,
-        ],
-        axis=1,
-    )
+    inputs = np.zeros((2, N_FEATURES))
+    inputs[:, :FEATURES] = features_of_result(found)
+    inputs[:, _OF_SEARCH] = features_of_search(found.search, cost, keypoints_m)
+    if found.viewpoints.has_depth:
+        inputs[:, OF_DEPTH] = features_of_depth(frame, camera, keypoints_m)
+    if frame.points is not None:
+        inputs[:, OF_POINTS] = features_of_points(frame.points, camera, keypoints_m)
+    inputs[:, -1] = log2(max(frame.interval_s, _LEAST_S) / USUAL_INTERVAL_S)
+    return inputs
 
 
 def features_of_result(result: Result) -> FloatArray:
