@@ -138,7 +138,7 @@ class PoseProblem:
         self._seen: list[tuple[SeenOutline, SeenOutline]] = []
         self._stddevs: list[FloatArray] = []
         for state, seen, seen_there, stddev in sightings:
-            hips_m = self._cost.hips(state, self._first)
+            hips_m = np.array(self._cost.hips(state))
             there_m = extrinsics.rotation @ hips_m + extrinsics.translation_m
             pair = (
                 SeenOutline(seen, self._first, hips_m),

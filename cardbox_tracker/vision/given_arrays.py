@@ -162,6 +162,8 @@ def _check_size(array: NDArray[Any], name: str, size: Size | None) -> None:
 
 def _check_range(array: NDArray[Any], name: str, expected: str) -> float:
     """Return the largest value; refuse values below 0, above 255 or not a number."""
+    if array.dtype == np.uint8:
+        return float(array.max())
     lowest, highest = array.min(), array.max()
     if not (lowest >= 0 and highest <= _BRIGHTEST):
         is_number = lowest == lowest

@@ -63,12 +63,12 @@ class Prior(NamedTuple):
     Attributes:
         anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
         rules: units and weights, (15,).
-        gmm: mixture of Gaussians of an arm's directions, see :mod:`.pose_prior`.
+        gaussians: mixture of an arm's directions, (28, K), see :func:`.pose_prior.nats_of`.
     """
 
     anchor: Floats
     rules: Floats
-    gmm: Floats
+    gaussians: Floats
 
 
 PriorTuple = tuple[Floats, Floats, Floats]
@@ -137,12 +137,15 @@ def penetration(points: Floats, parts: Floats) -> float:
 
 
 @inlined_kernel
-def arm_prior(arm: PosedArm, side: float, parts: Floats, given: Prior) -> float:
-    """Return the prior of a posed arm: the learned prior, nats, and the cost of penetration."""
+def arm_prior(arm: PosedArm, side: float, parts: Floats, given: Prior, logs: Floats) -> float:
+    """Return the prior of a posed arm: the learned prior, nats, and the cost of penetration.
+
+    ``logs`` is scratch with one value for each Gaussian, (K,).
+    """
     rules = given.rules
     for c in range(6):
         arm.outward[c] = arm.directions[c] * (side if c == 1 or c == 4 else 1.0)
-    rated = nats_of(arm.outward, given.gmm, rules[UNKNOWN_DENSITY], arm.away)
+    rated = nats_of(arm.outward, given.gaussians, rules[UNKNOWN_DENSITY], logs)
     rated += rules[PENETRATION] * penetration(arm.points, parts)
     prior: float = rules[WEIGHT] * rated
     return prior
@@ -153,8 +156,9 @@ def priors(state: Floats, body: BodyTuple, prior: PriorTuple) -> tuple[float, fl
     """Return the priors of torso, left and right arm of one state."""
     found = np.zeros(2)
     arm, of, given = new_arm(), body_of(body), Prior(*prior)
+    logs = np.empty(given.gaussians.shape[1])
     for k in range(2):
         angles, side = angles_in(state, k), side_of(k)
         pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
-        found[k] = arm_prior(arm, side, of.parts, given)
+        found[k] = arm_prior(arm, side, of.parts, given, logs)
     return torso_prior(state, given), found[0], found[1]

@@ -99,8 +99,6 @@ class PosedArm(NamedTuple):
     """(3, 3): the points in the optical frame, metres."""
     axes: Floats
     """(2, 3): the directions in the optical frame."""
-    away: Floats
-    """(6,): scratch of the arms' prior."""
     outward: Floats
     """(6,): the directions with y outwards, for the arms' prior; otherwise scratch."""
 
@@ -113,7 +111,6 @@ def new_arm() -> PosedArm:
         directions=np.empty(6),
         joints=np.empty((3, 3)),
         axes=np.empty((2, 3)),
-        away=np.empty(6),
         outward=np.empty(6),
     )
 

@@ -128,8 +128,11 @@ def find_outline(
     width, height = size
     end = min(end_row, height - _BORDER_PX)
     turns = np.empty(BODY_PATCHES)
-    sides_px = np.empty((BODY_PATCHES, 4))
+    sides_px, boxes = np.empty((BODY_PATCHES, 4)), np.empty((BODY_PATCHES, 4))
     _turns(corners_px, turns, sides_px)
+    for p in range(BODY_PATCHES):
+        boxes[p, 0], boxes[p, 1] = corners_px[p, :, 0].min(), corners_px[p, :, 0].max()
+        boxes[p, 2], boxes[p, 3] = corners_px[p, :, 1].min(), corners_px[p, :, 1].max()
     count = 0
     for p in range(BODY_PATCHES):
         for c in range(4):
@@ -142,9 +145,10 @@ def find_outline(
                 counts = _BORDER_PX <= x <= width - 1 - _BORDER_PX and _BORDER_PX <= y < end
                 if counts:
                     for other in range(BODY_PATCHES):
-                        if other != p and _is_inside(
-                            corners_px, sides_px, other, turns[other], x, y
-                        ):
+                        box = boxes[other]
+                        if other == p or not (box[0] <= x <= box[1] and box[2] <= y <= box[3]):
+                            continue
+                        if _is_inside(corners_px, sides_px, other, turns[other], x, y):
                             counts = False
                             break
                 if counts:

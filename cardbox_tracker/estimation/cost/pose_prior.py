@@ -28,6 +28,8 @@ can still outweigh it."""
 
 _DATA = "pose_prior.json"
 _D = 6
+# With an unsigned index, numba compiles no code for negative indices.
+_index = np.uint64
 
 
 @cache
@@ -74,22 +76,40 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
 
 
 @inlined_kernel
-def nats_of(directions: Any, gmm: Any, rest: float, away: Any) -> float:
-    """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm; ``away`` is scratch."""
+def nats_of(directions: Any, gaussians: Any, rest: float, logs: Any) -> float:
+    """Return -log(p + ``rest``), nats, of the unit vectors (6,) of an arm.
+
+    Args:
+        directions: unit vectors of upper arm and forearm, (6,).
+        gaussians: the transpose of :func:`load_gmm`, (28, K). The loop over the Gaussians has no
+            inner loops, so that it can be vectorized.
+        rest: density of postures that the mixture does not know.
+        logs: scratch, (K,).
+    """
+    g = gaussians
+    d0, d1, d2 = directions[0], directions[1], directions[2]
+    d3, d4, d5 = directions[3], directions[4], directions[5]
+    for one in range(g.shape[1]):
+        k = _index(one)
+        x0, x1, x2 = d0 - g[1, k], d1 - g[2, k], d2 - g[3, k]
+        x3, x4, x5 = d3 - g[4, k], d4 - g[5, k], d5 - g[6, k]
+        y = g[7, k] * x0
+        squares = y * y
+        y = g[8, k] * x0 + g[9, k] * x1
+        squares += y * y
+        y = g[10, k] * x0 + g[11, k] * x1 + g[12, k] * x2
+        squares += y * y
+        y = g[13, k] * x0 + g[14, k] * x1 + g[15, k] * x2 + g[16, k] * x3
+        squares += y * y
+        y = g[17, k] * x0 + g[18, k] * x1 + g[19, k] * x2 + g[20, k] * x3 + g[21, k] * x4
+        squares += y * y
+        y = g[22, k] * x0 + g[23, k] * x1 + g[24, k] * x2 + g[25, k] * x3 + g[26, k] * x4
+        y += g[27, k] * x5
+        squares += y * y
+        logs[k] = g[0, k] - 0.5 * squares
     density = rest
-    for k in range(gmm.shape[0]):
-        for row in range(_D):
-            away[row] = directions[row] - gmm[k, 1 + row]
-        squares = 0.0
-        place = 1 + _D
-        for row in range(_D):
-            y = 0.0
-            for column in range(row + 1):
-                y += gmm[k, place] * away[column]
-                place += 1
-            squares += y * y
-        log_density = gmm[k, 0] - 0.5 * squares
+    for one in range(g.shape[1]):
         # Smaller summands would not change the sum, which is at least exp(-FLOOR_NATS).
-        if log_density > -20.0:
-            density += exp(log_density)
+        if logs[one] > -20.0:
+            density += exp(logs[one])
     return -log(density)

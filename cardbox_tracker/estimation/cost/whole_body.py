@@ -7,6 +7,7 @@ depend on the last place of the hips.
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class WholeBodyCost:
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
         """Prepare for one body and one camera, which includes the pitch."""
-        self._model, self._camera, self._config = body, camera, config
+        self._camera, self._config = camera, config
         self.body = body_tuple(body, camera, config)
         self.parts, _, self.girdle, self.place, self.view = self.body
         self.size = camera.width, camera.height
@@ -74,7 +75,8 @@ class WholeBodyCost:
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
         self._rules = _rules(config)
-        self._gmm = np.array(load_gmm())
+        self._waist_m = float(body.size("waist_width"))
+        self._gaussians = np.ascontiguousarray(load_gmm().T)
         # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
         kind = np.int16 if camera.width < 2**15 else np.int32
         shape = (camera.height, camera.width + 1)
@@ -90,12 +92,12 @@ class WholeBodyCost:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
         config, camera = self._config, self._camera
         check_array("silhouette", silhouette, (camera.height, camera.width))
-        hip = self.hips(state, camera)
-        depth_m = max(float(hip[2]), 1e-3)
-        column, row = camera.fx * hip[0] / depth_m + camera.cx, camera.fy * hip[1] / depth_m
-        row += camera.cy
+        aside_m, down_m, ahead_m = self.hips(state)
+        depth_m = max(ahead_m, 1e-3)
+        column = camera.fx * aside_m / depth_m + camera.cx
+        row = camera.fy * down_m / depth_m + camera.cy
         hip_row, rows = (
-            int(np.clip(np.ceil(end), 1, camera.height))
+            min(max(ceil(end), 1), camera.height)
             for end in (row, row + config.below_hips_m * camera.fy / depth_m)
         )
         upper = np.ascontiguousarray(silhouette[:rows])
@@ -103,8 +105,8 @@ class WholeBodyCost:
         self._seen, self._beside, self._beside_trunk = (table[:rows] for table in self._all_rows)
         self.silhouette_px = int(fill_row_sums(upper, words, self._seen))
         if hip_row < rows:
-            half = config.legs * self._model.size("waist_width") * camera.fx / depth_m
-            ends = (int(np.clip(end, 0, camera.width)) for end in (column - half, column + half))
+            half = config.legs * self._waist_m * camera.fx / depth_m
+            ends = (min(max(int(end), 0), camera.width) for end in (column - half, column + half))
             self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
 
@@ -113,15 +115,18 @@ class WholeBodyCost:
         self._rules[priors.X_STEP] = factor * self._config.x_step_m
         self._rules[priors.X_HOME] = factor * self._config.x_home_m
 
-    def hips(self, state: FloatArray, camera: Camera) -> FloatArray:
-        """Return the middle of the hips (3,) of a state (14,), metres in the optical frame."""
-        x_m = self._model.placement.distance_m - state[TORSO_X]
-        z_m = self._model.placement.hip_height_m + state[TORSO_Z]
-        return camera.reference_to_optical(np.array([-x_m, state[TORSO_Y], z_m]))
+    def hips(self, state: FloatArray) -> tuple[float, float, float]:
+        """Return the middle of the hips of a state (14,), x, y, z in the optical frame, metres."""
+        distance_m, height_m = self.place
+        x_m = distance_m - float(state[TORSO_X])
+        z_m = height_m + float(state[TORSO_Z])
+        cos_pitch, sin_pitch = self.view[4:]
+        down_m = -cos_pitch * z_m - sin_pitch * x_m
+        return float(state[TORSO_Y]), down_m, cos_pitch * x_m - sin_pitch * z_m
 
     def hip_row(self, state: FloatArray, camera: Camera) -> float:
-        """Return the row of the hips of a state (14,) in the image of ``camera``, at any size."""
-        _, down_m, ahead_m = self.hips(state, camera).tolist()
+        """Return the row of the hips of a state (14,) in the camera's image, at any size."""
+        _, down_m, ahead_m = self.hips(state)
         return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
 
     def see_nothing(self) -> None:
@@ -187,6 +192,15 @@ class WholeBodyCost:
             ratings += self._scale * costs(SIDES[arm], arms)
         return ratings
 
+    def pairs(self, states: FloatArray) -> FloatArray:
+        """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
+        ratings = np.empty(len(states))
+        observed = self._beside_trunk, self._base_px, self._scale
+        kernels.rate_pairs(states, self.body, observed, self._prior, ratings)
+        for term in self.terms:
+            ratings += self._scale * term.postures(states)
+        return ratings
+
     def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rate whole states (N, 14): ratings, differing and drawn pixels, each (N,)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))
@@ -231,7 +245,7 @@ class WholeBodyCost:
 
     @property
     def _prior(self) -> priors.PriorTuple:
-        return self.anchor, self._rules, self._gmm
+        return self.anchor, self._rules, self._gaussians
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
@@ -86,6 +88,7 @@ def rate_arms(
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
     work, arm = new_workspace(ARM_PATCHES, rows), new_arm()
+    logs = np.empty(given.gaussians.shape[1])
     state_pose(torso, of.place, of.camera, work.torso, work.hip)
     for i in range(arms.shape[0]):
         pose_arm(arms[i], side, of.parts, of.girdle, arm.points, arm.directions)
@@ -93,7 +96,7 @@ def rate_arms(
         place_arm(arm, 0, of.drawn, work.corners)
         draw(work, of.camera, rows, width)
         gain = sum_union(work, ARM_PATCHES, seen.row_sums)[0]
-        rated = arm_prior(arm, side, of.parts, given)
+        rated = arm_prior(arm, side, of.parts, given, logs)
         ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
@@ -111,6 +114,7 @@ def rate_bodies(
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
     work, arm = new_workspace(BODY_PATCHES, rows), new_arm()
+    logs = np.empty(given.gaussians.shape[1])
     for i in range(states.shape[0]):
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
@@ -120,12 +124,39 @@ def rate_bodies(
             pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
             turn_arm(arm, work.torso, work.hip)
             place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, of.drawn, work.corners)
-            rated += arm_prior(arm, side, of.parts, given)
+            rated += arm_prior(arm, side, of.parts, given, logs)
         draw(work, of.camera, rows, width)
         gain, area = sum_union(work, BODY_PATCHES, seen.row_sums)
         costs_px[i] = seen.base_px + gain
         areas_px[i] = area
         ratings[i] = costs_px[i] * seen.scale + rated
+
+
+@kernel
+def rate_pairs(
+    states: Floats, body: BodyTuple, observed: ObservedTuple, prior: PriorTuple, ratings: Floats
+) -> None:
+    """Write ratings (N,) of states (N, 14) that all have the trunk of the first one.
+
+    ``observed`` is the silhouette with that trunk drawn, so only the arms are.
+    """
+    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
+    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
+    work, arm = new_workspace(2 * ARM_PATCHES, rows), new_arm()
+    logs = np.empty(given.gaussians.shape[1])
+    state_pose(states[0], of.place, of.camera, work.torso, work.hip)
+    of_torso = torso_prior(states[0], given)
+    for i in range(states.shape[0]):
+        rated = of_torso
+        for k in range(2):
+            angles, side = angles_in(states[i], k), side_of(k)
+            pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
+            turn_arm(arm, work.torso, work.hip)
+            place_arm(arm, ARM_PATCHES * k, of.drawn, work.corners)
+            rated += arm_prior(arm, side, of.parts, given, logs)
+        draw(work, of.camera, rows, width)
+        gain = sum_union(work, 2 * ARM_PATCHES, seen.row_sums)[0]
+        ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
 @kernel

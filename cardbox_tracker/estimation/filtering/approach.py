@@ -11,10 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.body.posture import TORSO_X, TORSO_Y
+from cardbox_tracker.body.posture import N_STATE, TORSO_X, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
+from cardbox_tracker.estimation.filtering.joint_moves import clip_state
 
 # Multiples of the last distance at which the last posture is proposed.
 _SCALES = np.exp([-0.16, -0.08, -0.04, 0.04, 0.08, 0.16])
@@ -68,8 +70,7 @@ class Approach:
         body_m = cost.place[0]
         scales = _SCALES[:0] if self.is_fixed else _SCALES
         distances_m = scales * (body_m - float(state[TORSO_X]))
-        moved: FloatArray = np.clip(at_distances(state, distances_m, body_m), *cost.limits.T)
-        return moved
+        return at_distances(state, distances_m, body_m, cost.limits)
 
     def with_upright(
         self,
@@ -108,17 +109,25 @@ class Approach:
         return kept
 
 
-def at_distances(state: FloatArray, distances_m: FloatArray, body_m: float) -> FloatArray:
+@kernel
+def at_distances(
+    state: FloatArray, distances_m: FloatArray, body_m: float, limits: FloatArray
+) -> FloatArray:
     """Return a state (14,) at other distances, at the same column of the image, (N, 14).
 
     Args:
         state: the state.
         distances_m: distances (N,) of the hips from the camera.
         body_m: distance of the hips in the body model, metres.
+        limits: lowest and highest value of each value of a state, (14, 2).
     """
-    states = np.tile(state, (len(distances_m), 1))
-    states[:, TORSO_X] = body_m - distances_m
-    states[:, TORSO_Y] *= distances_m / max(body_m - float(state[TORSO_X]), 1e-3)
+    states = np.empty((distances_m.shape[0], N_STATE))
+    ahead_m = max(body_m - state[TORSO_X], 1e-3)
+    for i in range(states.shape[0]):
+        states[i] = state
+        states[i, TORSO_X] = body_m - distances_m[i]
+        states[i, TORSO_Y] = state[TORSO_Y] * (distances_m[i] / ahead_m)
+        clip_state(states[i], limits)
     return states
 
 
@@ -140,8 +149,10 @@ def placed_upright(
         upright: state (14,) at the column of the silhouette.
     """
     seeing = cost.seeing
-    candidates = [expected, *at_distances(upright, _DISTANCES_M, cost.place[0])]
-    candidates = [np.clip(state, *cost.limits.T) for state in candidates]
+    candidates = [
+        np.clip(expected, *cost.limits.T),
+        *at_distances(upright, _DISTANCES_M, cost.place[0], cost.limits),
+    ]
     misfits = []
     for state in candidates:
         cost.see(silhouettes, state)

@@ -18,7 +18,7 @@ that the corrected shoulder, elbow and hand are off by more than 30 cm.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import log2, sqrt
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ from cardbox_tracker.estimation.filtering.networks import (
     load_network,
     load_recurrent_network,
 )
+from cardbox_tracker.estimation.filtering.packed_network import PackedNetwork
 from cardbox_tracker.estimation.filtering.point_features import POINT_FEATURES, features_of_points
 from cardbox_tracker.estimation.filtering.result_features import FEATURES, features_of
 from cardbox_tracker.estimation.filtering.search_features import SEARCH_FEATURES, features_of_search
@@ -57,7 +58,7 @@ MIDDLE_Z = 2
 sources that were left out, it makes their distance worse."""
 DOUBT = 1.0
 """Weight of the networks' disagreement, which shortens the correction."""
-_NO_DEPTH = np.zeros((2, DEPTH_FEATURES))
+_OF_SEARCH = slice(FEATURES, FEATURES + SEARCH_FEATURES)
 N_FEATURES = FEATURES + SEARCH_FEATURES + DEPTH_FEATURES + POINT_FEATURES + 1
 """Inputs of the network: features of the result, of the search, of the depth image and of the
 points, and the binary logarithm of the interval between frames."""
@@ -99,12 +100,23 @@ def limited(answers_m: FloatArray, spread_m: FloatArray, doubt: float = DOUBT) -
         spread_m: their standard deviation, (2, 9).
         doubt: weight of the spread; 0 for the answers as they are.
     """
-    each, spread = answers_m.reshape(2, 3, 3), spread_m.reshape(2, 3, 3)
-    squares = np.sum(each * each, axis=2, keepdims=True)
-    doubts = doubt * np.sum(spread * spread, axis=2, keepdims=True)
-    gains = squares / (squares + doubts + _LEAST_M2)
-    shortened: FloatArray = (gains * each).reshape(2, 9)
+    shortened = np.empty((2, 9))
+    _shorten(answers_m, spread_m, doubt, shortened)
     return shortened
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _shorten(answers_m: Any, spread_m: Any, doubt: float, shortened: Any) -> None:
+    """Write :func:`limited` to ``shortened``."""
+    for arm in range(2):
+        for first in range(0, 9, 3):
+            squares, doubts = 0.0, 0.0
+            for i in range(first, first + 3):
+                squares += answers_m[arm, i] ** 2
+                doubts += spread_m[arm, i] ** 2
+            gain = squares / (squares + doubt * doubts + _LEAST_M2)
+            for i in range(first, first + 3):
+                shortened[arm, i] = gain * answers_m[arm, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -143,9 +155,9 @@ class NetworkCorrector:
 
     def __init__(self, cost: WholeBodyCost, camera: Camera, network: RecurrentNetwork) -> None:
         """Prepare for the body of ``cost`` before the first camera ``camera``."""
-        self._cost, self._camera, self._network = cost, camera, network
+        self._cost, self._camera, self._network = cost, camera, PackedNetwork(network)
         # A person who comes back is the same one, so the hidden state is never reset.
-        self._hidden = network.initial_hidden(2)
+        self._hidden = self._network.initial_hidden()
         self._deviations = load_network(DATA_OF_DEVIATIONS)
         self.features = self.result_features = np.empty((2, 0))
         self._log_odds: FloatArray = np.empty(0)
@@ -196,19 +208,15 @@ class NetworkCorrector:
 def inputs_of(found: Result, cost: WholeBodyCost, camera: Camera) -> FloatArray:
     """Return the inputs of the network (2, F) for the left arm and the mirrored right arm."""
     frame, keypoints_m = found.frame, found.keypoints_m
-    interval = np.full((2, 1), np.log2(max(frame.interval_s, _LEAST_S) / USUAL_INTERVAL_S))
-    return np.concatenate(
-        [
-            features_of_result(found),
-            features_of_search(found.search, cost, keypoints_m),
-            features_of_depth(frame, camera, keypoints_m)
-            if found.viewpoints.has_depth
-            else _NO_DEPTH,
-            features_of_points(frame.points, camera, keypoints_m),
-            interval,
-        ],
-        axis=1,
-    )
+    inputs = np.zeros((2, N_FEATURES))
+    inputs[:, :FEATURES] = features_of_result(found)
+    inputs[:, _OF_SEARCH] = features_of_search(found.search, cost, keypoints_m)
+    if found.viewpoints.has_depth:
+        inputs[:, OF_DEPTH] = features_of_depth(frame, camera, keypoints_m)
+    if frame.points is not None:
+        inputs[:, OF_POINTS] = features_of_points(frame.points, camera, keypoints_m)
+    inputs[:, -1] = log2(max(frame.interval_s, _LEAST_S) / USUAL_INTERVAL_S)
+    return inputs
 
 
 def features_of_result(result: Result) -> FloatArray:

@@ -9,9 +9,12 @@ errors of the recordings are below two deviations.
 
 from __future__ import annotations
 
+from math import exp
+
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.filtering.networks import Network
 
 DATA = "deviations.npz"
@@ -30,7 +33,24 @@ def deviations_of(network: Network, features: FloatArray) -> FloatArray:
         features: (n, 2, F), see :func:`~.result_features.features_of`.
     """
     logarithms = network(features.reshape(-1, features.shape[2]))
-    stddevs = np.clip(np.exp(logarithms), *_LIMITS_RAD)
-    both = stddevs.reshape(-1, 2, stddevs.shape[1])
-    torso = both[:, :, :TORSO].mean(axis=1)
-    return np.hstack([torso, both[:, 0, TORSO:], both[:, 1, TORSO:]])
+    of_arm = logarithms.shape[1] - TORSO
+    deviations_rad = np.empty((len(features), TORSO + 2 * of_arm))
+    _join(logarithms, deviations_rad)
+    return deviations_rad
+
+
+@kernel
+def _join(logarithms: FloatArray, deviations_rad: FloatArray) -> None:
+    """Write the deviations of torso, left and right arm from the answers (2 n, A) for both arms."""
+    low_rad, high_rad = _LIMITS_RAD
+    of_arm = logarithms.shape[1] - TORSO
+    for n in range(deviations_rad.shape[0]):
+        row = deviations_rad[n]
+        row[:] = 0.0
+        for arm in range(2):
+            for i in range(logarithms.shape[1]):
+                one_rad = min(max(exp(logarithms[2 * n + arm, i]), low_rad), high_rad)
+                if i < TORSO:
+                    row[i] += 0.5 * one_rad
+                else:
+                    row[i + of_arm * arm] = one_rad

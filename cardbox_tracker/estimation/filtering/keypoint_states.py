@@ -87,7 +87,7 @@ def _beyond(deviation_m: float) -> float:
 
 def are_sure(chances: FloatArray) -> bool:
     """Return whether no keypoint is uncertain by its probability of being wrong, (n,)."""
-    return bool((chances <= UNCERTAIN_FROM).all())
+    return all(chance <= UNCERTAIN_FROM for chance in chances.tolist())
 
 
 def states_of(

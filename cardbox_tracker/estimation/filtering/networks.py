@@ -50,11 +50,10 @@ class Network(NamedTuple):
 
     def __call__(self, features: FloatArray) -> FloatArray:
         """Return the answers, (n, A), to features (n, F)."""
-        scaled = scaled_features(features, self.mean, self.scale, self.most)
         answers = np.zeros((len(features), len(self.unit)))
+        scaling = self.mean, self.scale, self.most
         # For two rows, compiled code is faster than calls of numpy.
-        _add_answers(scaled, self.weights, self.biases, answers)
-        answers *= self.unit / len(self.weights[0])
+        _add_answers(features, scaling, self.weights, self.biases, self.unit, answers)
         return answers
 
 
@@ -121,14 +120,20 @@ class RecurrentNetwork(NamedTuple):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_answers(
     features: FloatArray,
+    scaling: tuple[FloatArray, FloatArray, float],
     weights: tuple[FloatArray, ...],
     biases: tuple[FloatArray, ...],
+    unit: FloatArray,
     answers: FloatArray,
 ) -> None:
-    """Add the answers (n, A) of all networks of a :class:`Network`, without the unit."""
-    for network in range(weights[0].shape[0]):
-        for row in range(features.shape[0]):
-            values = features[row]
+    """Add the mean answers (n, A) of all networks of a :class:`Network`."""
+    mean, scale, most = scaling
+    scaled, networks = np.empty(features.shape[1]), weights[0].shape[0]
+    for row in range(features.shape[0]):
+        for i in range(features.shape[1]):
+            scaled[i] = min(max((features[row, i] - mean[i]) / scale[i], -most), most)
+        for network in range(networks):
+            values = scaled
             for number in range(len(weights)):
                 inputs, outputs = weights[number].shape[1:]
                 sums = biases[number][network, 0].copy()
@@ -140,7 +145,7 @@ def _add_answers(
                         sums[o] += value * weights[number][network, i, o]
                 values = sums
             for o in range(answers.shape[1]):
-                answers[row, o] += values[o]
+                answers[row, o] += values[o] * (unit[o] / networks)
 
 
 def scaled_features(

@@ -102,7 +102,7 @@ class OutlineFit:
             steps: number of Gauss-Newton steps; with 0 the fit returns the state unchanged.
             others: costs of the further cameras, and their views of the body.
         """
-        self._limits = cost.limits
+        self._low, self._high = cost.limits.T.copy()
         self._steps, self.seeing = steps, tuple(range(1 + len(others)))
         self._lenses = [_Lens(cost, camera, np.eye(N_STATE), np.zeros(N_STATE))]
         self._lenses += [_Lens(there, v.camera, v.turned, v.moved) for there, v in others]
@@ -124,7 +124,10 @@ class OutlineFit:
         correction = self.fitted(frames, state, self._steps) - state
         before = correction if self._correction is None else self._correction
         self._correction = _KEPT * before + (1.0 - _KEPT) * correction
-        return np.clip(state + self._correction, *self._limits.T)
+        clipped: FloatArray = np.minimum(
+            np.maximum(state + self._correction, self._low), self._high
+        )
+        return clipped
 
     def different(
         self,
@@ -175,7 +178,7 @@ def signed_distances(
         The first column and row of the window around the foreground above ``end_row``, and the
         distances there, px; empty without foreground, or with a single row above ``end_row``.
     """
-    rows = silhouette[: int(np.clip(end_row + _MARGIN_PX, 0, len(silhouette)))]
+    rows = silhouette[: int(min(max(end_row + _MARGIN_PX, 0), len(silhouette)))]
     # The interpolation between pixels needs two rows.
     if len(rows) < 2:
         return 0, 0, np.zeros((0, 0), np.float32)

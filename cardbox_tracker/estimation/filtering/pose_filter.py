@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -68,8 +69,9 @@ class Fit:
     def is_finite(self) -> bool:
         """Whether all values are finite."""
         values = (self.posture, self.posture_stddev, self.keypoints_m, self.iou)
+        # A sum of squares is only finite if all summands are.
         return all(
-            value is None or bool(np.isfinite(value).all())
+            value is None or isfinite(np.vdot(value, value))
             for value in (*values, self.offset_m, self.offset_stddev_m, self.keypoint_chances)
         )
 

@@ -82,6 +82,8 @@ def choose_apart(
                 squares = 0.0
                 for c in range(16):
                     squares += (features[j, c] - one[c]) ** 2
+                    if squares >= apart_m * apart_m:
+                        break
                 if squares < apart_m * apart_m:
                     is_new = False
                     break

@@ -185,7 +185,7 @@ class WholeBodyFilter:
         left, right = (self._arm(by_rating, arm, draws) for arm in (0, 1))
         pairs = joint_moves.combine(best, *left, *right, config.paired_arms)
         states = np.concatenate([pool, pairs])
-        ratings = np.concatenate([ratings, cost.bodies(pairs)[0]])
+        ratings = np.concatenate([ratings, cost.pairs(pairs)])
         self._together(frames, states, ratings, draws)
 
     def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
@@ -260,17 +260,17 @@ class WholeBodyFilter:
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
-        _, (mean_differs_px,), (mean_px,) = cost.bodies(mean[None])
+        both = np.array([mean, fitted])
+        _, (mean_differs_px, differs_px), (mean_px, drawn_px) = cost.bodies(both)
         is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
-        _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
+            _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
         fit_iou = iou_of(total, drawn_px, differs_px)
         found = (mean, stddev), (mean_differs_px, mean_px), self._arm.spreads_m
         evidence = evidence_in(cost, rated, *found, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
-        search = Search(*rated, config.spread, evidence, self._chance)
-        seen = frame, fitted, spread, fit_iou, search
+        seen = frame, fitted, spread, fit_iou, Search(*rated, config.spread, evidence, self._chance)
         result = fitted if is_by_points else self.refine.corrected(*seen)
         _, (cost_px,), (area_px,) = cost.bodies(result[None])
         iou = iou_of(total, area_px, cost_px)

@@ -40,8 +40,9 @@ def directions(arms: np.ndarray) -> np.ndarray:
 
 
 def nats(arms: np.ndarray, floor_nats: float = FLOOR_NATS) -> np.ndarray:
-    rest, away = np.exp(-floor_nats), np.empty(6)
-    return np.array([nats_of(one, load_gmm(), rest, away) for one in directions(arms)])
+    gaussians = np.ascontiguousarray(load_gmm().T)
+    rest, logs = np.exp(-floor_nats), np.empty(gaussians.shape[1])
+    return np.array([nats_of(one, gaussians, rest, logs) for one in directions(arms)])
 
 
 def test_the_kernel_is_the_definition() -> None:

@@ -48,6 +48,7 @@ BODY = somebody(shoulder_breadth=0.36, upper_arm_length=0.3)
 CONFIG = WholeBodyCostConfig()
 STIFF = replace(CONFIG, lift_gain=0.0)
 LIMITS = np.vstack([JOINT_LIMITS, [[-0.9, 0.9], [-0.3, 0.3]]])
+GAUSSIANS = np.ascontiguousarray(load_gmm().T)
 ARM_LIMITS = np.ascontiguousarray(LIMITS[4:8])
 
 
@@ -176,6 +177,18 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     assert both == pytest.approx(share)
 
 
+@given(st.integers(0, 10_000))
+@settings(max_examples=25, deadline=None)
+def test_pairs_of_arms_beside_a_trunk_are_rated_as_whole_bodies(seed: int) -> None:
+    of = cost()
+    rng = np.random.default_rng(seed)
+    of.see(rng.integers(0, 2, (120, 160)).astype(np.uint8) * 255, state())
+    states = random_states(6, seed)
+    states[:, [0, 1, 2, 3, 12, 13]] = states[0, [0, 1, 2, 3, 12, 13]]
+    of.fix_torso(states[0])
+    np.testing.assert_array_equal(of.pairs(states), of.bodies(states)[0])
+
+
 def test_the_torsos_prior_by_hand() -> None:
     of = cost()
     of.see(np.full((120, 160), 255, np.uint8), state())
@@ -220,7 +233,8 @@ def test_an_arms_prior_is_the_learned_one_and_what_is_inside_the_body() -> None:
         arm = forward_kinematics(BODY, one[:12]).left
         limbs = [arm.elbow - arm.shoulder, arm.hand - arm.elbow]
         directions = np.concatenate([limb / np.linalg.norm(limb) for limb in limbs])
-        return float(nats_of(directions, load_gmm(), np.exp(-FLOOR_NATS), np.empty(6)))
+        logs = np.empty(GAUSSIANS.shape[1])
+        return float(nats_of(directions, GAUSSIANS, np.exp(-FLOOR_NATS), logs))
 
     assert of_left(free) == pytest.approx(learned(free))
     assert of_left(inside) > learned(inside) + 0.5

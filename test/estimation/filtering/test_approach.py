@@ -94,11 +94,14 @@ def test_what_can_be_tracked(x_m: float, y_m: float, is_enough: bool) -> None:
     assert is_trackable(made(), state) is is_enough
 
 
+WIDE = np.tile([-20.0, 20.0], (14, 1))
+
+
 @given(st.floats(0.5, 10.0), st.floats(-1.0, 1.0))
 def test_another_distance_keeps_the_column_of_the_image(there_m: float, y_m: float) -> None:
     state = np.append(FRONT, [0.0, 0.0])
     state[0] = y_m
-    (moved,) = at_distances(state, np.array([there_m]), 2.0)
+    (moved,) = at_distances(state, np.array([there_m]), 2.0, WIDE)
     assert 2.0 - moved[12] == pytest.approx(there_m)
     assert moved[0] / there_m == pytest.approx(y_m / 2.0)
     np.testing.assert_array_equal(moved[1:12], state[1:12])

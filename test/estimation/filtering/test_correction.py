@@ -27,7 +27,8 @@ from cardbox_tracker.estimation.filtering.correction import (
 )
 from cardbox_tracker.estimation.filtering.corrector import Result
 from cardbox_tracker.estimation.filtering.loss import Evidence
-from cardbox_tracker.estimation.filtering.networks import RecurrentNetwork, load_recurrent_network
+from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
+from cardbox_tracker.estimation.filtering.packed_network import PackedNetwork
 from cardbox_tracker.estimation.filtering.posing import SmoothedPosing
 from cardbox_tracker.estimation.filtering.result_features import Viewpoints
 from cardbox_tracker.estimation.filtering.search_features import Search
@@ -84,7 +85,7 @@ def test_joints_and_turns_are_steadied(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(_: object, features: np.ndarray, hidden: object) -> tuple[object, ...]:
         return np.zeros((2, N_ANSWERS)), np.zeros((2, N_ANSWERS)), hidden
 
-    monkeypatch.setattr(RecurrentNetwork, "__call__", nothing)
+    monkeypatch.setattr(PackedNetwork, "__call__", nothing)
     later = FRONT.copy()
     later[[0, 1, 4]] += 0.2, 0.1, 0.3
     frame = replace(NOBODY, interval_s=0.05)
@@ -180,7 +181,7 @@ def test_a_correction_that_leaves_the_silhouette_is_not_made() -> None:
     points = cost.keypoints(FRONT)
     found = Result(NOBODY, FRONT, STDDEV, points, iou, search(FRONT), VIEWPOINTS)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RecurrentNetwork, "__call__", far)
+        patch.setattr(PackedNetwork, "__call__", far)
         corrector = NetworkCorrector(cost, CAMERA, network)
         assert np.array_equal(corrector(found), points)
         # Without a fit there is nothing to lose.
@@ -203,7 +204,7 @@ def test_the_chance_of_error_is_that_of_the_log_odds(monkeypatch: pytest.MonkeyP
         answers[0, 9:], answers[1, 9:] = np.log([1 / 9, 1.0, 3.0]), np.log([4.0, 99.0, 1 / 99])
         return answers, np.zeros((2, N_ANSWERS)), hidden
 
-    monkeypatch.setattr(RecurrentNetwork, "__call__", said)
+    monkeypatch.setattr(PackedNetwork, "__call__", said)
     corrector = learned(COST, CAMERA, 1)
     points = COST.keypoints(FRONT)
     found = Result(NOBODY, FRONT, STDDEV, points, NO_IOU, search(FRONT), VIEWPOINTS)
