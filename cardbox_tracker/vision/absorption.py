@@ -61,17 +61,20 @@ class StillRegions:
             Every fifteenth time, a mask (H, W) of the objects that stay; None in between.
 
         Raises:
-            ValueError: the images are of another type or layout, or differ in shape.
+            ValueError: the images are of another type or layout, differ in shape, or have no
+                pixels.
         """
         check_array("brightness", brightness, (ANY, ANY))
         check_array("silhouette", silhouette, brightness.shape)
+        if not brightness.size:
+            raise ValueError(f"brightness has the shape {brightness.shape}; expected pixels")
         height, width = brightness.shape
         size = max(width // _SCALE, 1), max(height // _SCALE, 1)
         if self._count == 0:
             self._sum = np.zeros(size[::-1], np.uint16)
             self._seen = np.zeros(size[::-1], np.uint8)
         check_array("sum of the images before it", self._sum, size[::-1], np.uint16)
-        if height % _SCALE or width % _SCALE:
+        if (height, width) != (_SCALE * size[1], _SCALE * size[0]):
             seen = cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA)
             small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA)
             self._sum += np.asarray(small, np.uint8).reshape(self._sum.shape)

@@ -133,7 +133,7 @@ class ChromaScore:
         """
         half = self._background.shape[1:]
         check_array("colors", colors, (3, *half))
-        if half != (max(size[0] // 2, 1), max(size[1] // 2, 1)):
+        if min(size) < 1 or half != (max(size[0] // 2, 1), max(size[1] // 2, 1)):
             raise ValueError(f"an image of {size} px does not have colours of {half} px")
         if window is None:
             if self._shares.size:

@@ -51,10 +51,12 @@ class ColorReader:
         """Replace brightness and colours by those of a bgr image (H, W, 3).
 
         Raises:
-            ValueError: the image has another size or type.
+            ValueError: the image has another size or type, or no pixels.
         """
         height, width = self.brightness.shape
         check_array("image", image, (height, width, 3))
+        if not image.size:
+            raise ValueError(f"image has the shape {image.shape}; expected pixels")
         if self._is_even:
             _read(image.reshape(height, 3 * width), self._rows, self.brightness, self.colors)
         else:
