@@ -9,11 +9,14 @@ region that a person touches in the image stays foreground.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.vision.scene_motion import changed_pixels
 
@@ -46,7 +49,7 @@ class StillRegions:
         """Start without images; a region that stays still for ``images`` images is an object."""
         self._blocks = max(2, -(-images // _BLOCK))
         self._count = 0
-        self._sum = np.zeros((0, 0), np.float32)
+        self._sum = np.zeros((0, 0), np.uint16)
         self._seen = np.zeros((0, 0), np.uint8)
         self._before: FloatImage | None = None
         self._still = np.zeros((0, 0), np.int32)
@@ -56,20 +59,33 @@ class StillRegions:
 
         Returns:
             Every fifteenth time, a mask (H, W) of the objects that stay; None in between.
+
+        Raises:
+            ValueError: the images are of another type or layout, differ in shape, or have no
+                pixels.
         """
+        check_array("brightness", brightness, (ANY, ANY))
+        check_array("silhouette", silhouette, brightness.shape)
+        if not brightness.size:
+            raise ValueError(f"brightness has the shape {brightness.shape}; expected pixels")
         height, width = brightness.shape
         size = max(width // _SCALE, 1), max(height // _SCALE, 1)
-        seen = cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA)
         if self._count == 0:
-            self._sum = np.zeros(size[::-1], np.float32)
+            self._sum = np.zeros(size[::-1], np.uint16)
             self._seen = np.zeros(size[::-1], np.uint8)
-        cv2.accumulate(cv2.resize(brightness, size, interpolation=cv2.INTER_AREA), self._sum)
-        cv2.bitwise_or(self._seen, seen, dst=self._seen)
+        check_array("sum of the images before it", self._sum, size[::-1], np.uint16)
+        if (height, width) != (_SCALE * size[1], _SCALE * size[0]):
+            seen = cv2.resize(silhouette, size, interpolation=cv2.INTER_AREA)
+            small = cv2.resize(brightness, size, interpolation=cv2.INTER_AREA)
+            self._sum += np.asarray(small, np.uint8).reshape(self._sum.shape)
+            self._seen |= np.asarray(seen, np.uint8).reshape(self._seen.shape)
+        else:
+            _add_halved(brightness, silhouette, self._sum, self._seen)
         self._count += 1
         if self._count < _BLOCK:
             return None
         self._count = 0
-        now = self._sum / np.float32(_BLOCK * max(level, _LEAST_LEVEL))
+        now = self._sum.astype(np.float32) / np.float32(_BLOCK * max(level, _LEAST_LEVEL))
         now = np.asarray(cv2.GaussianBlur(now, (0, 0), _SMOOTHING_PX), np.float32)
         if self._before is None:
             self._before, self._still = now, np.ones(now.shape, np.int32)
@@ -77,8 +93,12 @@ class StillRegions:
             changed = changed_pixels(self._before, now, _TIMES_NOISE)
             self._still = np.where(changed, 1, self._still + 1)
             self._before = np.where(changed, now, self._before)
-        things = self._things().astype(np.uint8)
-        whole = cv2.resize(things, (width, height), interpolation=cv2.INTER_NEAREST)
+        things = self._things()
+        if not things.any():
+            return np.zeros((height, width), np.bool_)
+        whole = cv2.resize(
+            things.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST
+        )
         return np.asarray(whole > 0, np.bool_)
 
     def _things(self) -> Mask:
@@ -175,3 +195,26 @@ class Absorber:
 def _disk(radius_px: int) -> ImageArray:
     size = 2 * radius_px + 1
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+
+@kernel
+def _add_halved(brightness: Any, silhouette: Any, total: Any, seen: Any) -> None:
+    """Add the rounded means of squares of 2x2 px, and mark the squares with a person.
+
+    Args:
+        brightness: (2 h, 2 w).
+        silhouette: (2 h, 2 w).
+        total: sum of the means, (h, w) uint16.
+        seen: not 0 in squares with a person, (h, w).
+    """
+    height, width = total.shape
+    for v in range(height):
+        above, below, out = brightness[2 * v], brightness[2 * v + 1], total[v]
+        for u in range(width):
+            one, other = np.int32(above[2 * u]), np.int32(above[2 * u + 1])
+            square = np.int32(one + other + np.int32(below[2 * u]) + np.int32(below[2 * u + 1]))
+            out[u] += np.uint16(np.int32(square + 2) >> np.int32(2))
+        above, below, marks = silhouette[2 * v], silhouette[2 * v + 1], seen[v]
+        for u in range(width):
+            one, other = above[2 * u] | above[2 * u + 1], below[2 * u] | below[2 * u + 1]
+            marks[u] |= one | other

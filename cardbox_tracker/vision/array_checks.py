@@ -31,12 +31,26 @@ def check_array(
         ValueError: it is no array, its shape or type is another one, or its elements do not follow
             each other in memory, for which numba would compile another version.
     """
+    if isinstance(array, np.ndarray) and array.dtype == kind:
+        # The common case is kept short, since several arrays of each image are checked.
+        flags = array.flags
+        is_sound = flags.c_contiguous and flags.aligned and (flags.writeable or not is_written)
+        if is_sound and (array.shape == shape or _fits(array.shape, shape)):
+            return
+    _refuse(name, array, shape, kind)
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int, ...]) -> bool:
+    return len(found) == len(shape) and all(
+        length in (one, ANY) for length, one in zip(shape, found, strict=True)
+    )
+
+
+def _refuse(name: str, array: object, shape: tuple[int, ...], kind: type[np.generic]) -> None:
+    """Raise the error that names the fault of an array."""
     if not isinstance(array, np.ndarray):
         raise ValueError(f"{name} is of the type {type(array).__name__}; expected an array")
-    fits = array.ndim == len(shape) and all(
-        length in (found, ANY) for length, found in zip(shape, array.shape, strict=True)
-    )
-    if not fits or array.dtype != kind:
+    if not _fits(array.shape, shape) or array.dtype != kind:
         expected = ", ".join("any" if length == ANY else str(length) for length in shape)
         raise ValueError(
             f"{name} has the shape {array.shape} and the type {array.dtype}; expected ({expected}) "
@@ -44,5 +58,4 @@ def check_array(
         )
     if not (array.flags.c_contiguous and array.flags.aligned):
         raise ValueError(f"{name} is not contiguous; give np.ascontiguousarray({name})")
-    if is_written and not array.flags.writeable:
-        raise ValueError(f"{name} is read-only; give a copy")
+    raise ValueError(f"{name} is read-only; give a copy")

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.vision.absorption import Absorber
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.chroma import ChromaScore
+from cardbox_tracker.vision.color_reader import ColorReader
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel, brightness_of
 from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.given_arrays import image_from
@@ -67,6 +68,7 @@ class SilhouetteExtractor:
         self._absorber = Absorber(config.absorb_after) if config.absorb_after else None
         # Window of the last silhouette, and number of images compared by colour.
         self._last, self._images = Window(0, 0, 0, 0), 0
+        self._colors = ColorReader(model.mean.shape)
         # Scratch memory is allocated once, since allocation takes longer than the arithmetic.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
@@ -125,11 +127,14 @@ class SilhouetteExtractor:
                 impossible.
         """
         image = image_from(image)
-        brightness = brightness_of(image)
-        if brightness.shape != self.model.mean.shape:
+        if image.shape[:2] != self.model.mean.shape:
             raise ValueError(
-                f"image has shape {brightness.shape}, the background {self.model.mean.shape}"
+                f"image has shape {image.shape[:2]}, the background {self.model.mean.shape}"
             )
+        has_color = self._chroma is not None and image.ndim == 3
+        if has_color:
+            self._colors.read(image)
+        brightness = self._colors.brightness if has_color else brightness_of(image)
         config = self.config
         if not config.clean_up:
             difference = np.abs(brightness - self.model.mean)
@@ -150,10 +155,11 @@ class SilhouetteExtractor:
             cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
         foreground = segment_foreground(signed, self._brighter, self._darker, config.edge, score)
         window = window_of(foreground)
-        colored = None
+        colored, is_whole = None, False
         if self._chroma is not None and image.ndim == 3:
             window, looked_at = self._colored_window(window, foreground.shape)
-            colored = self._chroma(image, looked_at)
+            is_whole = looked_at is None
+            colored = self._chroma(self._colors.colors, self.model.mean.shape, looked_at)
         else:
             window = window.grown(_MARGIN_PX, foreground.shape)
         if config.soft_shadow > 0:
@@ -167,7 +173,9 @@ class SilhouetteExtractor:
                 window,
             )
         elif colored is not None:
-            foreground[window.slices][colored >= 0] = 255
+            foreground[window.slices] |= colored
+        if is_whole:
+            window = window_of(foreground).grown(_MARGIN_PX, foreground.shape)
         silhouette = clean_silhouette(foreground, config.min_area, config.max_hole, window)
         self._last = window_of(silhouette)
         if self._light is not None:
@@ -186,11 +194,10 @@ class SilhouetteExtractor:
         """
         number, self._images = self._images, self._images + 1
         is_settling = self._light is not None and self._light.is_settling
-        everywhere = Window(0, shape[0], 0, shape[1])
         near = window.joined(self._last).grown(_COLOR_MARGIN_PX, shape)
-        is_odd = any(length % 2 for length in shape)
+        is_odd = shape[0] % 2 or shape[1] % 2
         if number % _WHOLE_EVERY == 0 or is_settling or is_odd or near.is_empty:
-            return everywhere, None
+            return Window(0, shape[0], 0, shape[1]), None
         return near, near
 
     def restart(self) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.vision.array_checks import ANY, check_array
-from cardbox_tracker.vision.chroma import ChromaModel, chroma_planes, half_size
+from cardbox_tracker.vision.chroma import ChromaModel, chroma_planes
+from cardbox_tracker.vision.color_reader import half_size
 from cardbox_tracker.vision.given_arrays import image_from
 
 FloatImage = NDArray[np.float32]

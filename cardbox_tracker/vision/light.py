@@ -15,16 +15,26 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.chroma import bgr_of
-from cardbox_tracker.vision.light_samples import CUT_OFF, collect_ratios, limit_channels, sum_cells
+from cardbox_tracker.vision.light_field import multiply_field, update_field
+from cardbox_tracker.vision.light_outlines import average_blocks, find_smooth, grow_person
+from cardbox_tracker.vision.light_samples import (
+    BLOCK,
+    CUT_OFF,
+    STEP_PX,
+    limit_channels,
+    measure_level,
+    sum_cells,
+    take_samples,
+)
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 
-# The light is estimated from every fourth pixel of every fourth row.
-_GRID = (slice(1, None, 4), slice(1, None, 4))
-# Cells of the coarse field, and the standard deviation of its smoothing, cells.
+_GRID = (slice(1, None, STEP_PX), slice(1, None, STEP_PX))
+# Columns and rows of the cells of the coarse field, and the Gaussian that smooths them, with a
+# standard deviation of two cells.
 _CELLS = (20, 15)
-_SMOOTHING_CELLS = 2.0
+_GAUSSIAN = cv2.getGaussianKernel(17, 2.0, cv2.CV_32F)
 # Darker pixels carry no information about the light, grey levels.
 _DARKEST = 10.0
 # A field within this of 1 is ignored.
@@ -32,10 +42,13 @@ _SAME = 0.004
 # Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
 _GREY = np.ones(1, np.float32)
-# The field is estimated in every third image, and in every one after a step; the level always.
-_EVERY = 3
-# Share of the new estimate in the field, an exponential moving average.
-_RATE = 1.0 - 0.9**_EVERY
+# The field is estimated in the first image, in every sixth one, which has an odd number and so is
+# none that is compared by colour everywhere, and after a step; the level always.
+_EVERY, _PHASE = 6, 3
+# Foreground that light has caused is searched in every third image.
+_SEARCH_EVERY = 3
+# Share that an estimate keeps from image to image in the field, an exponential moving average.
+_KEPT = 0.9
 # Pixels whose brightness differs from the expected one by more are not background.
 _TOLERANCE, _TOLERANCE_AFTER_STEP = 0.1, 0.4
 # A larger change of the level between two images is a step of the light: a lamp, a gain.
@@ -44,17 +57,12 @@ _STEP = 0.04
 _SETTLING = 8
 # Smallest share of pixels that must be background.
 _ENOUGH = 0.15
-# Weight of the assumption of no change, as a share of a cell's pixels.
-_DOUBT = 0.02
 _LEAST = 1e-3
 _KERNEL = np.ones((5, 5), np.uint8)
 # More foreground than a person covers: the light has changed, not the scene.
 _COVERAGE = 0.5
-# Light varies by less than this fraction within 12 px; an outline does not.
-_SOFT = 0.06
 # With more foreground than this caused by light, the field is estimated as after a step.
 _LIT = 0.01
-_AROUND = np.ones((3, 3), np.uint8)
 
 
 class LightFollower:
@@ -84,8 +92,14 @@ class LightFollower:
                 "from larger images"
             )
         self._prepare(mean, chroma)
-        self._ratios = np.empty(self._size[0] * self._size[1], np.float32)
-        self._cells = np.zeros((2, *_CELLS[::-1]), np.float32)
+        count = self._size[0] * self._size[1]
+        self._ratios = np.empty(count + 2, np.float32)
+        self._ratio_bits = self._ratios.view(np.int32)
+        self._samples = np.empty(self._size[::-1], np.uint8)
+        self._flat_samples = self._samples.ravel()
+        self._means = np.empty(self._size[::-1], np.float32)
+        self._smooth = np.zeros(self._size[::-1], np.bool_)
+        self._cells = np.zeros((*_CELLS[::-1], 2), np.float32)
         self.restart()
 
     def replace(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
@@ -116,13 +130,17 @@ class LightFollower:
         self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
             np.float32
         )
+        self._flat_small, self._flat_brightest = self._small.ravel(), self._small_brightest.ravel()
         self._highest = float(self._brightest.max())
+        starts = np.arange(0, mean.size, BLOCK)
+        self._highest_of_blocks = np.maximum.reduceat(self._brightest, starts)
 
     def restart(self) -> None:
         """Forget the light and the person, since the next image may be from any other time."""
         self.level = 1.0
         self._field = np.ones(_CELLS[::-1], np.float32)
         self._base = np.ones_like(self._field)
+        self._base_fine = self._fine_of(self._base)
         self._fine = np.ones(self._size[::-1], np.float32)
         self._person = np.zeros(self._size[::-1], np.uint8)
         self._settling, self._is_lit = 0, False
@@ -131,7 +149,9 @@ class LightFollower:
         self._lit = np.zeros(self._size[::-1], np.bool_)
         self._brightness = np.zeros(self._mean.shape, np.uint8)
         self._started = False
-        self._images = 0
+        # The first estimate counts as one after three images.
+        self._images, self._estimated = 0, -_PHASE
+        self._extremes = 1.0, 1.0
         self._relative, self._highest_field = self._mean, 1.0
 
     def expect_step(self) -> None:
@@ -162,58 +182,69 @@ class LightFollower:
     def _cut_off(self) -> None:
         """Compute the expected brightness, limited to the range of the camera's channels."""
         limit = np.float32(CUT_OFF / (self.level * self._highest_field))
-        light = self._relative.ravel(), np.float32(self.level), limit
-        parts = self._mean.ravel(), self._channels, self._brightest
         weights = _WEIGHTS if len(self._channels) == 3 else _GREY
-        limit_channels(light, *parts, weights, self._now.ravel())
+        limit_channels(
+            *(self._relative.ravel(), np.float32(self.level), limit, self._mean.ravel()),
+            *(self._channels, self._brightest, self._highest_of_blocks, weights),
+            self._now.ravel(),
+        )
 
     def _estimate(self, brightness: ImageArray) -> None:
-        small = np.ascontiguousarray(brightness[_GRID])
         self._brightness = brightness
-        parts = small, self._small, self._small_brightest
-        ratios = self._ratios
-        count = collect_ratios(*parts, self._fine, self._person, ratios)
-        if count < _ENOUGH * ratios.size:
-            count = collect_ratios(*parts, self._fine, np.zeros_like(self._person), ratios)
-        if count == 0:
+        take_samples(brightness, self._samples)
+        measured = measure_level(
+            *(self._flat_samples, self._flat_small, self._flat_brightest, self._fine.ravel()),
+            *(self._person.ravel(), self._ratios, self._ratio_bits, np.float32(self.level)),
+            _ENOUGH,
+        )
+        if not measured >= 0.0:
             return
-        level = max(float(np.partition(ratios[:count], count // 2)[count // 2]), _LEAST)
+        level = max(float(measured), _LEAST)
         if self._started and abs(level / self.level - 1.0) > _STEP:
             if self._settling == 0:
                 self._base = np.ones_like(self._field)
+                self._base_fine = self._fine_of(self._base)
             self._settling = _SETTLING
         self._started = True
         self.level = level
         number, self._images = self._images, self._images + 1
-        if number % _EVERY and self._settling == 0 and not self._is_lit:
+        is_due = number == 0 or number % _EVERY == _PHASE
+        if not (is_due or self._settling > 0 or self._is_lit):
             return
-        person, rate, tolerance, around = self._person, _RATE, _TOLERANCE, self._fine
+        elapsed, self._estimated = number - self._estimated, number
+        rate = 1.0 - _KEPT**elapsed
+        person, tolerance, around = self._person, _TOLERANCE, self._fine
         if self._settling > 0:
             # The person may have moved since.
             known = person if self._passing is None else person | self._passing
             person = cv2.dilate(known, _KERNEL).reshape(person.shape)
         if self._settling > 0 or self._is_lit:
             rate, tolerance = 1.0, _TOLERANCE_AFTER_STEP
-        base = cv2.resize(self._base, self._size)
-        sum_cells(parts, around, base, person, level, tolerance, self._cells)
-        change, weight = (cv2.GaussianBlur(c, (0, 0), _SMOOTHING_CELLS) for c in self._cells)
-        # Cells without known pixels do not change.
-        goal = self._base * (1.0 + change / (weight + _DOUBT))
-        self._field += np.float32(rate) * (goal - self._field)
+        sum_cells(
+            *(self._samples, self._small, self._small_brightest, around, self._base_fine),
+            *(person, level, tolerance, self._cells),
+        )
+        cells = cv2.sepFilter2D(self._cells, -1, _GAUSSIAN, _GAUSSIAN)
+        self._extremes = update_field(cells, self._base, np.float32(rate), self._field)
         if self._is_lit:
             # The next estimate is relative to this one and adds the remainder of the smoothing.
             self._base = self._field.copy()
-        self._fine = cv2.resize(self._field, self._size).reshape(small.shape)
+            self._base_fine = self._fine_of(self._base)
+        self._fine = self._fine_of(self._field)
         self._spread()
+
+    def _fine_of(self, field: FloatImage) -> FloatImage:
+        """Return a field at the resolution of the samples, (h, w)."""
+        shape = self._size[1], self._size[0]
+        return np.asarray(cv2.resize(field, self._size), np.float32).reshape(shape)
 
     def _spread(self) -> None:
         """Multiply the background by the field."""
-        self._highest_field = float(self._field.max())
-        if self._highest_field < 1.0 + _SAME and float(self._field.min()) > 1.0 - _SAME:
+        lowest, self._highest_field = (float(extreme) for extreme in self._extremes)
+        if self._highest_field < 1.0 + _SAME and lowest > 1.0 - _SAME:
             self._relative = self._mean
         else:
-            field = cv2.resize(self._field, self._mean.shape[::-1])
-            cv2.multiply(self._mean, field, dst=self._scaled)
+            multiply_field(self._mean, self._field, self._scaled)
             self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray) -> None:
@@ -222,35 +253,29 @@ class LightFollower:
         if cv2.countNonZero(silhouette) > _COVERAGE * silhouette.size:
             self._settling = _SETTLING - 1
             return
-        person = np.ascontiguousarray(silhouette[_GRID])
-        # Smooth foreground is searched as often as the field is estimated, before it.
-        if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
-            smooth, brighter = self._smooth_from_background(person)
+        person = np.empty(self._size[::-1], np.uint8)
+        take_samples(silhouette, person)
+        if self._settling > 0 or self._is_lit or self._images % _SEARCH_EVERY == 0:
             # Darker pixels may be the person's shadow, which moves with the person.
-            self._lit = smooth & brighter
-            self._is_lit = bool(np.count_nonzero(self._lit) > _LIT * smooth.size)
+            count = self._find_smooth(person)
+            self._is_lit = count > _LIT * person.size
         if self._settling > 0:
             self._settling -= 1
-            person[smooth] = 0
+            person[self._smooth] = 0
             self._passing = person
             return
-        person[self._lit] = 0
+        grow_person(person, self._lit, self._person)
         self._passing = None
-        self._person = cv2.dilate(person, _KERNEL).reshape(person.shape)
 
-    def _smooth_from_background(
-        self, person: ImageArray
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return masks (h, w) of foreground without an outline and of its brighter part.
-
-        Args:
-            person: foreground of the last image, (h, w), not 0 where set.
-        """
-        relative = cv2.resize(self._brightness, self._size, interpolation=cv2.INTER_AREA) / (
-            self._blocks * self._fine * np.float32(self.level)
-        )
-        varies = cv2.dilate(relative, _AROUND) - cv2.erode(relative, _AROUND)
-        count, labels = cv2.connectedComponents((varies < _SOFT).astype(np.uint8), connectivity=4)
-        reached = np.bincount(labels[person == 0], minlength=count) > 0
-        reached[0] = False
-        return reached[labels] & (person > 0), relative > 1.0
+    def _find_smooth(self, person: ImageArray) -> int:
+        """Find foreground (h, w) without an outline, and return the size of its brighter part."""
+        height, width = self._mean.shape
+        quads = None if height % STEP_PX or width % STEP_PX else self._brightness.view(np.uint32)
+        if quads is None or not quads.flags.aligned:
+            self._means[:] = cv2.resize(
+                self._brightness, self._size, interpolation=cv2.INTER_AREA
+            ).reshape(person.shape)
+        else:
+            average_blocks(quads, self._means)
+        parts = self._means, self._blocks, self._fine, np.float32(self.level)
+        return int(find_smooth(*parts, person, self._smooth, self._lit))

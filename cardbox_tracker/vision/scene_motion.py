@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.vision.medians import median
+
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -79,8 +81,9 @@ def changed_pixels(
 
     The level of the light and the noise are medians, since moving pixels are less than half.
     """
-    level = max(float(np.median(after / np.maximum(before, _DARKEST))), 1e-3)
+    ratios = np.asarray(after / np.maximum(before, _DARKEST), np.float32)
+    level = max(median(ratios), 1e-3)
     # Differences grow with the light.
-    difference = np.abs(after - level * before) / max(level, 1.0)
-    noise = _FROM_MEDIAN * float(np.median(difference))
+    difference = np.asarray(np.abs(after - level * before) / max(level, 1.0), np.float32)
+    noise = _FROM_MEDIAN * median(difference)
     return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)

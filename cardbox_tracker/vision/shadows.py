@@ -7,9 +7,8 @@ relative brightness changes slowly. The flood covers a shadow and stops at the o
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,21 +27,13 @@ _REACH_PX = 2
 
 # Eight pixels are processed at a time where the width is a multiple of eight.
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-_NO_COLOR = np.zeros((0, 0), np.uint8)
-
-
-class _Darkness(NamedTuple):
-    """Difference (H, W) in grey levels, and one grey level (H, W) as a fraction."""
-
-    difference: Any
-    per_level: Any
 
 
 def decide_shadows(
     foreground: ImageArray,
     difference: FloatImage,
     per_level: FloatImage,
-    colored: FloatImage | None,
+    colored: ImageArray | None,
     darkest: float,
     softest: float,
     window: Window | None = None,
@@ -55,134 +46,164 @@ def decide_shadows(
         foreground: (H, W), 0 or 255, found by brightness alone.
         difference: image minus background, (H, W), grey levels.
         per_level: one grey level as a fraction of the background, (H, W).
-        colored: >= 0 where the colour differs, of the window's size; None without colour.
+        colored: 255 where the colour differs, else 0, of the window's size; None without colour.
         darkest: largest darkness of a shadow.
         softest: largest variation of the darkness around a pixel of a shadow.
         window: a window that contains all foreground, whose columns are multiples of 8 if the
             width is one; the whole image if None.
 
     Raises:
-        ValueError: the arrays differ in shape, one is read-only, or the window is not in the image.
+        ValueError: the arrays differ in shape or type, one is read-only, or the window is not in
+            the image.
     """
     check_array("foreground", foreground, (ANY, ANY), is_written=True)
     height, width = shape = foreground.shape
     window = window or Window(0, height, 0, width)
     check_array("difference", difference, shape, np.float32, is_written=True)
     check_array("per_level", per_level, shape, np.float32, is_written=True)
+    sides = window.bottom - window.top, window.right - window.left
     if colored is not None:
-        sides = window.bottom - window.top, window.right - window.left
-        check_array("colored", colored, sides, np.float32)
+        check_array("colored", colored, sides)
     window.check_within(shape, 1 if width % 8 else 8)
-    part = foreground[window.slices]
-    by_color = _NO_COLOR
-    if colored is not None:
-        by_color = np.asarray(cv2.inRange(colored, 0.0, np.inf), np.uint8)
-    # Row and column of the candidates, and of the pixels that were flooded.
-    queues = np.empty((4, part.size), np.int32)
-    limits = np.float32(-darkest), np.float32(softest)
-    words = foreground.view(np.uint64) if foreground.shape[1] % 8 == 0 else _NO_WORDS
-    if colored is not None:
-        cv2.bitwise_or(part, by_color, dst=part)
-    darkness = _Darkness(difference, per_level)
-    _decide(foreground, words, darkness, by_color, limits, window, queues)
+    by_color = np.zeros(sides, np.uint8) if colored is None else colored
+    words = colored_words = _NO_WORDS
+    if width % 8 == 0:
+        words, colored_words = foreground.view(np.uint64), by_color.view(np.uint64)
+    # Tuples of arrays take longer to pass on than arrays.
+    _decide(
+        *(foreground, words, by_color, colored_words, difference, per_level),
+        *(np.float32(-darkest), np.float32(softest), *window),
+    )
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _is_soft(darkness: Any, v: Any, u: Any, softest: Any) -> Any:
+def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> Any:
     """Return whether the darkness varies by less than ``softest`` in the square around a pixel."""
-    difference, per_level = darkness
     height, width = difference.shape
+    reach = _REACH_PX
     low = high = difference[v, u] * per_level[v, u]
-    for y in range(max(v - _REACH_PX, 0), min(v + _REACH_PX + 1, height)):
-        for x in range(max(u - _REACH_PX, 0), min(u + _REACH_PX + 1, width)):
+    # Within the image the loops have a fixed length.
+    if reach <= v < height - reach and reach <= u < width - reach:
+        for i in range(2 * reach + 1):
+            for k in range(2 * reach + 1):
+                value = difference[v + i - reach, u + k - reach]
+                value *= per_level[v + i - reach, u + k - reach]
+                low, high = min(low, value), max(high, value)
+            if high - low >= softest:
+                return False
+        return True
+    for y in range(max(v - reach, 0), min(v + reach + 1, height)):
+        for x in range(max(u - reach, 0), min(u + reach + 1, width)):
             value = difference[y, x] * per_level[y, x]
-            low = min(low, value)
-            high = max(high, value)
-        if high - low >= softest:
-            return False
-    return True
+            low, high = min(low, value), max(high, value)
+    return high - low < softest
 
 
 @njit(cache=True, nogil=True)
 def _decide(
     foreground: Any,
     words: Any,
-    darkness: Any,
-    by_color: Any,
-    limits: Any,
-    window: Any,
-    queues: Any,
+    colored: Any,
+    colored_words: Any,
+    difference: Any,
+    per_level: Any,
+    darkest: Any,
+    softest: Any,
+    top: Any,
+    bottom: Any,
+    left: Any,
+    right: Any,
 ) -> None:
     height, width = foreground.shape
-    top, bottom, left, right = window
-    difference, per_level = darkness
-    darkest, softest = limits
-    has_color = by_color.shape[0] > 0
-    rows, columns = queues[0], queues[1]
-    queued_rows, queued_columns = queues[2], queues[3]
     dark = np.uint8(_DARK)
-    number = 0
+    # Row and first column of each eight pixels with candidates.
+    begins = np.empty(2 * (bottom - top) * ((right - left + 7) // 8), np.int32)
+    chunks = 0
     for v in range(top, bottom):
-        start = left
-        while start < right:
-            end = right
-            if words.shape[1] > 0:
-                end = start + 8
-                if words[v, start // 8] == 0:
-                    start = end
-                    continue
-            for u in range(start, end):
-                darker = difference[v, u] * per_level[v, u]
-                if foreground[v, u] > 0 and darkest < darker < 0:
-                    if has_color and by_color[v - top, u - left] > 0:
-                        continue
-                    foreground[v, u] = dark
-                    rows[number], columns[number] = v, u
-                    number += 1
-            start = end
+        row, by_color = foreground[v, left:right], colored[v - top]
+        darker, level = difference[v, left:right], per_level[v, left:right]
+        if words.shape[1] > 0:
+            seen, added = words[v, left // 8 : right // 8], colored_words[v - top]
+            unexplained = np.uint64(0)
+            for k in range(len(seen)):
+                unexplained |= seen[k] & ~added[k]
+                seen[k] |= added[k]
+            if unexplained == 0:
+                continue
+            for k in range(len(seen)):
+                # Coloured pixels are no candidates.
+                if seen[k] != added[k] and _mark(row, by_color, darker, level, darkest, 8 * k, 8):
+                    begins[2 * chunks], begins[2 * chunks + 1] = v, left + 8 * k
+                    chunks += 1
+        else:
+            for start in range(0, right - left, 8):
+                size = min(8, right - left - start)
+                if _mark(row, by_color, darker, level, darkest, start, size):
+                    begins[2 * chunks], begins[2 * chunks + 1] = v, left + start
+                    chunks += 1
     # The flood starts at the background and spreads as far as the shadow is soft.
+    rows, columns = np.empty(8 * chunks, np.int32), np.empty(8 * chunks, np.int32)
     count = 0
-    for index in range(number):
-        v, u = rows[index], columns[index]
-        outside = (
-            (v > 0 and foreground[v - 1, u] == 0)
-            or (v + 1 < height and foreground[v + 1, u] == 0)
-            or (u > 0 and foreground[v, u - 1] == 0)
-            or (u + 1 < width and foreground[v, u + 1] == 0)
-        )
-        if outside and _is_soft(darkness, v, u, softest):
-            foreground[v, u] = 0
-            queued_rows[count], queued_columns[count] = v, u
-            count += 1
+    for chunk in range(chunks):
+        v, start = begins[2 * chunk], begins[2 * chunk + 1]
+        for u in range(start, min(start + 8, right)):
+            if foreground[v, u] == dark and (
+                (v > 0 and foreground[v - 1, u] == 0)
+                or (v + 1 < height and foreground[v + 1, u] == 0)
+                or (u > 0 and foreground[v, u - 1] == 0)
+                or (u + 1 < width and foreground[v, u + 1] == 0)
+            ):
+                is_soft = _is_soft(difference, per_level, v, u, softest)
+                if is_soft:
+                    foreground[v, u] = 0
+                    rows[count], columns[count] = v, u
+                    count += 1
     begin = 0
     while begin < count:
-        v, u = queued_rows[begin], queued_columns[begin]
+        v, u = rows[begin], columns[begin]
         begin += 1
         for k in range(4):
             y = v + (k == 0) - (k == 1)
             x = u + (k == 2) - (k == 3)
             if y < 0 or y >= height or x < 0 or x >= width or foreground[y, x] != dark:
                 continue
-            if _is_soft(darkness, y, x, softest):
+            if _is_soft(difference, per_level, y, x, softest):
                 foreground[y, x] = 0
-                queued_rows[count], queued_columns[count] = y, x
+                rows[count], columns[count] = y, x
                 count += 1
     # Near the outline the square reaches into the person, so the last pixels skip this test.
     begin = 0
     for _ in range(_REACH_PX):
         last = count
         for index in range(begin, last):
-            v, u = queued_rows[index], queued_columns[index]
+            v, u = rows[index], columns[index]
             for k in range(4):
                 y = v + (k == 0) - (k == 1)
                 x = u + (k == 2) - (k == 3)
                 inside = y >= 0 and y < height and x >= 0 and x < width
                 if inside and foreground[y, x] == dark:
                     foreground[y, x] = 0
-                    queued_rows[count], queued_columns[count] = y, x
+                    rows[count], columns[count] = y, x
                     count += 1
         begin = last
-    for index in range(number):
-        v, u = rows[index], columns[index]
-        if foreground[v, u] == dark:
-            foreground[v, u] = 255
+    for chunk in range(chunks):
+        v, start = begins[2 * chunk], begins[2 * chunk + 1]
+        for u in range(start, min(start + 8, right)):
+            foreground[v, u] = 255 * (foreground[v, u] > 0)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _mark(
+    row: Any, by_color: Any, difference: Any, per_level: Any, darkest: Any, start: Any, size: Any
+) -> Any:
+    """Add coloured pixels to a row, mark candidates, and return whether there are any."""
+    dark, zero = np.uint8(_DARK), np.float32(0)
+    found = np.uint8(0)
+    for k in range(size):
+        u = start + k
+        darker = difference[u] * per_level[u]
+        seen = row[u] | by_color[u]
+        is_dark = (seen > by_color[u]) & (darkest < darker) & (darker < zero)
+        row[u] = dark if is_dark else seen
+        found |= np.uint8(is_dark)
+    return found > 0

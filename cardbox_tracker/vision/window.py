@@ -37,10 +37,9 @@ class Window(NamedTuple):
         Raises:
             ValueError: its edges are elsewhere.
         """
-        is_inside = (
-            0 <= self.top <= self.bottom <= shape[0] and 0 <= self.left <= self.right <= shape[1]
-        )
-        if not is_inside or any(edge % unit for edge in (self.left, self.right)):
+        top, bottom, left, right = self
+        is_inside = 0 <= top <= bottom <= shape[0] and 0 <= left <= right <= shape[1]
+        if not is_inside or left % unit or right % unit:
             raise ValueError(
                 f"{self} does not fit an image of the shape {shape}; expected a part of it whose "
                 f"columns are multiples of {unit}"
@@ -62,12 +61,15 @@ class Window(NamedTuple):
 
         An empty window stays empty.
         """
-        if self.is_empty:
+        top, bottom, left, right = self
+        if bottom <= top or right <= left:
             return Window(0, 0, 0, 0)
-        low = (8 * ((edge - margin_px) // 8) for edge in (self.top, self.left))
-        high = (-8 * (-(edge + margin_px) // 8) for edge in (self.bottom, self.right))
-        (top, left), (bottom, right) = low, high
-        return Window(max(top, 0), min(bottom, shape[0]), max(left, 0), min(right, shape[1]))
+        return Window(
+            max((top - margin_px) // 8 * 8, 0),
+            min((bottom + margin_px + 7) // 8 * 8, shape[0]),
+            max((left - margin_px) // 8 * 8, 0),
+            min((right + margin_px + 7) // 8 * 8, shape[1]),
+        )
 
 
 def window_of(image: ImageArray) -> Window:
@@ -79,7 +81,9 @@ def window_of(image: ImageArray) -> Window:
         ValueError: the image is of another type.
     """
     # A read-only array would make numba compile another version.
-    image = np.require(image, requirements=("C", "W", "A"))
+    flags = getattr(image, "flags", None)
+    if flags is None or not (flags.c_contiguous and flags.writeable and flags.aligned):
+        image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))
     if not image.size:
         return Window(0, 0, 0, 0)

@@ -40,13 +40,16 @@ from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.estimation.precompile import quickest
 from cardbox_tracker.estimation.still_things import StillThings
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.absorption import StillRegions
 from cardbox_tracker.vision.background import SilhouetteExtractor
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore
+from cardbox_tracker.vision.color_reader import ColorReader
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.given_arrays import depth_from, image_from, silhouette_from
 from cardbox_tracker.vision.light import LightFollower
+from cardbox_tracker.vision.medians import median
 from cardbox_tracker.vision.regions import clean_silhouette, find_regions, remove_small_regions
 from cardbox_tracker.vision.shadows import decide_shadows
 from cardbox_tracker.vision.window import Window, window_of
@@ -137,7 +140,18 @@ def terms() -> SimpleNamespace:
 def score_chroma(take: Take, numbers: Iterator[int]) -> None:
     small = (3, *(max(length // 2, 1) for length in take.size))  # type: ignore[attr-defined]
     score = ChromaScore(ChromaModel(take("f4", small), take("f4", small)), 3.0, 2.0, 0.5, True)
-    score(take(more=(3,)), window(numbers))
+    score(take("u1", small), take.size, window(numbers))  # type: ignore[attr-defined]
+
+
+def read_colors(take: Take, _: Iterator[int]) -> None:
+    reader = ColorReader(take.size)  # type: ignore[attr-defined]
+    reader.read(take(more=(3,)))
+
+
+def find_still(take: Take, _: Iterator[int]) -> None:
+    regions = StillRegions(15)
+    for _image in range(3):
+        regions.add(take(), take(), 1.0)
 
 
 def follow_light(take: Take, _: Iterator[int]) -> None:
@@ -168,7 +182,7 @@ def decide(take: Take, numbers: Iterator[int]) -> None:
     sides = None if part is None else (part.bottom - part.top, part.right - part.left)
     colored = None
     if next(numbers) % 2:
-        colored = take("f4", sides if sides is None or min(sides) >= 0 else None)
+        colored = take("u1", sides if sides is None or min(sides) >= 0 else None)
     decide_shadows(take(), take("f4"), take("f4"), colored, 0.6, 0.1, part)
 
 
@@ -248,6 +262,9 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     ),
     "decide_shadows": decide,
     "ChromaScore": score_chroma,
+    "ColorReader": read_colors,
+    "StillRegions": find_still,
+    "median": lambda take, _: median(take("f4")),
     "LightFollower": follow_light,
     "SilhouetteExtractor": extract,
     "BackgroundLearner": learn_background,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -154,3 +155,17 @@ def test_the_share_that_may_move_by_hand(moved: float, is_thing: bool) -> None:
     assert all((mask is None) == (number % 15 != 14) for number, mask in enumerate(found))
     assert found[-1] is not None
     assert found[-1].any() == is_thing
+
+
+def test_images_are_halved_as_by_opencv() -> None:
+    rng = np.random.default_rng(0)
+    for shape in ((40, 60), (41, 60)):
+        images = rng.integers(0, 256, (15, *shape), np.uint8)
+        silhouettes = np.where(rng.random((15, *shape)) < 0.02, 255, 0).astype(np.uint8)
+        regions = StillRegions(AFTER)
+        for image, silhouette in zip(images[:14], silhouettes[:14], strict=True):
+            assert regions.add(image, silhouette, 1.0) is None
+        small = [cv2.resize(i, (30, 20), interpolation=cv2.INTER_AREA) for i in images[:14]]
+        seen = [cv2.resize(s, (30, 20), interpolation=cv2.INTER_AREA) for s in silhouettes[:14]]
+        np.testing.assert_array_equal(regions._sum, np.sum(small, axis=0, dtype=float))
+        np.testing.assert_array_equal(regions._seen > 0, np.any(np.array(seen) > 0, axis=0))

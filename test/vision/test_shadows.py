@@ -78,7 +78,7 @@ def plain(
 ) -> np.ndarray:
     """The same in passes over whole images."""
     darkest, softest = limits
-    by_color = np.zeros(foreground.shape, bool) if colored is None else colored >= 0
+    by_color = np.zeros(foreground.shape, bool) if colored is None else colored > 0
     fixed = by_color | (foreground > 0)
     dark = (foreground > 0) & ~by_color & (relative < 0) & (relative > -darkest)
     square, cross = np.ones((5, 5), np.uint8), cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -111,7 +111,7 @@ def test_equal_to_passes_of_opencv(
     noise = cv2.GaussianBlur(rng.normal(0, 1, size), (0, 0), blur).reshape(size)
     relative = (0.4 * noise / noise.std() - 0.2).astype(np.float32)
     foreground = np.where(np.abs(relative) > 0.1, 255, 0).astype(np.uint8)
-    colored = rng.normal(-2, 1, size).astype(np.float32) if has_color else None
+    colored = np.where(rng.normal(-2, 1, size) >= 0, 255, 0).astype(np.uint8) if has_color else None
     limits = (0.4, 0.25)
     expected = plain(foreground, relative, colored, limits)
     per_level = np.full(size, 0.5, np.float32)
