@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -21,7 +20,7 @@ from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from rclpy.waitable import Waitable
 from std_srvs.srv import Trigger
 
-from cardbox_tracker import interrupts
+from cardbox_tracker import garbage, interrupts
 from cardbox_tracker.errors import CardboxError, cut, quoted
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.diagnostics import NodeDiagnostics
@@ -241,10 +240,7 @@ def run(create: Callable[[], N], args: list[str] | None, work: Callable[[N], Non
         return 2
     try:
         node = create()
-        # Existing objects, mainly compiled code, live as long as the process; without freezing
-        # them, each garbage collection would delay an image.
-        gc.collect()
-        gc.freeze()
+        garbage.keep_all()
         with interrupts.only_noted():
             try:
                 work(node)
