@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 
 @contextmanager
@@ -19,6 +18,9 @@ def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], 
 
     The bar is drawn again every ``every_s``, because its seconds go on.
     """
+    # Nodes need no bar, and tqdm imports much.
+    from tqdm import tqdm
+
     with (
         tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar,
         # The first run compiles for minutes before the first image; the seconds go on meanwhile.

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 
-from cardbox_tracker import interrupts
+from cardbox_tracker import garbage, interrupts
 
 COMMAND = "cardbox_tracker.commands.main"
 """Module of the executable ``cardbox``."""
@@ -84,6 +84,8 @@ def _run(name: str) -> int:
         )
     # A node that ends by a signal succeeds; an interrupted command does not.
     interrupts.end_at_once(0 if name in NODES else None)
+    if name in NODES:
+        garbage.search_seldom()
     code = start(name, lambda: import_module(NODES.get(name, COMMAND)).main())
     if name in NODES:
         interrupts.ignore()

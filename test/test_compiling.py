@@ -196,3 +196,46 @@ def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) ->
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+SUMS = """
+import numpy
+from cardbox_tracker.compiling import njit
+
+@njit(cache=True)
+def total(values):
+    if values.any():
+        return values.sum() / values.shape[0]
+    raise ValueError("nothing to add")
+
+@njit()
+def more(values):
+    return total(values) + numpy.median(values)
+"""
+USE_SUMS = """
+import sys
+sys.path.insert(0, ".")
+import numpy, sums
+print(sums.total(numpy.arange(4.0)), "numba.np.arraymath" in sys.modules)
+try:
+    sums.total(numpy.zeros(2))
+except ValueError as error:
+    print(error)
+print(sums.more(numpy.arange(4.0)))
+"""
+
+
+def test_kept_code_is_read_without_the_compiler_which_still_works(tmp_path: Path) -> None:
+    """The modules of numba's own functions are only imported when code is compiled."""
+    (tmp_path / "sums.py").write_text(SUMS)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", USE_SUMS]
+    told = []
+    for _ in range(2):
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        told.append(done.stdout)
+    assert told[0] == "1.5 True\nnothing to add\n3.0\n"
+    assert told[1] == "1.5 False\nnothing to add\n3.0\n"

@@ -17,8 +17,8 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # Folders named together do not import each other.
 LAYERS: tuple[tuple[str, ...], ...] = (
     (
-        *("compiling", "errors", "files", "interrupts", "processes", "progress", "settings"),
-        "small_yaml",
+        *("compiling", "errors", "files", "garbage", "interrupts"),
+        *("processes", "progress", "settings", "small_yaml"),
     ),
     ("body",),
     ("vision", "description"),

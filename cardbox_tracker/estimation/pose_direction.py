@@ -48,13 +48,13 @@ class PoseDirection:
             given: the given pose, from the first camera to the upright one.
             roll_rad: angle by which the further camera was turned upright.
         """
-        self._cameras = first, other
+        self._tangents = TopTangents(first, other, most=1)
         # The images have been turned by the roll of the given pose, even if that pose is inverted.
         c, s = np.cos(roll_rad), np.sin(roll_rad)
         roll = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
         raw = Extrinsics(roll @ given.rotation, roll @ given.translation_m).inverse()
         inverse = Extrinsics(roll.T @ raw.rotation, roll.T @ raw.translation_m)
-        self._poses = given, inverse
+        self._pencils = [self._tangents.pencil(pose) for pose in (given, inverse)]
         self._per_px = 1.0 / other.fx
         self._heights_rad = deque[tuple[float, float]](maxlen=_WINDOW)
         self._frames = 0
@@ -68,11 +68,12 @@ class PoseDirection:
         self._frames += 1
         if self._frames % (_EVERY if self._frames > _FIRST else _EVERY_AT_FIRST):
             return
-        tangents = TopTangents(*self._cameras, [(first, other)])
-        heights = [tangents.heights(pose) for pose in self._poses]
-        if not heights[0].size or not np.isfinite(heights[0][0]):
+        if not self._tangents.add(first, other):
             return
-        given, inverse = (float(abs(height[0])) * self._per_px for height in heights)
+        heights = [float(self._tangents.heights(pencil)[0]) for pencil in self._pencils]
+        given, inverse = (abs(height) * self._per_px for height in heights)
+        if not np.isfinite(given):
+            return
         # The inverse pose is no better if it does not even show the top.
         self._heights_rad.append((given, inverse if np.isfinite(inverse) else np.inf))
         if len(self._heights_rad) >= _LEAST:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from math import atan2
+from math import atan2, sqrt
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -34,6 +35,20 @@ _ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
 _FEWEST, _LARGEST_CONDITION = 8, 1e6
 
 _Hull = tuple[FloatArray, NDArray[np.bool_]]
+
+
+class Pencil(NamedTuple):
+    """The planes through both cameras of a pose.
+
+    Attributes:
+        along: direction of the baseline in the other camera's frame, (3,).
+        here: directions up and ahead across the baseline, (2, 3), in the first camera's frame.
+        there: the same in the other camera's frame.
+    """
+
+    along: FloatArray
+    here: FloatArray
+    there: FloatArray
 
 
 class TopTangents:
@@ -60,11 +75,13 @@ class TopTangents:
         for one, two in pairs:
             self.add(one, two)
 
-    def add(self, one: Silhouette, two: Silhouette) -> None:
-        """Add the silhouettes of a frame unless one of them is empty."""
+    def add(self, one: Silhouette, two: Silhouette) -> bool:
+        """Add the silhouettes of a frame and return True, unless one of them is empty."""
         hulls = _hull(one, self._first), _hull(two, self._other)
-        if all(len(rays) for rays, _ in hulls):
+        is_there = all(len(rays) for rays, _ in hulls)
+        if is_there:
             self._hulls.append(hulls)
+        return is_there
 
     def copy(self) -> TopTangents:
         """Return a copy for use in another thread."""
@@ -72,11 +89,8 @@ class TopTangents:
         now._hulls.extend(list(self._hulls))
         return now
 
-    def heights(self, extrinsics: Extrinsics) -> FloatArray:
-        """Return the height of the first camera's tangent above the other camera's, (n,), px.
-
-        It is measured in pixels of the other camera; NaN if a silhouette is cut off at the border.
-        """
+    def pencil(self, extrinsics: Extrinsics) -> Pencil:
+        """Return the planes of a pose, for several calls of :meth:`heights`."""
         along = extrinsics.translation_m / np.linalg.norm(extrinsics.translation_m)
         up = extrinsics.rotation @ self._up
         ahead = np.cross(along, up)
@@ -85,13 +99,21 @@ class TopTangents:
         ahead *= 1.0 if ahead[2] > 0.0 else -1.0
         axes = np.array([up - (up @ along) * along, ahead])
         axes[0] /= np.linalg.norm(axes[0])
+        return Pencil(along, axes @ extrinsics.rotation, axes)
+
+    def heights(self, pose: Extrinsics | Pencil) -> FloatArray:
+        """Return the height of the first camera's tangent above the other camera's, (n,), px.
+
+        It is measured in pixels of the other camera; NaN if a silhouette is cut off at the border.
+        """
+        along, axes_here, axes = self.pencil(pose) if isinstance(pose, Extrinsics) else pose
         found = np.full(len(self._hulls), np.nan)
         for number, (one, two) in enumerate(self._hulls):
-            here, is_whole = _highest(one, axes @ extrinsics.rotation)
+            here, is_whole = _highest(one, axes_here)
             there, is_whole_there = _highest(two, axes)
             if is_whole and is_whole_there:
-                angles = [atan2(*(axes @ extrinsics.rotation @ here)), atan2(*(axes @ there))]
-                across = np.sqrt(1.0 - (there @ along) ** 2)
+                angles = [atan2(*(axes_here @ here)), atan2(*(axes @ there))]
+                across = sqrt(1.0 - float(there @ along) ** 2)
                 found[number] = (angles[0] - angles[1]) * across * self._other.fx
         return found
 
@@ -160,14 +182,16 @@ def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
 
 def _hull(mask: Silhouette, camera: Camera) -> _Hull:
     """Return the convex hull as unit rays (n, 3), and whether each is inside the image, (n,)."""
-    seen = np.asarray(mask) > 0
-    rows = np.flatnonzero(seen.any(axis=1))
-    if not len(rows):
+    left, top, width, height = cv2.boundingRect(mask)
+    if not width:
         return np.empty((0, 3)), np.empty(0, np.bool_)
+    seen = mask[top : top + height, left : left + width] != 0
     # The ends of the rows have the same hull as all pixels, and are a hundredth of them.
-    left, right = seen[rows].argmax(axis=1), seen.shape[1] - 1 - seen[rows, ::-1].argmax(axis=1)
-    ends = np.column_stack([np.append(left, right), np.append(rows, rows)]).astype(np.int32)
-    hull = cv2.convexHull(ends).reshape(-1, 2).astype(np.float64)
+    starts, ends = seen.argmax(axis=1), width - 1 - seen[:, ::-1].argmax(axis=1)
+    rows = np.flatnonzero(seen[np.arange(height), starts])
+    columns = np.concatenate([starts[rows], ends[rows]]) + left
+    points = np.column_stack([columns, np.concatenate([rows, rows]) + top]).astype(np.int32)
+    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
     x, y = hull.T
     inside = (x >= _BORDER_PX) & (x < camera.width - _BORDER_PX) & (y >= _BORDER_PX)
     rays = np.column_stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 0.0 * x + 1])

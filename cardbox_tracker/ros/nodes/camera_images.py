@@ -62,9 +62,11 @@ class CameraImages:
         self.info: CameraInfo | None = None
         self.order = StampOrder.NEXT
         self.image_bytes = 0
+        self._early: tuple[Image | CompressedImage, int] | None = None
         self._single = SinglePublisher(node, (self.topic, self.info_topic))
-        node.subscribe(CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
+        # Of messages that arrive together, those of the first subscription are taken first.
         node.subscribe(kind, topic, self.on_image, profile)
+        node.subscribe(CameraInfo, "camera_info", self.on_info, qos.SENSOR_DATA)
         node.diagnostics.source = f"images on {self.topic}"
         node.diagnostics.wait_for(
             f"images on {self.topic} and their CameraInfo on {self.info_topic}"
@@ -90,6 +92,9 @@ class CameraImages:
         self.info = message
         self._changed(calibration)
         self._node.diagnostics.wait_for(f"images on {self.topic}")
+        early, self._early = self._early, None
+        if early is not None and early[0].header.stamp == message.header.stamp:
+            self._use(*early, calibration)
 
     def on_image(self, message: Image | CompressedImage, sent_ns: int) -> None:
         """Deliver an image if its stamp can be used and the calibration is known.
@@ -103,11 +108,18 @@ class CameraImages:
         self.order, self.image_bytes = order, len(message.data)
         calibration = self.watch.current
         if calibration is None:
+            # Its CameraInfo may have arrived with it.
+            self._early = message, sent_ns
             if not self.watch.seen:
                 self._node.diagnostics.wait_for(
                     f"the CameraInfo on {self.info_topic} for the images on {self.topic}"
                 )
             return
+        self._use(message, sent_ns, calibration)
+
+    def _use(
+        self, message: Image | CompressedImage, sent_ns: int, calibration: Calibration
+    ) -> None:
         most = conversions.most_pixels_of(calibration, self._most_megapixels())
         image = conversions.image_of(message, most)
         conversions.check_shape(image, calibration, self.topic, self.info_topic)

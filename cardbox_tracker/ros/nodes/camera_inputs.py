@@ -97,7 +97,6 @@ class CameraInputs:
         """
         cameras = settings.cameras or [""]
         self._changed, self._deliver = changed, deliver
-        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         topics = silhouettes_of(cameras)
         self._streams = [
             InputStream(camera.strip("/") or "camera", node.resolve(topic))
@@ -115,6 +114,8 @@ class CameraInputs:
                 image = f"{topic}/image"
                 node.subscribe(Image, image, pairing.add_image, qos.SILHOUETTE_INPUT)
             node.subscribe(Image, topic, pairing.add_silhouette, qos.SILHOUETTE_INPUT)
+        # Of messages that arrive together, silhouettes are taken before their CameraInfo.
+        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
         self._keypoints = KeypointInputs(node, settings)

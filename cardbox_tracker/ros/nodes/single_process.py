@@ -16,19 +16,20 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.utilities import try_shutdown
 
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
-from cardbox_tracker.ros.nodes.camera_node import CameraNode
 from cardbox_tracker.ros.nodes.initializer_node import InitializerNode
-from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.ros.runtime.intra_process import IntraProcess
 from cardbox_tracker.ros.runtime.node import CardboxNode, own_arguments, run
+
+if TYPE_CHECKING:
+    from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
 
 _STOP_S = 5.0
 SOURCES = ("camera", "play_bag")
@@ -49,6 +50,8 @@ class AllNodes:
         # The tracker subscribes first, so it gets a silhouette before the initializer.
         kinds: list[Callable[..., CardboxNode]] = [BackgroundNode, TrackerNode, InitializerNode]
         if source == "camera":
+            from cardbox_tracker.ros.nodes.camera_node import CameraNode
+
             kinds.append(CameraNode)
         try:
             intra_process = IntraProcess()
@@ -56,6 +59,9 @@ class AllNodes:
                 self.nodes.append(kind(intra_process=intra_process))
                 _check_cameras(self.nodes[-1])
             if source == "play_bag":
+                # Without a bag, the start does not wait for the readers of bags.
+                from cardbox_tracker.ros.nodes.play_bag_node import PlayBagNode
+
                 self._player = PlayBagNode()
         except Exception:
             self.close()

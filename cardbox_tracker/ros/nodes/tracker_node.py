@@ -45,9 +45,8 @@ class TrackerNode(CardboxNode):
         # Calls that come while the code is compiled are answered afterwards.
         self.offer("~/reset", self._reset)
         settings = self.parameters.value
-        # The code that these settings need is ready before the first image arrives.
-        with told(self.get_logger().info, _PREPARING):
-            compile_all(several_cameras=len(settings.cameras) > 1, points=bool(settings.keypoints))
+        self._prepared: set[str] = set()
+        self._prepare(settings)
         self._body: BodyModel | None = None
         self._camera: Camera | None = None
         self._others: Sequence[OtherCamera] = ()
@@ -64,6 +63,18 @@ class TrackerNode(CardboxNode):
         if settings.model_file:
             self._use(load_body_model(user_path(settings.model_file)))
         self._wait()
+
+    def _prepare(self, settings: TrackerParameters) -> None:
+        """Get the code that the settings need before an image needs it."""
+        if settings.preset in self._prepared:
+            return
+        with told(self.get_logger().info, _PREPARING):
+            compile_all(
+                [settings.preset],
+                several_cameras=len(settings.cameras) > 1,
+                points=bool(settings.keypoints),
+            )
+        self._prepared.add(settings.preset)
 
     def _on_model(self, message: String, _: int) -> None:
         body = loads_body_model(message.data, source=self._model_topic)
@@ -88,6 +99,7 @@ class TrackerNode(CardboxNode):
 
     def _changed(self, settings: TrackerParameters) -> None:
         """Apply changed parameters."""
+        self._prepare(settings)
         if self._tracker is None:
             return
         config = settings.config()

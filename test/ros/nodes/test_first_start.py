@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from rclpy.parameter import Parameter
+
 from cardbox_tracker.ros.nodes import background_node, tracker_node
 
 
@@ -36,15 +38,28 @@ def test_the_tracker_tells_that_it_compiles_and_takes_calls_of_reset(
     monkeypatch.setattr(tracker_node, "told", telling)
     monkeypatch.setattr(tracker_node.TrackerNode, "offer", offer)
 
-    def compile_all(**needed: bool) -> None:
-        seen.append((telling.text, list(offered), needed))
+    def compile_all(presets: list[str], **needed: bool) -> None:
+        seen.append((telling.text, list(offered), presets, needed))
 
     monkeypatch.setattr(tracker_node, "compile_all", compile_all)
     bus.start(tracker_node.TrackerNode)
-    ((text, services, needed),) = seen
+    ((text, services, presets, needed),) = seen
+    assert presets == ["default"]
     assert needed == {"several_cameras": False, "points": False}
     assert "compiles" in text
     assert services == ["~/reset"]
+
+
+def test_the_code_of_another_preset_is_prepared_when_it_is_chosen(
+    bus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(tracker_node, "compile_all", lambda presets, **_: seen.extend(presets))
+    node = bus.start(tracker_node.TrackerNode)
+    for preset in ("paper", "default", "paper"):
+        node.set_parameters([Parameter("preset", value=preset)])
+    node.set_parameters([Parameter("effort", value=0.5)])
+    assert seen == ["default", "paper"]
 
 
 def test_the_background_node_tells_that_it_compiles_and_announces_silhouettes(

@@ -1,0 +1,69 @@
+"""The order in which nodes take images and their CameraInfo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from builtin_interfaces.msg import Time  # noqa: E402
+from rclpy.qos import QoSProfile  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
+
+from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
+    camera_info_message,
+    image_message,
+)
+from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
+from cardbox_tracker.ros.nodes.camera_images import CameraImages  # noqa: E402
+from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.ros.runtime.node import CardboxNode  # noqa: E402
+from cardbox_tracker.vision.camera import Camera  # noqa: E402
+
+CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "image"), [(BackgroundNode, "/image_raw"), (TrackerNode, "/silhouette")]
+)
+def test_an_image_does_not_wait_for_its_camera_info(
+    kind: type[CardboxNode], image: str, make_node: Callable[..., Any]
+) -> None:
+    """An executor takes messages that arrive together in the order of the subscriptions."""
+    node = kind(context=make_node().context, enable_rosout=False)
+    topics = [subscription.topic_name for subscription in node.subscriptions]
+    node.destroy_node()
+    assert topics.index(image) < next(i for i, name in enumerate(topics) if "camera_info" in name)
+
+
+@pytest.mark.parametrize("info_stamp_s", [1, 2, 3])
+def test_only_the_image_of_the_first_camera_info_is_kept_for_it(
+    info_stamp_s: int, make_node: Callable[..., Any], hands: Any
+) -> None:
+    delivered: list[int] = []
+    node = CardboxNode("tested", hands, context=make_node().context, enable_rosout=False)
+    CameraImages(
+        node,
+        "raw",
+        lambda: 1.0,
+        lambda _: None,
+        lambda header, *_: delivered.append(header.stamp.sec),
+        QoSProfile(depth=1),
+    )
+
+    def give(stamp_s: int) -> None:
+        header = Header(stamp=Time(sec=stamp_s))
+        image = image_message(header, np.zeros((120, 160), np.uint8), "mono8")
+        hands.give("/image_raw", image)
+
+    give(1)
+    give(2)
+    hands.give("/camera_info", camera_info_message(Header(stamp=Time(sec=info_stamp_s)), CAMERA))
+    give(4)
+    hands.give("/camera_info", camera_info_message(Header(stamp=Time(sec=4)), CAMERA))
+    node.destroy_node()
+    assert delivered == ([2, 4] if info_stamp_s == 2 else [4])
