@@ -54,7 +54,6 @@ class NodeDiagnostics:
             Warnings of the kind "" are not logged here, because the node logs them.
         remarks: called once a second; returns warnings of common checks, such as the types of the
             topics, which write their own log messages.
-        events: called once a second, before the status is made; handles events of QoS.
     """
 
     def __init__(self, node: Node) -> None:
@@ -64,7 +63,6 @@ class NodeDiagnostics:
         self.advice: Callable[[], dict[str, str]] = dict
         self.source = ""
         self.remarks: Callable[[], list[str]] = list
-        self.events: Callable[[], None] = lambda: None
         self._node = node
         self._waiting = ""
         self._problem = ""
@@ -172,7 +170,6 @@ class NodeDiagnostics:
 
     def publish(self) -> None:
         """Publish the status and log its changes; a timer calls this once a second."""
-        self.events()
         self._look_for_silence()
         if self._problem and not self._silence:
             self.problem(self._problem, self._kind)

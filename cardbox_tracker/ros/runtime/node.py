@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 import rclpy
-from rclpy.event_handler import EventHandler
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -17,7 +16,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.utilities import ok, remove_ros_args, try_shutdown
-from rclpy.waitable import Waitable
 from std_srvs.srv import Trigger
 
 from cardbox_tracker import garbage, interrupts
@@ -41,19 +39,6 @@ class Closable(Protocol):
 N = TypeVar("N", bound=Closable)
 
 
-class _Ready:
-    """A wait set in which everything is ready, so that events can be taken without a wait."""
-
-    def add_event(self, _: Any) -> int:
-        return 0
-
-    def is_ready(self, *_: Any) -> bool:
-        return True
-
-
-_READY = _Ready()
-
-
 class CardboxNode(Node):
     """A node with diagnostics of its state, its missing inputs and its errors."""
 
@@ -70,24 +55,8 @@ class CardboxNode(Node):
         super().__init__(name, **options)
         self._intra_process = intra_process
         self.diagnostics = NodeDiagnostics(self)
-        self.diagnostics.events = self._handle_events
         self._types = TopicTypes(self)
         self.diagnostics.remarks = self._types.remarks
-
-    @property
-    def waitables(self) -> Iterator[Waitable]:
-        """Return what an executor waits for; without QoS events, which lengthen every wait."""
-        return (one for one in super().waitables if not isinstance(one, EventHandler))
-
-    def _handle_events(self) -> None:
-        """Call the callbacks of the QoS events since the last call; the diagnostics do it."""
-        for one in super().waitables:
-            if isinstance(one, EventHandler):
-                one.add_to_wait_set(_READY)
-                one.is_ready(_READY)
-                event = one.take_data()
-                if event is not None and event.total_count_change:
-                    one.callback(event)
 
     def resolve(self, topic: str) -> str:
         """Return the full name of ``topic`` after namespace and remapping.
