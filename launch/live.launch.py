@@ -25,7 +25,12 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
+from cardbox_tracker.ros.runtime.launch_arguments import (
+    Argument,
+    check_names,
+    shares_process,
+    values,
+)
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # Arguments that are parameters of the node camera.
@@ -82,16 +87,12 @@ def _check(context: LaunchContext) -> list[object]:
     return []
 
 
-def _is_single(context: LaunchContext) -> bool:
-    return context.launch_configurations.get("single_process", "false").lower() == "true"
-
-
 def _parameters(context: LaunchContext) -> dict[str, object]:
     return dict(values(ARGUMENTS, context.launch_configurations))
 
 
 def _in_one_process(context: LaunchContext) -> list[object]:
-    if not _is_single(context):
+    if not shares_process(context.launch_configurations):
         return []
     return [
         SetLaunchConfiguration("source", "camera"),
@@ -100,7 +101,7 @@ def _in_one_process(context: LaunchContext) -> list[object]:
 
 
 def _camera(context: LaunchContext) -> list[object]:
-    if _is_single(context):
+    if shares_process(context.launch_configurations):
         return []
     # Without a type, launch would read a text as a number or as nothing.
     parameters = {

@@ -32,7 +32,13 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
+from cardbox_tracker.ros.runtime.launch_arguments import (
+    Argument,
+    check_names,
+    parameters_in,
+    shares_process,
+    values,
+)
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -93,7 +99,12 @@ ARGUMENTS = {
         "with robot_file: map of joints; empty: the hand is followed by inverse kinematics",
         Path,
     ),
-    "single_process": Argument("false", "all nodes in one process, for least latency", bool),
+    "single_process": Argument(
+        "auto",
+        "all nodes in one process, for least latency: true, false, or auto, which is true for one "
+        "camera with a node background",
+        choices=("auto", "true", "false"),
+    ),
     "publish_tf": Argument("true", "start robot_state_publisher", bool),
     "rviz": Argument("false", "start RViz", bool),
 }
@@ -144,7 +155,8 @@ def _check(context: LaunchContext) -> list[object]:
     check_names(__file__, ARGUMENTS, sys.argv)
     given = context.launch_configurations
     typed = values(ARGUMENTS, given)
-    if typed["cameras"] and typed["single_process"]:
+    is_single = shares_process(given)
+    if typed["cameras"] and is_single:
         raise ValueError(
             "launch argument single_process is true, but cameras are given; expected only one of "
             "the two, because several cameras need more than one core; leave single_process out"
@@ -154,7 +166,7 @@ def _check(context: LaunchContext) -> list[object]:
             f"launch argument within_m is {given['within_m']}; expected it with depth, the topic "
             "of depth images of one camera, and without cameras"
         )
-    if typed["silhouettes"] == "detector" and (typed["single_process"] or typed["within_m"]):
+    if typed["silhouettes"] == "detector" and (is_single or typed["within_m"]):
         raise ValueError(
             "launch argument silhouettes is detector; expected it without within_m and without "
             "single_process, because a node background would make silhouettes, too"
@@ -185,7 +197,8 @@ def _nodes(context: LaunchContext) -> list[object]:
         given["keypoints"] = POINTS
     cameras = typed["cameras"] or [""]
     left_out = [] if detects else ["detector"]
-    if typed["single_process"]:
+    is_single = shares_process(given)
+    if is_single:
         left_out += TOGETHER
     elif typed["silhouettes"] == "detector":
         left_out.append("background")
@@ -195,7 +208,7 @@ def _nodes(context: LaunchContext) -> list[object]:
         for below in cameras
     ]
     own = {"background": remappings, "detector": remappings, "tracker": infos}
-    nodes = [_single_process(context, remappings)] if typed["single_process"] else []
+    nodes = [_single_process(context, remappings)] if is_single else []
     return nodes + [
         Node(
             package="cardbox_tracker",
@@ -276,12 +289,12 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
     source = given.get("source", "")
     if source:
         parameters[source] = yaml.safe_load(given["source_parameters"])
+    place = f"/{given['namespace'].strip('/')}".rstrip("/")
     sections = {}
     for name, own in parameters.items():
-        path = Path(given["config_dir"]) / f"{name}.yaml"
         # In one process, a file for all nodes would apply to each of them.
-        (section,) = yaml.safe_load(path.read_text(encoding="utf-8")).values()
-        sections[f"/**/{name}"] = {"ros__parameters": {**section["ros__parameters"], **own}}
+        kept = _kept(Path(given["config_dir"]) / f"{name}.yaml", f"{place}/{name}")
+        sections[f"/**/{name}"] = {"ros__parameters": {**kept, **own}}
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix="cardbox_", delete=False) as file:
         yaml.safe_dump(sections, file)
     rules = [word for old, new in remappings for word in ("-r", f"background:{old}:={new}")]
@@ -296,6 +309,17 @@ def _single_process(context: LaunchContext, remappings: list[tuple[str, str]]) -
         ],
         output="screen",
     )
+
+
+def _kept(path: Path, node: str) -> dict[str, object]:
+    """Return the parameters of ``node`` in a file of the folder config_dir."""
+    try:
+        return parameters_in(yaml.safe_load(path.read_text(encoding="utf-8")), node)
+    except (OSError, yaml.YAMLError, ValueError) as error:
+        raise ValueError(
+            f"{path} is no file of parameters: {error}; expected the form of "
+            f"{SHARE / 'config' / path.name}; with single_process:=false the node reads the file"
+        ) from None
 
 
 def _robot_state_publisher(context: LaunchContext) -> list[object]:

@@ -27,7 +27,12 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cardbox_tracker.ros.runtime.launch_arguments import Argument, check_names, values
+from cardbox_tracker.ros.runtime.launch_arguments import (
+    Argument,
+    check_names,
+    shares_process,
+    values,
+)
 
 SHARE = Path(get_package_share_directory("cardbox_tracker"))
 # All but 'bag' are parameters of the node play_bag with the same names.
@@ -98,10 +103,6 @@ def _find_topics(context: LaunchContext) -> list[object]:
     ]
 
 
-def _is_single(context: LaunchContext) -> bool:
-    return context.launch_configurations.get("single_process", "false").lower() == "true"
-
-
 def _parameters(context: LaunchContext) -> dict[str, object]:
     parameters: dict[str, object] = dict(values(ARGUMENTS, context.launch_configurations))
     # The tracker compiles at its first start, and the recording must not end before.
@@ -113,7 +114,7 @@ def _parameters(context: LaunchContext) -> dict[str, object]:
 
 
 def _in_one_process(context: LaunchContext) -> list[object]:
-    if not _is_single(context):
+    if not shares_process(context.launch_configurations):
         return []
     return [
         SetLaunchConfiguration("source", "play_bag"),
@@ -122,7 +123,7 @@ def _in_one_process(context: LaunchContext) -> list[object]:
 
 
 def _play_bag(context: LaunchContext) -> list[object]:
-    if _is_single(context):
+    if shares_process(context.launch_configurations):
         return []
     # Without a type, launch would read a text as a number or as nothing.
     parameters = {

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
@@ -77,7 +78,10 @@ def stand_ins(prefix: Path) -> dict[str, dict[str, Any]]:
 
 @pytest.fixture
 def launch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., list[str]]]:
-    """Return a function that carries out a launch file and returns the nodes it starts."""
+    """Return a function that carries out a launch file and returns the nodes it starts.
+
+    Each node has a process of its own, unless ``single_process`` is given.
+    """
     program = tmp_path / "lib" / "cardbox_tracker" / "play_bag"
     program.parent.mkdir(parents=True)
     program.write_text(
@@ -95,7 +99,10 @@ def launch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable
             if parent == name or parent not in stand_ins(tmp_path):
                 monkeypatch.setitem(sys.modules, parent, ModuleType(parent))
         sys.modules[name].__dict__.update(values)
-    yield lambda name, **given: started(load(name).generate_launch_description(), Context(given))
+    apart = {"single_process": "false"}
+    yield lambda name, **given: started(
+        load(name).generate_launch_description(), Context(apart | given)
+    )
     for name in [n for n in sys.modules if n.partition(".")[0] == "cardbox_tracker"]:
         del sys.modules[name]
 
@@ -215,6 +222,46 @@ def test_live_starts_the_camera_with_typed_values(launch: Callable[..., Any]) ->
     assert executables(nodes) == [*NODES, "camera"]
     parameters = nodes[-1].options["parameters"][1]
     assert (parameters["width"], parameters["loop"]) == (320, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        ("nodes", {}, ["cardbox_nodes"]),
+        ("live", {}, ["cardbox_nodes"]),
+        ("nodes", {"cameras": "[]"}, ["cardbox_nodes"]),
+        ("nodes", {"cameras": "[left, right]"}, ["background", *NODES]),
+        ("two_cameras", {}, ["background", *NODES]),
+        ("nodes", {"silhouettes": "detector"}, ["initializer", "tracker", "detector"]),
+    ],
+)
+def test_nodes_share_a_process_by_default_where_they_can(
+    name: str, given: dict[str, str], expected: list[str], launch: Callable[..., Any]
+) -> None:
+    assert load("nodes").ARGUMENTS["single_process"].default == "auto"
+    nodes = launch(name, single_process="auto", publish_tf="false", **given)
+    assert executables(nodes) == expected
+
+
+def test_in_one_process_each_node_keeps_its_own_parameters(
+    launch: Callable[..., Any], tmp_path: Path
+) -> None:
+    for name in NODES:
+        own = {"/**": {"ros__parameters": {"shared": name}}}
+        own[f"/left/{name}"] = {"ros__parameters": {"own": name}}
+        own[f"/right/{name}"] = {"ros__parameters": {"own": "another's"}}
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(own))
+    given = {"config_dir": str(tmp_path), "namespace": "/left/", "publish_tf": "false"}
+    (node,) = launch("nodes", single_process="true", **given)
+    file = Path(node.options["arguments"][node.options["arguments"].index("--params-file") + 1])
+    read = yaml.safe_load(file.read_text())
+    file.unlink()
+    for name in NODES:
+        parameters = read[f"/**/{name}"]["ros__parameters"]
+        assert (parameters["shared"], parameters["own"]) == (name, name)
+    (tmp_path / "tracker.yaml").write_text("left: {tracker: {ros__parameters: {own: 1}}}")
+    with pytest.raises(ValueError, match=r"tracker.yaml .*ros__parameters.*single_process:=false"):
+        launch("nodes", single_process="true", **given)
 
 
 def test_live_leaves_the_rate_of_a_file_to_the_camera(launch: Callable[..., Any]) -> None:
@@ -381,7 +428,7 @@ def test_what_two_cameras_cannot_be_is_said_before_anything_runs(
         ("live", "loop", "yes", "true or false"),
         ("live", "rate_hz", "nan", "a number from 0 to 240"),
         ("live", "rviz", "yes", "true or false"),
-        ("live", "single_process", "1", "true or false"),
+        ("live", "single_process", "1", "auto or true or false"),
         ("live", "preset", "papers", "paper or default"),
         ("live", "config_dir", "/nowhere", "a folder"),
         ("live", "file", "/nowhere.mp4", "a file that exists"),

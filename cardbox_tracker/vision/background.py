@@ -228,10 +228,14 @@ class SilhouetteExtractor:
 
 
 def warm_up() -> None:
-    """Extract one silhouette, so that the kernels are compiled before the first live image."""
+    """Extract silhouettes, so that the kernels are compiled before the first live image."""
     learner = BackgroundLearner()
+    color = np.full((16, 16, 3), 90, np.uint8)
     for _ in range(2):
-        learner.add(np.full((16, 16, 3), 90, np.uint8))
+        learner.add(color)
     extractor = SilhouetteExtractor(learner.model())
-    extractor(np.zeros((16, 16), np.uint8))
-    extractor(np.zeros((16, 16, 3), np.uint8))
+    color[4:12, 4:12] = 250
+    grey = np.ascontiguousarray(color[..., 0])
+    # Arrays over the memory of messages are read-only, which is another type to numba.
+    for image in (grey, np.frombuffer(grey.tobytes(), np.uint8).reshape(grey.shape), color):
+        extractor(image)

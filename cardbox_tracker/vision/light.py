@@ -42,13 +42,10 @@ _SAME = 0.004
 # Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
 _GREY = np.ones(1, np.float32)
-# The field is estimated in the first image, in every sixth one, which has an odd number and so is
-# none that is compared by colour everywhere, and after a step; the level always.
-_EVERY, _PHASE = 6, 3
-# Foreground that light has caused is searched in every third image.
-_SEARCH_EVERY = 3
-# Share that an estimate keeps from image to image in the field, an exponential moving average.
-_KEPT = 0.9
+# The field is estimated in every third image, and in every one after a step; the level always.
+_EVERY = 3
+# Share of the new estimate in the field, an exponential moving average.
+_RATE = 1.0 - 0.9**_EVERY
 # Pixels whose brightness differs from the expected one by more are not background.
 _TOLERANCE, _TOLERANCE_AFTER_STEP = 0.1, 0.4
 # A larger change of the level between two images is a step of the light: a lamp, a gain.
@@ -149,8 +146,7 @@ class LightFollower:
         self._lit = np.zeros(self._size[::-1], np.bool_)
         self._brightness = np.zeros(self._mean.shape, np.uint8)
         self._started = False
-        # The first estimate counts as one after three images.
-        self._images, self._estimated = 0, -_PHASE
+        self._images = 0
         self._extremes = 1.0, 1.0
         self._relative, self._highest_field = self._mean, 1.0
 
@@ -208,12 +204,9 @@ class LightFollower:
         self._started = True
         self.level = level
         number, self._images = self._images, self._images + 1
-        is_due = number == 0 or number % _EVERY == _PHASE
-        if not (is_due or self._settling > 0 or self._is_lit):
+        if number % _EVERY and self._settling == 0 and not self._is_lit:
             return
-        elapsed, self._estimated = number - self._estimated, number
-        rate = 1.0 - _KEPT**elapsed
-        person, tolerance, around = self._person, _TOLERANCE, self._fine
+        person, rate, tolerance, around = self._person, _RATE, _TOLERANCE, self._fine
         if self._settling > 0:
             # The person may have moved since.
             known = person if self._passing is None else person | self._passing
@@ -255,7 +248,7 @@ class LightFollower:
             return
         person = np.empty(self._size[::-1], np.uint8)
         take_samples(silhouette, person)
-        if self._settling > 0 or self._is_lit or self._images % _SEARCH_EVERY == 0:
+        if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
             # Darker pixels may be the person's shadow, which moves with the person.
             count = self._find_smooth(person)
             self._is_lit = count > _LIT * person.size

@@ -7,6 +7,7 @@ Therefore this module imports only the standard library.
 from __future__ import annotations
 
 import difflib
+import fnmatch
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -91,6 +92,45 @@ def values(arguments: Mapping[str, Argument], given: Mapping[str, str]) -> dict[
             wrong.append(f"launch argument {name} is {quoted(given[name])}; expected {error}")
     if wrong:
         raise CardboxError("; ".join(wrong))
+    return found
+
+
+def shares_process(given: Mapping[str, str]) -> bool:
+    """Return whether background, initializer, tracker and the source of images share a process.
+
+    Args:
+        given: arguments of a launch file; ``single_process`` is ``auto`` if it is missing. Then
+            they do, unless there are several cameras or the detector makes the silhouettes.
+    """
+    text = given.get("single_process", "auto").strip().lower()
+    if text != "auto":
+        return text == "true"
+    is_one = not given.get("cameras", "").strip(" []")
+    return is_one and given.get("silhouettes", "background") == "background"
+
+
+def parameters_in(sections: object, node: str) -> dict[str, object]:
+    """Return the parameters of a node in the content of a parameter file of ROS.
+
+    Args:
+        sections: the parsed YAML: a mapping from names of nodes, with wildcards, to
+            ``ros__parameters``.
+        node: full name of the node, with its namespace.
+
+    Raises:
+        ValueError: the content has another form; the error's text is the expectation.
+    """
+    if not isinstance(sections, Mapping):
+        raise ValueError("a mapping from names of nodes to ros__parameters")
+    found: dict[str, object] = {}
+    for name, section in sections.items():
+        own = section.get("ros__parameters") if isinstance(section, Mapping) else None
+        if not isinstance(own, Mapping):
+            raise ValueError(f"ros__parameters below {quoted(name)}, as one mapping")
+        # Two asterisks stand for any number of namespaces, also for none.
+        pattern = "/" + str(name).lstrip("/").replace("**/", "*").replace("**", "*")
+        if fnmatch.fnmatchcase(node, pattern):
+            found |= own
     return found
 
 
