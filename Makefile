@@ -131,9 +131,9 @@ experiments: setup
 	$(BIN)/cardbox evaluate --runs $(RUNS) --output docs/evaluation --force
 	$(BIN)/python -m tools.readme_figures
 
-# This compares all recorded sessions beside the checkout with their ground truth.
+# This compares the recorded sessions of one camera beside the checkout with their ground truth.
 DATA ?= ../shared/data
-SESSIONS = $(filter-out $(DATA)/real_%,\
+SESSIONS = $(filter-out $(DATA)/real_% $(DATA)/stereo_% $(DATA)/two_%,\
 	$(patsubst %/ground_truth.json,%,$(wildcard $(DATA)/*/ground_truth.json)))
 .PHONY: sessions
 sessions: setup
