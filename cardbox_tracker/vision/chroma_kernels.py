@@ -38,9 +38,9 @@ def collect_shares(colors: Any, background: Any, step: Any, shares: Any) -> None
     height, width = colors.shape[1:]
     count = 0
     for v in range(step // 2, height, step):
-        rows = _before(v), v, _after(v, height)
+        rows = _before(v, height), v, _after(v, height)
         for u in range(step // 2, width, step):
-            columns = _before(u), u, _after(u, width)
+            columns = _before(u, width), u, _after(u, width)
             level = red = blue = 0
             for y in rows:
                 for x in columns:
@@ -57,9 +57,9 @@ def collect_shares(colors: Any, background: Any, step: Any, shares: Any) -> None
 
 
 @inlined_kernel
-def _before(index: Any) -> Any:
+def _before(index: Any, length: Any) -> Any:
     """Return the index of the pixel before one; the image is mirrored at its first pixel."""
-    return abs(index - 1)
+    return min(abs(index - 1), length - 1)
 
 
 @inlined_kernel
@@ -80,7 +80,7 @@ def _rate(colors: Any, place: Any, background: Any, cast: Any, sums: Any, score:
     lowest, highest, cut_off = _f32(_RATIOS[0]), _f32(_RATIOS[1]), _f32(_CUT_OFF)
     levels, reds, blues = sums[0], sums[1], sums[2]
     for v in range(height):
-        above, below = min(_before(v), height - 1), _after(v, height)
+        above, below = _before(v, height), _after(v, height)
         for k in range(3):
             one = colors[k, top + above, left : left + width]
             two = colors[k, top + v, left : left + width]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from cardbox_tracker.vision.background import SilhouetteExtractor
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, bgr_of, chroma_planes
+from cardbox_tracker.vision.chroma_kernels import collect_shares
 from cardbox_tracker.vision.color_reader import ColorReader, halved
 from cardbox_tracker.vision.empty_scene import BackgroundLearner
 from cardbox_tracker.vision.window import Window
@@ -173,3 +174,12 @@ def test_what_only_its_colour_shows_is_followed_from_image_to_image() -> None:
         image = np.roll(scene(as_bright_as_the_wall()), 2 * number, axis=1)
         whole = extractor()(image)
         assert np.count_nonzero(made(image) != whole) < 0.02 * np.count_nonzero(whole)
+
+
+def test_the_white_balance_of_an_image_of_one_square_is_that_of_its_colour() -> None:
+    """An image of 2x2 px has one pixel at half the resolution, which is its own neighbour."""
+    colors = np.array([100, 148, 118], np.uint8).reshape(3, 1, 1)
+    background = np.array([1 / 100, 0, 0, 1, 1, 200], np.float32).reshape(6, 1, 1)
+    shares = np.zeros((2, 1), np.float32)
+    collect_shares(colors, background, 1, shares)
+    np.testing.assert_allclose(shares[:, 0], [0.2, -0.1], rtol=1e-5)
