@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from decimal import Decimal
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,11 @@ PARQUET = ".parquet"
 
 _BODY_NAMES = (*JOINT_NAMES, *PLACE_NAMES)
 
-
 POINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
 """Columns of the keypoints, m in the optical frame of the first camera."""
 
 
+@cache
 def columns(has_points: bool = False) -> tuple[str, ...]:
     """Return the names of the columns, see :func:`units`."""
     return tuple(units(has_points))
