@@ -22,7 +22,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.initialization.first_sight import upper_body
 from cardbox_tracker.estimation.initialization.references import lateral_m
@@ -168,9 +168,8 @@ def _iou(cost: WholeBodyCost, estimate: Estimate, mask: Image) -> float:
     assert estimate.offset_m is not None
     state = np.concatenate([estimate.posture, estimate.offset_m])
     cost.see(mask, state)
-    _, costs_px, areas_px = cost.bodies(state[None])
-    common = 0.5 * (cost.silhouette_px + areas_px[0] - costs_px[0])
-    return float(common / max(cost.silhouette_px + areas_px[0] - common, 1.0))
+    rated = cost.bodies(state[None])
+    return iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
 
 
 def silhouette_iou(frames: Frames, silhouettes: str) -> FloatArray:

@@ -70,7 +70,8 @@ class Compared(NamedTuple):
 
 def terms_of(cost: WholeBodyCost, state: FloatArray) -> FloatArray:
     """Return the ``TERMS`` of the rating of a state (14,), (6,), as shares of the silhouette."""
-    rating, differing_px, _ = (float(values[0]) for values in cost.bodies(state[None]))
+    rated = cost.bodies(state[None])
+    rating, differing_px = float(rated.ratings[0]), float(rated.costs_px[0])
     pixels = differing_px / max(cost.silhouette_px, 1)
     prior = cost._prior
     by_part = np.array(priors(state, cost.body, prior))
@@ -111,7 +112,7 @@ def best_near(cost: WholeBodyCost, state: FloatArray, rng: np.random.Generator) 
         moved = np.array([cost.keypoints(one) for one in states]) - joints_m
         is_near = np.linalg.norm(beside_shoulders(moved), axis=2).max(axis=1) < _REACH_M
         states = np.concatenate([best[None], states[is_near]])
-        best = states[np.argmin(cost.bodies(states)[0])]
+        best = states[np.argmin(cost.bodies(states).ratings)]
         noise = _DECAY * noise
     return best
 
@@ -143,7 +144,7 @@ def compared(session: RecordedSession, seed: int, body: BodyModel | None = None)
         if stamp_ns not in truth or estimate.posture is None:
             return
         if isinstance(search, WholeBodyFilter):
-            best = search.states[np.argmin(search.ratings)]
+            best = search.rated.best(1)[0]
             found.append(compare(search._cost.costs[0], best, truth[stamp_ns], rng))
 
     only = InputSelection(only=session.truth.cameras[0] if session.truth.cameras else None)

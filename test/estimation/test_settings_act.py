@@ -171,7 +171,7 @@ def test_an_effort_takes_as_many_states_more(effort: float) -> None:
         for image, silhouette, _ in scenes()[:3]:
             assert tracker.track(silhouette, image).posture is not None
         assert isinstance(tracker.filter, WholeBodyFilter)
-        counts.append(len(tracker.filter.states))
+        counts.append(len(tracker.filter.rated.states))
     assert counts[1] / counts[0] == pytest.approx(effort, rel=0.2)
 
 

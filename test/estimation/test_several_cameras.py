@@ -128,7 +128,7 @@ def test_the_rating_is_the_mean_of_the_cameras_with_priors_once() -> None:
     states = np.array([state_of(t) for t in (0.0, 0.2, 0.4)])
     views.see(both(states[1]), states[1])
     views.choose((0, 1))
-    ratings, costs_px, _ = views.bodies(states)
+    ratings, costs_px, _, _ = views.bodies(states)
     alone = [cost.bodies(to(states)) for cost, to in zip(views.costs, views.to_views, strict=True)]
     shares = [a[1] / c.silhouette_px for a, c in zip(alone, views.costs, strict=True)]
     priors = alone[0][0] - shares[0]
@@ -140,7 +140,9 @@ def test_the_rating_is_the_mean_of_the_cameras_with_priors_once() -> None:
     for seeing in ((0,), (1,)):
         views.see(both(states[1]), states[1])
         views.choose(seeing)
-        np.testing.assert_allclose(views.bodies(states)[0], shares[seeing[0]] + priors, atol=1e-12)
+        np.testing.assert_allclose(
+            views.bodies(states).ratings, shares[seeing[0]] + priors, atol=1e-12
+        )
 
 
 def test_terms_of_each_camera_get_the_number_of_pixels_that_count() -> None:

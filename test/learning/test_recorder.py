@@ -26,7 +26,9 @@ EVIDENCE = Evidence(0.2, 0.1, 0.3, 0.6, 0.05, 0.04, STDDEV, STATE, 3)
 
 
 def result(state: np.ndarray = STATE) -> Result:
-    search = Search(np.array([state, state + 0.02]), np.array([0.1, 0.12]), 0.02, EVIDENCE, 0.1)
+    states = np.array([state, state + 0.02])
+    keypoints_m = COST.bodies(states).points.keypoints_m
+    search = Search(states, np.array([0.1, 0.12]), keypoints_m, 0.02, EVIDENCE, 0.1)
     frame = Frame(np.zeros((240, 320), np.uint8), 240, 0)
     viewpoints = Viewpoints.of(0.0, [0.0], is_measured=True)
     return Result(frame, state, STDDEV, COST.keypoints(state), 0.9, search, viewpoints)

@@ -21,8 +21,9 @@ from cardbox_tracker.body.posture import NEAREST_M, TORSO_X
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame, Silence, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost, iou_of
+from cardbox_tracker.estimation.cost.whole_body import Bodies, WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.vision.camera import Camera
 
 # Distance for which the units of the priors of ``torso_x`` were chosen, m.
@@ -56,7 +57,7 @@ class MultiViewCost:
         self.costs = [WholeBodyCost(body, camera, config)]
         self.costs += [WholeBodyCost(view.body, view.camera, without_priors) for view in views]
         self.to_views: list[ToView] = [lambda states: states, *(view.states for view in views)]
-        self.seeing: tuple[int, ...] = (0,)
+        self.choose([0])
         first = self.costs[0]
         self.parts, self.girdle = first.parts, first.girdle
         self.place, self.view, self.body = first.place, first.view, first.body
@@ -80,6 +81,7 @@ class MultiViewCost:
     def choose(self, seeing: Sequence[int]) -> None:
         """Use only the cameras with these indices in this frame."""
         self.seeing = tuple(seeing)
+        self._others = [number for number in seeing if number]
         if 0 not in self.seeing:
             # The priors of the first camera count in any case.
             self.costs[0].see_nothing()
@@ -142,32 +144,43 @@ class MultiViewCost:
         for number in {0, *self.seeing}:
             self.costs[number].fix_torso(self.to_views[number](torso))
 
-    def arms(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso."""
-        return self._sum(lambda cost, to_view: cost.arms(arms, arm))
+    def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
+        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
+
+        Returns:
+            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
+        """
+        ratings, joints_m = self.costs[0].arms(arms, arm)
+        for number in self._others:
+            ratings += self.costs[number].arms(arms, arm)[0]
+        ratings /= len(self.seeing)
+        return ratings, joints_m
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
         """Return approximate costs (N,) of arms (N, 4), 0 left or 1 right, without priors."""
         joints = self.costs[0].joints(arms, arm)
         return self._sum(lambda cost, _: cost.arms_by_points(joints, arm))
 
-    def pairs(self, states: FloatArray) -> FloatArray:
+    def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
         """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""
-        return self._sum(lambda cost, to_view: cost.pairs(to_view(states)))
+        ratings, points = self.costs[0].pairs(states)
+        for number in self._others:
+            ratings += self.costs[number].pairs(self.to_views[number](states))[0]
+        ratings /= len(self.seeing)
+        return ratings, points
 
-    def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rate whole states (N, 14): ratings, differing and drawn pixels of all cameras, (N,)."""
-        ratings, costs_px, areas_px = self.costs[0].bodies(states)
+    def bodies(self, states: FloatArray) -> Bodies:
+        """Rate whole states (N, 14), with the pixels of all cameras, and points of the first."""
+        ratings, costs_px, areas_px, points = self.costs[0].bodies(states)
         if 0 not in self.seeing:
             costs_px, areas_px = np.zeros((2, len(states)))
-        for number in self.seeing:
-            if number:
-                more = self.costs[number].bodies(self.to_views[number](states))
-                ratings += more[0]
-                costs_px += more[1]
-                areas_px += more[2]
+        for number in self._others:
+            more = self.costs[number].bodies(self.to_views[number](states))
+            ratings += more.ratings
+            costs_px += more.costs_px
+            areas_px += more.areas_px
         ratings /= len(self.seeing)
-        return ratings, costs_px, areas_px
+        return Bodies(ratings, costs_px, areas_px, points)
 
     def point_costs(self, states: FloatArray) -> FloatArray:
         """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
@@ -183,8 +196,8 @@ class MultiViewCost:
         found: list[float | None] = [None] * len(self.costs)
         for number in seeing:
             cost = self.costs[number]
-            _, (differ_px,), (drawn_px,) = cost.bodies(self.to_views[number](state)[None])
-            found[number] = iou_of(cost.silhouette_px, drawn_px, differ_px)
+            rated = cost.bodies(self.to_views[number](state)[None])
+            found[number] = iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
         return found
 
     def keypoints(self, state: FloatArray) -> FloatArray:
@@ -193,8 +206,7 @@ class MultiViewCost:
 
     def _sum(self, rate: Callable[[WholeBodyCost, ToView], FloatArray]) -> FloatArray:
         ratings = rate(self.costs[0], self.to_views[0])
-        for number in self.seeing:
-            if number:
-                ratings += rate(self.costs[number], self.to_views[number])
+        for number in self._others:
+            ratings += rate(self.costs[number], self.to_views[number])
         ratings /= len(self.seeing)
         return ratings

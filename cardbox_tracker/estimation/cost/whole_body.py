@@ -8,7 +8,7 @@ depend on the last place of the hips.
 from __future__ import annotations
 
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums, leave_out, median_column
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.whole_body_kernels import Points, PointsTuple
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
@@ -44,6 +45,22 @@ SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
 _TORSO_OF_TERMS = [*range(TORSO_ANGLES.stop), TORSO_X, TORSO_Z]
 _BOTH_ARMS, _TRUNK = (False, True, True), (True, False, False)
+
+
+class Bodies(NamedTuple):
+    """Rated states.
+
+    Attributes:
+        ratings: (N,); lower is better.
+        costs_px: pixels in which model and silhouettes differ, (N,).
+        areas_px: pixels of the model, (N,).
+        points: joints of the arms.
+    """
+
+    ratings: FloatArray
+    costs_px: FloatArray
+    areas_px: FloatArray
+    points: Points
 
 
 class WholeBodyCost:
@@ -86,7 +103,7 @@ class WholeBodyCost:
         self.anchor = np.zeros(4)
         front = body.reference_state()[None]
         self.see(np.zeros((camera.height, camera.width), np.uint8), front[0])
-        self.frontal_px = max(1, int(self.bodies(front)[2][0]))
+        self.frontal_px = max(1, int(self.bodies(front).areas_px[0]))
 
     def see(self, silhouette: Silhouette, state: FloatArray) -> None:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
@@ -182,34 +199,37 @@ class WholeBodyCost:
         add_costs_of_arms(joints, self._torso, self.body, *seen, costs)
         return costs
 
-    def arms(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso."""
-        ratings = np.empty(len(arms))
-        observed = self._beside_trunk, self._base_px, self._scale
-        side = 1.0 - 2.0 * arm
-        kernels.rate_arms(arms, side, self._torso, self.body, observed, self._prior, ratings)
+    def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
+        """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
+
+        Returns:
+            Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
+        """
+        ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
+        seen = (self._beside_trunk, self._base_px, self._scale), self._prior
+        kernels.rate_arms(arms, 1.0 - 2.0 * arm, self._torso, self.body, *seen, ratings, joints_m)
         for costs in self._arm_terms:
             ratings += self._scale * costs(SIDES[arm], arms)
-        return ratings
+        return ratings, joints_m
 
-    def pairs(self, states: FloatArray) -> FloatArray:
+    def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
         """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
-        ratings = np.empty(len(states))
-        observed = self._beside_trunk, self._base_px, self._scale
-        kernels.rate_pairs(states, self.body, observed, self._prior, ratings)
+        ratings, points = np.empty(len(states)), _new_points(len(states))
+        seen = (self._beside_trunk, self._base_px, self._scale), self._prior
+        kernels.rate_pairs(states, self.body, *seen, ratings, points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
-        return ratings
+        return ratings, Points(*points)
 
-    def bodies(self, states: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rate whole states (N, 14): ratings, differing and drawn pixels, each (N,)."""
+    def bodies(self, states: FloatArray) -> Bodies:
+        """Rate whole states (N, 14)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))
-        observed = self._seen, self.silhouette_px, self._scale
-        rated = ratings, costs_px, areas_px
-        kernels.rate_bodies(states, self.body, observed, self._prior, *rated)
+        seen = (self._seen, self.silhouette_px, self._scale), self._prior
+        points = _new_points(len(states))
+        kernels.rate_bodies(states, self.body, *seen, ratings, (costs_px, areas_px), points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
-        return ratings, costs_px, areas_px
+        return Bodies(ratings, costs_px, areas_px, Points(*points))
 
     def point_costs(self, states: FloatArray) -> FloatArray:
         """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
@@ -246,6 +266,11 @@ class WholeBodyCost:
     @property
     def _prior(self) -> priors.PriorTuple:
         return self.anchor, self._rules, self._gaussians
+
+
+def _new_points(count: int) -> PointsTuple:
+    """Allocate the fields of :class:`~.whole_body_kernels.Points` for ``count`` states."""
+    return np.empty((count, 6, 3)), np.empty((count, 6, 3))
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:

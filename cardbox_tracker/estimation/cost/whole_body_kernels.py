@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import kernel
+from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
     BODY_PATCHES,
@@ -52,7 +52,28 @@ class Observed(NamedTuple):
     scale: float
 
 
+class Points(NamedTuple):
+    """Shoulder, elbow and hand of the left, then of the right arm of N states.
+
+    Attributes:
+        joints_m: in the torso's frame, (N, 6, 3), metres.
+        keypoints_m: in the optical frame, (N, 6, 3), metres.
+    """
+
+    joints_m: Floats
+    keypoints_m: Floats
+
+
 ObservedTuple = tuple[RowSums, int, float]
+PointsTuple = tuple[Floats, Floats]
+
+
+@inlined_kernel
+def _copy(points: Floats, written: Floats) -> None:
+    """Copy points (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            written[i, j] = points[i, j]
 
 
 @kernel
@@ -80,10 +101,12 @@ def rate_arms(
     observed: ObservedTuple,
     prior: PriorTuple,
     ratings: Floats,
+    joints_m: Floats,
 ) -> None:
     """Write ratings (N,) of one arm (N, 4) beside the trunk of the state ``torso`` (14,).
 
     ``observed`` is the silhouette with that trunk drawn; ``side`` is 1 for left, -1 for right.
+    Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
@@ -94,6 +117,7 @@ def rate_arms(
         pose_arm(arms[i], side, of.parts, of.girdle, arm.points, arm.directions)
         turn_arm(arm, work.torso, work.hip)
         place_arm(arm, 0, of.drawn, work.corners)
+        _copy(arm.points, joints_m[i])
         draw(work, of.camera, rows, width)
         gain = sum_union(work, ARM_PATCHES, seen.row_sums)[0]
         rated = arm_prior(arm, side, of.parts, given, logs)
@@ -107,14 +131,26 @@ def rate_bodies(
     observed: ObservedTuple,
     prior: PriorTuple,
     ratings: Floats,
-    costs_px: Floats,
-    areas_px: Floats,
+    pixels: tuple[Floats, Floats],
+    points: PointsTuple,
 ) -> None:
-    """Write ratings, costs in pixels and drawn areas, each (N,), of states (N, 14)."""
+    """Write ratings (N,) of states (N, 14), their pixels, and the points of their arms.
+
+    Args:
+        states: (N, 14).
+        body: fields of :class:`~.kernel_arguments.Body`.
+        observed: fields of :class:`Observed`.
+        prior: fields of :class:`~.body_priors.Prior`.
+        ratings: written, (N,).
+        pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
+        points: fields of :class:`Points`, written.
+    """
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
     work, arm = new_workspace(BODY_PATCHES, rows), new_arm()
     logs = np.empty(given.gaussians.shape[1])
+    costs_px, areas_px = pixels
+    joints_m, keypoints_m = points
     for i in range(states.shape[0]):
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
@@ -124,6 +160,8 @@ def rate_bodies(
             pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
             turn_arm(arm, work.torso, work.hip)
             place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, of.drawn, work.corners)
+            _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
+            _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
             rated += arm_prior(arm, side, of.parts, given, logs)
         draw(work, of.camera, rows, width)
         gain, area = sum_union(work, BODY_PATCHES, seen.row_sums)
@@ -134,11 +172,17 @@ def rate_bodies(
 
 @kernel
 def rate_pairs(
-    states: Floats, body: BodyTuple, observed: ObservedTuple, prior: PriorTuple, ratings: Floats
+    states: Floats,
+    body: BodyTuple,
+    observed: ObservedTuple,
+    prior: PriorTuple,
+    ratings: Floats,
+    points: PointsTuple,
 ) -> None:
-    """Write ratings (N,) of states (N, 14) that all have the trunk of the first one.
+    """Write ratings (N,) and points of states (N, 14) that all have the trunk of the first one.
 
-    ``observed`` is the silhouette with that trunk drawn, so only the arms are.
+    ``observed`` is the silhouette with that trunk drawn, so only the arms are. The other arguments
+    are those of :func:`rate_bodies`.
     """
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
@@ -146,6 +190,7 @@ def rate_pairs(
     logs = np.empty(given.gaussians.shape[1])
     state_pose(states[0], of.place, of.camera, work.torso, work.hip)
     of_torso = torso_prior(states[0], given)
+    joints_m, keypoints_m = points
     for i in range(states.shape[0]):
         rated = of_torso
         for k in range(2):
@@ -153,6 +198,8 @@ def rate_pairs(
             pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
             turn_arm(arm, work.torso, work.hip)
             place_arm(arm, ARM_PATCHES * k, of.drawn, work.corners)
+            _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
+            _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
             rated += arm_prior(arm, side, of.parts, given, logs)
         draw(work, of.camera, rows, width)
         gain = sum_union(work, 2 * ARM_PATCHES, seen.row_sums)[0]

@@ -157,7 +157,7 @@ def placed_upright(
     for state in candidates:
         cost.see(silhouettes, state)
         cost.choose(seeing)
-        misfits.append(cost.bodies(state[None])[1][0] / max(cost.silhouette_px, 1))
+        misfits.append(cost.bodies(state[None]).costs_px[0] / max(cost.silhouette_px, 1))
     misfits[0] *= _BETTER
     best = int(np.argmin(misfits))
     cost.see(silhouettes, candidates[best])

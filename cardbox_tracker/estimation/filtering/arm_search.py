@@ -43,9 +43,9 @@ class ArmSearch:
         """
         config, cost = self._config, self._cost
         arms = self._proposed(pool, arm, *draws.for_arms(self._candidates * config.arms))
-        ratings = cost.arms(arms, arm)
+        ratings, joints_m = cost.arms(arms, arm)
         self.spreads_m[2 * arm : 2 * arm + 2] = state_choice.spread_of_arm(
-            arms, ratings, 1.0 - 2.0 * arm, config.spread, cost.parts, cost.girdle
+            joints_m, ratings, config.spread
         )
         near = arm_proposals.around_best(
             arms,
@@ -56,7 +56,7 @@ class ArmSearch:
             draws.for_near_arms(self._candidates * config.arms_again),
         )
         near = self.promising(near, arm)
-        return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)])
+        return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)[0]])
 
     def _proposed(
         self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray

@@ -182,8 +182,8 @@ class NetworkCorrector:
             wanted_m = moved(found.keypoints_m, share * answers_m)
             state = found.state.copy()
             pose_at_keypoints(state, self._cost.body, wanted_m, self._cost.limits)
-            _, (differing_px,), (model_px,) = self._cost.bodies(state[None])
-            iou = iou_of(self._cost.silhouette_px, model_px, differing_px)
+            rated = self._cost.bodies(state[None])
+            iou = iou_of(self._cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
             if iou >= found.iou - MOST_IOU_LOSS:
                 return wanted_m
         return found.keypoints_m
@@ -210,7 +210,7 @@ def inputs_of(found: Result, cost: WholeBodyCost, camera: Camera) -> FloatArray:
     frame, keypoints_m = found.frame, found.keypoints_m
     inputs = np.zeros((2, N_FEATURES))
     inputs[:, :FEATURES] = features_of_result(found)
-    inputs[:, _OF_SEARCH] = features_of_search(found.search, cost, keypoints_m)
+    inputs[:, _OF_SEARCH] = features_of_search(found.search, keypoints_m)
     if found.viewpoints.has_depth:
         inputs[:, OF_DEPTH] = features_of_depth(frame, camera, keypoints_m)
     if frame.points is not None:

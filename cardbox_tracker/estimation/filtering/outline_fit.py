@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
-from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import (
     SHARES,
@@ -30,7 +29,7 @@ from cardbox_tracker.estimation.cost.outline_points import POINTS
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering import state_choice
+from cardbox_tracker.estimation.filtering.rated_states import RatedStates
 from cardbox_tracker.vision.camera import Camera
 
 # Standard deviations of the prior around the filter's state: angles in rad, places in m.
@@ -129,17 +128,11 @@ class OutlineFit:
         )
         return clipped
 
-    def different(
-        self,
-        frames: Sequence[Frame],
-        states: FloatArray,
-        ratings: FloatArray,
-        cost: MultiViewCost,
-    ) -> FloatArray:
-        """Return fits (N, 14) of the best different states of ``states`` (M, 14)."""
-        kept = state_choice.choose_apart(states, ratings, *_DIFFERENT, cost.parts, cost.girdle)
-        fitted = [self.fitted(frames, state, _STEPS_OF_DIFFERENT) for state in states[kept]]
-        clipped: FloatArray = np.clip(np.array(fitted), *cost.limits.T)
+    def different(self, frames: Sequence[Frame], rated: RatedStates) -> FloatArray:
+        """Return fits (N, 14) of the best different states."""
+        chosen = rated.different(*_DIFFERENT)
+        fitted = [self.fitted(frames, state, _STEPS_OF_DIFFERENT) for state in chosen]
+        clipped: FloatArray = np.clip(np.array(fitted), self._low, self._high)
         return clipped
 
     def fitted(self, frames: Sequence[Frame], state: FloatArray, steps: int) -> FloatArray:

@@ -26,9 +26,10 @@ from cardbox_tracker.estimation.cost.joint_points_fit import FittedTuple, fit_st
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering import point_doubt, state_choice
+from cardbox_tracker.estimation.filtering import point_doubt
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
+from cardbox_tracker.estimation.filtering.rated_states import RatedStates
 
 # Gauss-Newton steps, and deviation of a value in a step, rad and m.
 _STEPS, _STEP_DEVIATION = 3, 0.25
@@ -115,17 +116,11 @@ class PointFit:
         upright[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
         return self._fitted_from(np.array([survivors[0], survivors[-1], turned, upright]))
 
-    def bodies(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
-        """Return fits (N, 14) of the best different states, and of the best one's mirror images.
-
-        Args:
-            states: rated states, (M, 14).
-            ratings: their ratings, (M,).
-        """
-        cost = self._cost
-        kept = state_choice.choose_apart(states, ratings, *_DIFFERENT, cost.parts, cost.girdle)
-        mirrored = mirrored_states(states[kept[0]], cost.body, ARM_LIMITS)
-        return self._fitted_from(np.concatenate([states[kept], mirrored[1:]]))
+    def bodies(self, rated: RatedStates) -> FloatArray:
+        """Return fits (N, 14) of the best different states, and of the best one's mirror images."""
+        chosen = rated.different(*_DIFFERENT)
+        mirrored = mirrored_states(chosen[0], self._cost.body, ARM_LIMITS)
+        return self._fitted_from(np.concatenate([chosen, mirrored[1:]]))
 
     def _fitted_from(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) near ``states`` that fit the points and the torso's priors."""

@@ -13,8 +13,6 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.cost.kinematics import keypoints
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.loss import Evidence, freshness, log_area
 
 # Least relative weight of a state that counts.
@@ -37,6 +35,7 @@ class Search(NamedTuple):
     Attributes:
         states: rated states, (N, 14).
         ratings: ratings of the states, (N,); each state has the weight exp(-rating / ``spread``).
+        keypoints_m: keypoints of the states in the optical frame, (N, 6, 3), metres.
         spread: difference of ratings that changes a weight by the factor e.
         evidence: evidence for or against the mean state.
         chance: probability of loss, see :mod:`.loss`.
@@ -44,12 +43,13 @@ class Search(NamedTuple):
 
     states: FloatArray
     ratings: FloatArray
+    keypoints_m: FloatArray
     spread: float
     evidence: Evidence
     chance: float
 
 
-def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray) -> FloatArray:
+def features_of_search(search: Search, result_m: FloatArray) -> FloatArray:
     """Return the features (2, F) for the left arm and the mirrored right arm.
 
     For elbow and hand of the arm, then of the other arm, relative to the middle of the shoulders,
@@ -57,11 +57,10 @@ def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray
 
     Args:
         search: result of the search.
-        cost: cost that has rated the states.
         result_m: keypoints of the result, (6, 3), metres in the optical frame.
     """
     features = np.empty((2, SEARCH_FEATURES))
-    _fill(search.states, search.ratings, search.spread, result_m, cost.body, features)
+    _fill(search.keypoints_m, search.ratings, search.spread, result_m, features)
     seen = search.evidence
     features[:, OF_EVIDENCE] = (
         seen.residual,
@@ -77,25 +76,17 @@ def features_of_search(search: Search, cost: WholeBodyCost, result_m: FloatArray
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill(
-    states: Any,
-    ratings: Any,
-    spread: float,
-    result_m: Any,
-    body: Any,
-    features: Any,
-) -> None:
+def _fill(keypoints_m: Any, ratings: Any, spread: float, result_m: Any, features: Any) -> None:
     """Write means and deviations of :func:`features_of_search` to ``features`` (2, F)."""
     count = len(_MOVING)
     sums, squares = np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
-    points, seen, total, best = np.empty((6, 3)), np.empty((count + 1, 3)), 0.0, ratings.min()
-    for n in range(len(states)):
+    seen, total, best = np.empty((count + 1, 3)), 0.0, ratings.min()
+    for n in range(len(ratings)):
         weight = exp((best - ratings[n]) / spread)
         if weight < _LEAST_WEIGHT:
             continue
-        keypoints(states[n], body, points)
         total += weight
-        _beside_middle(points, seen)
+        _beside_middle(keypoints_m[n], seen)
         for j in range(count + 1):
             for axis in range(3):
                 sums[j, axis] += weight * seen[j, axis]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.posture import N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
-from cardbox_tracker.estimation.cost.kinematics import angles_in, pose_arm, side_of
 
 # Metres per radian of yaw or pitch in the distance between states.
 _RADIAN_M = 0.3
@@ -18,27 +17,23 @@ Indices = NDArray[np.int64]
 
 
 @kernel
-def spread_of_arm(
-    arms: Floats, ratings: Floats, side: float, spread: float, parts: Floats, girdle: Floats
-) -> tuple[float, float]:
+def spread_of_arm(joints_m: Floats, ratings: Floats, spread: float) -> tuple[float, float]:
     """Return the weighted deviations of elbow and hand in the torso's frame, metres.
 
-    The weights of the arms (N, 4) are exp(-(rating - best) / ``spread``).
+    The weights of the arms, with ``joints_m`` (N, 3, 3), are exp(-(rating - best) / ``spread``).
     """
-    points, directions = np.empty((3, 3)), np.empty(6)
     best = ratings.min()
     total = 0.0
     sums, squares = np.zeros((3, 3)), np.zeros((3, 3))
-    for i in range(arms.shape[0]):
+    for i in range(joints_m.shape[0]):
         weight = exp((best - ratings[i]) / spread)
         if weight < 1e-4:
             continue
-        pose_arm(arms[i], side, parts, girdle, points, directions)
         total += weight
         for j in range(1, 3):
             for c in range(3):
-                sums[j, c] += weight * points[j, c]
-                squares[j, c] += weight * points[j, c] ** 2
+                sums[j, c] += weight * joints_m[i, j, c]
+                squares[j, c] += weight * joints_m[i, j, c] ** 2
     elbow, hand = 0.0, 0.0
     for c in range(3):
         elbow += max(squares[1, c] / total - (sums[1, c] / total) ** 2, 0.0)
@@ -48,32 +43,24 @@ def spread_of_arm(
 
 @kernel
 def choose_apart(
-    states: Floats,
-    ratings: Floats,
-    most: int,
-    alike: int,
-    apart_m: float,
-    parts: Floats,
-    girdle: Floats,
+    states: Floats, ratings: Floats, joints_m: Floats, most: int, alike: int, apart_m: float
 ) -> Indices:
     """Return up to ``most`` indices: the best ``alike``, then the best that differ from all chosen.
 
     Two states (N, 14) differ if their Euclidean distance is at least ``apart_m``. It includes
-    elbows and hands in the torso's frame, ``torso_x``, ``torso_y``, yaw and pitch, with a factor of
-    0.3 m per radian.
+    elbows and hands in the torso's frame, from ``joints_m`` (N, 6, 3), ``torso_x``, ``torso_y``,
+    yaw and pitch, with a factor of 0.3 m per radian.
     """
     order = np.argsort(ratings, kind="mergesort")
     chosen = np.empty(most, np.int64)
     features, one = np.empty((most, 16)), np.empty(16)
-    points, directions = np.empty((3, 3)), np.empty(6)
     found = 0
     for i in order:
         state = states[i]
         for arm in range(2):
-            pose_arm(angles_in(state, arm), side_of(arm), parts, girdle, points, directions)
             for c in range(3):
-                one[6 * arm + c] = points[1, c]
-                one[6 * arm + 3 + c] = points[2, c]
+                one[6 * arm + c] = joints_m[i, 3 * arm + 1, c]
+                one[6 * arm + 3 + c] = joints_m[i, 3 * arm + 2, c]
         one[12], one[13] = state[TORSO_X], state[TORSO_Y]
         one[14], one[15] = _RADIAN_M * state[YAW], _RADIAN_M * state[PITCH]
         is_new = True

@@ -47,6 +47,7 @@ from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
 from cardbox_tracker.estimation.filtering.presence import PersonPresence
+from cardbox_tracker.estimation.filtering.rated_states import RatedStates
 from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
@@ -65,8 +66,7 @@ class WholeBodyFilter:
     of several cameras may show no person for a while.
 
     Attributes:
-        states: rated states of the last frame, (N, 14).
-        ratings: ratings of the states, (N,); lower is better.
+        rated: rated states of the last frame.
         refine: fits the result to the outlines, corrects it, and estimates its deviations.
         approach: expects and proposes distances of the person.
     """
@@ -178,15 +178,12 @@ class WholeBodyFilter:
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
         pool = self._torsos(before, location, draws)
-        ratings = cost.bodies(pool)[0]
-        best = pool[np.argmin(ratings)]
-        by_rating = state_choice.best_states(pool, ratings, min(len(pool), config.survivors))
-        cost.fix_torso(best)
-        left, right = (self._arm(by_rating, arm, draws) for arm in (0, 1))
-        pairs = joint_moves.combine(best, *left, *right, config.paired_arms)
-        states = np.concatenate([pool, pairs])
-        ratings = np.concatenate([ratings, cost.pairs(pairs)])
-        self._together(frames, states, ratings, draws)
+        rated = RatedStates.of(pool, cost)
+        best = rated.best(config.survivors)
+        cost.fix_torso(best[0])
+        left, right = (self._arm(best, arm, draws) for arm in (0, 1))
+        pairs = joint_moves.combine(best[0], *left, *right, config.paired_arms)
+        self._together(frames, rated.joined(RatedStates.of_pairs(pairs, cost)), draws)
 
     def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
         """Return states (N, 14): the survivors, and the best new torsos with arms."""
@@ -214,25 +211,20 @@ class WholeBodyFilter:
             more.append(self._points.torsos(self._survivors, before, self._reference))
         return np.concatenate([pool, *more])
 
-    def _together(
-        self, frames: Sequence[Frame], states: FloatArray, ratings: FloatArray, draws: Draws
-    ) -> None:
+    def _together(self, frames: Sequence[Frame], rated: RatedStates, draws: Draws) -> None:
         """Move all joints of the best states together; then choose the survivors."""
         config, cost = self._config, self._cost
         if self._plan.fits_outlines:
-            fitted = self.refine.outline.different(frames, states, ratings, cost)
-            states = np.concatenate([states, fitted])
-            ratings = np.concatenate([ratings, cost.bodies(fitted)[0]])
+            fitted = self.refine.outline.different(frames, rated)
+            rated = rated.joined(RatedStates.of(fitted, cost))
         if self._points.is_given:
-            near = self._points.bodies(states, ratings)
-            states = np.concatenate([states, near])
-            ratings = np.concatenate([ratings, cost.bodies(near)[0]])
+            rated = rated.joined(RatedStates.of(self._points.bodies(rated), cost))
         sigma = config.together_noise * self._sigma
-        sources = self._apart(states, ratings)
+        different = config.survivors, config.alike, config.apart_m
+        sources = rated.different(*different)
         for number in range(config.rounds):
             if number > 0:
-                most = min(config.survivors, len(states))
-                sources = state_choice.best_states(states, ratings, most)
+                sources = rated.best(config.survivors)
             moved = joint_moves.move_all(
                 sources,
                 (sigma, cost.limits, self._lever_m),
@@ -240,44 +232,39 @@ class WholeBodyFilter:
                 config.difference_scale,
                 draws.for_states(config.together),
             )
-            states = np.concatenate([states, moved])
-            ratings = np.concatenate([ratings, cost.bodies(moved)[0]])
+            rated = rated.joined(RatedStates.of(moved, cost))
             sigma = config.round_decay * sigma
-        self.states, self.ratings = states, ratings
-        self._survivors = self._apart(states, ratings)
-
-    def _apart(self, states: FloatArray, ratings: FloatArray) -> FloatArray:
-        c, cost = self._config, self._cost
-        kept = (c.survivors, c.alike, c.apart_m)
-        return states[state_choice.choose_apart(states, ratings, *kept, cost.parts, cost.girdle)]
+        self.rated = rated
+        self._survivors = rated.different(*different)
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:
         """Return the refined mean of the best states with its confidence."""
         config, cost, frame = self._config, self._cost, frames[0]
-        rated = self.states, self.ratings
+        rated = self.rated.states, self.rated.ratings
         mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
         spread, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self.refine.outline(frames, self._output)
         both = np.array([mean, fitted])
-        _, (mean_differs_px, differs_px), (mean_px, drawn_px) = cost.bodies(both)
+        _, (mean_differs_px, differs_px), (mean_px, drawn_px), _ = cost.bodies(both)
         is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
-            _, (differs_px,), (drawn_px,) = cost.bodies(fitted[None])
+            _, (differs_px,), (drawn_px,), _ = cost.bodies(fitted[None])
         fit_iou = iou_of(total, drawn_px, differs_px)
         found = (mean, stddev), (mean_differs_px, mean_px), self._arm.spreads_m
         evidence = evidence_in(cost, rated, *found, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
-        seen = frame, fitted, spread, fit_iou, Search(*rated, config.spread, evidence, self._chance)
+        found_by = *rated, self.rated.keypoints_m, config.spread, evidence, self._chance
+        seen = frame, fitted, spread, fit_iou, Search(*found_by)
         result = fitted if is_by_points else self.refine.corrected(*seen)
-        _, (cost_px,), (area_px,) = cost.bodies(result[None])
+        _, (cost_px,), (area_px,), points = cost.bodies(result[None])
         iou = iou_of(total, area_px, cost_px)
         self._result = result
         if self._plan.keeps_result:
             self._survivors[-1] = fitted  # in place of the worst one
-        keypoints_m = cost.keypoints(result)
+        keypoints_m = points.keypoints_m[0]
         last = frame, result, spread, keypoints_m, iou
         deviations = spread if is_by_points else self.refine.deviations(*last)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou

@@ -169,8 +169,8 @@ class _Search:
         body = self._body(best)
         postures, _ = self._postures(body)
         cost = self._cost(body, postures)
-        _, costs_px, areas_px = cost.bodies(postures)
-        iou = iou_of(cost.silhouette_px, areas_px[0], costs_px[0])
+        rated = cost.bodies(postures)
+        iou = iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
         x_m, z_m = postures[0, PLACE].tolist()
         place, unknown = body.placement, body.unknown
         body = body.with_values(
@@ -203,7 +203,7 @@ class _Search:
 
     def _rate(self, steps: FloatArray, postures: FloatArray) -> float:
         own = np.sum(np.where(self._spread > 0, steps, 0.0) ** 2)
-        return float(self._cost(self._body(steps), postures).bodies(postures)[0].min()) + (
+        return float(self._cost(self._body(steps), postures).bodies(postures).ratings.min()) + (
             _PRIOR * float(own)
         )
 
@@ -221,5 +221,6 @@ class _Search:
         if search.look(frames) is not Presence.PERSON:
             return np.zeros((1, N_STATE)), np.array([np.inf])
         search.follow(frames, [()])
-        order = np.argsort(search.ratings, kind="stable")[:_POSTURES]
-        return search.states[order], search.ratings[order]
+        rated = search.rated
+        order = np.argsort(rated.ratings, kind="stable")[:_POSTURES]
+        return rated.states[order], rated.ratings[order]

@@ -191,7 +191,7 @@ def _share(
         state = there.reference_state(name)
         seen = view.states(state)
         cost.see(view.upright(silhouette, is_mask=True), seen)
-        shares.append(float(cost.bodies(seen[None])[0][0]) if cost.silhouette_px else 1.0)
+        shares.append(float(cost.bodies(seen[None]).ratings[0]) if cost.silhouette_px else 1.0)
     return float(np.mean(shares))
 
 

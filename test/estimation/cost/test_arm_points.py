@@ -92,5 +92,5 @@ def test_they_order_arms_much_as_drawn_ones_do(seed: int) -> None:
         silhouette[max(v.min(), 0) : max(v.max(), 0), max(u.min(), 0) : max(u.max(), 0)] = 255
     cost.see(silhouette, state)
     cost.fix_torso(state)
-    about, drawn = about_of(cost, arms), cost.arms(arms, 0)
+    about, drawn = about_of(cost, arms), cost.arms(arms, 0)[0]
     assert np.corrcoef(np.argsort(np.argsort(about)), np.argsort(np.argsort(drawn)))[0, 1] > 0.7

@@ -133,7 +133,7 @@ def test_pixels_are_those_of_the_drawn_outlines(seed: int, distance_m: float) ->
     silhouette = np.random.default_rng(seed).integers(0, 2, (120, 160)).astype(np.uint8) * 255
     of.see(silhouette, state())
     states = random_states(4, seed)
-    _, costs_px, areas_px = of.bodies(states)
+    _, costs_px, areas_px, _ = of.bodies(states)
     for one, cost_px, area_px in zip(states, costs_px, areas_px, strict=True):
         model = drawn(of, one)
         assert area_px == np.count_nonzero(model)
@@ -165,8 +165,8 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     of.see(person, one)
     of.fix_torso(one)
     trunk = of.torsos(one[None], one)[0]
-    left, right = (of.arms(one[None, 4 + 4 * k : 8 + 4 * k], k)[0] for k in (0, 1))
-    px, _ = of.bodies(one[None])[1:]
+    left, right = (of.arms(one[None, 4 + 4 * k : 8 + 4 * k], k)[0][0] for k in (0, 1))
+    px = of.bodies(one[None]).costs_px
     torso, left_prior, right_prior = priors(one, of.body, of._prior)
     share = px[0] / of.silhouette_px
     assert trunk == pytest.approx(share + torso)
@@ -186,7 +186,7 @@ def test_pairs_of_arms_beside_a_trunk_are_rated_as_whole_bodies(seed: int) -> No
     states = random_states(6, seed)
     states[:, [0, 1, 2, 3, 12, 13]] = states[0, [0, 1, 2, 3, 12, 13]]
     of.fix_torso(states[0])
-    np.testing.assert_array_equal(of.pairs(states), of.bodies(states)[0])
+    np.testing.assert_array_equal(of.pairs(states)[0], of.bodies(states).ratings)
 
 
 def test_the_torsos_prior_by_hand() -> None:
@@ -289,14 +289,14 @@ def test_further_terms_add_their_pixels_to_arms_and_bodies() -> None:
     of.see(person, state())
     states = random_states(5, 3)
     of.fix_torso(states[0])
-    bodies, arms = of.bodies(states)[0], of.arms(states[:, 4:8].copy(), 0)
+    bodies, arms = of.bodies(states)[0], of.arms(states[:, 4:8].copy(), 0)[0]
     squares = Squares()
     of.terms = (squares,)
     of.fix_torso(states[0])
     more = squares.postures(states) / of.silhouette_px
     np.testing.assert_allclose(of.bodies(states)[0], bodies + more)
     more = squares.arms_beside(states[0, :6])("left", states[:, 4:8].copy()) / of.silhouette_px
-    np.testing.assert_allclose(of.arms(states[:, 4:8].copy(), 0), arms + more)
+    np.testing.assert_allclose(of.arms(states[:, 4:8].copy(), 0)[0], arms + more)
 
 
 def test_the_median_column_is_where_the_person_is() -> None:

@@ -57,7 +57,8 @@ def search(state: np.ndarray, chance: float = 0.1) -> Search:
     """A search whose states are those around ``state``."""
     evidence = Evidence(0.1, 0.05, 0.05, 1.0, 0.0, 0.05, STDDEV, state, 100)
     states = np.array([state, state + 0.02, state - 0.02])
-    return Search(states, np.array([0.1, 0.12, 0.12]), 0.02, evidence, chance)
+    keypoints_m = COST.bodies(states).points.keypoints_m
+    return Search(states, np.array([0.1, 0.12, 0.12]), keypoints_m, 0.02, evidence, chance)
 
 
 class Correction:
@@ -140,7 +141,9 @@ def test_in_the_mirror_the_correction_is_mirrored(seed: int) -> None:
     for _ in range(3):
         state = FRONT + 0.1 * rng.standard_normal(14)
         other = MIRROR * state[OTHER_ARM]
-        mirrored = search(state)._replace(states=MIRROR * search(state).states[:, OTHER_ARM])
+        states = MIRROR * search(state).states[:, OTHER_ARM]
+        keypoints_m = COST.bodies(states).points.keypoints_m
+        mirrored = search(state)._replace(states=states, keypoints_m=keypoints_m)
         found = here(NOBODY, state, STDDEV, NO_IOU, search(state), VIEWPOINTS)
         found_there = there(NOBODY, other, STDDEV, NO_IOU, mirrored, VIEWPOINTS)
         assert np.allclose(MIRROR * found[OTHER_ARM], found_there, atol=1e-4)
@@ -168,7 +171,7 @@ def test_a_correction_that_leaves_the_silhouette_is_not_made() -> None:
     body = BodyModel.of(distance_m=2.3)
     cost = WholeBodyCost(body, CAMERA, WholeBodyCostConfig())
     cost.see(render(cardbox_patches(body, FRONT[:12]), CAMERA), FRONT)
-    _, (differing,), (drawn,) = cost.bodies(FRONT[None])
+    _, (differing,), (drawn,), _ = cost.bodies(FRONT[None])
     iou = iou_of(cost.silhouette_px, drawn, differing)
     assert iou > 0.8
     network = load_recurrent_network(DATA)

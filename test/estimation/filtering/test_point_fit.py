@@ -22,6 +22,7 @@ from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfi
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
+from cardbox_tracker.estimation.filtering.rated_states import RatedStates
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
@@ -147,10 +148,9 @@ def test_a_fit_is_finite_and_within_the_limits_whatever_a_point_says(
     px[POINT_INDEX["left_wrist"]] = wrong_px, -wrong_px
     one = Fit()
     fit = one.see(replace(points, px=px))
-    ratings = np.array([0.0, 1.0])
     states = np.array([BEGIN, FRONT])
     for found in (
-        fit.bodies(states, ratings),
+        fit.bodies(RatedStates.of(states, one.cost)),
         fit.torsos(states, BEGIN, FRONT),
         fit.polished(BEGIN)[None],
     ):
@@ -161,7 +161,7 @@ def test_fits_do_not_write_to_the_states_they_begin_with(detected: Detect) -> No
     one = Fit()
     fit = one.see(detected(BODY, CAMERA, near([0.1] * 14)))
     states, before = np.array([BEGIN, FRONT]), np.array([BEGIN, FRONT])
-    fit.bodies(states, np.array([0.0, 1.0]))
+    fit.bodies(RatedStates.of(states, one.cost))
     fit.torsos(states, states[0], states[1])
     fit.polished(states[0])
     np.testing.assert_array_equal(states, before)
@@ -174,7 +174,7 @@ def test_a_fit_costs_less_than_its_begin(detected: Detect) -> None:
     one = Fit()
     fit = one.see(detected(BODY, CAMERA, wanted))
     before = one.cost.point_costs(FRONT[None])[0]
-    fitted = fit.bodies(np.array([FRONT, BEGIN]), np.array([0.0, 1.0]))
+    fitted = fit.bodies(RatedStates.of(np.array([FRONT, BEGIN]), one.cost))
     assert one.cost.point_costs(fitted).min() < 0.2 * before
 
 

@@ -34,7 +34,9 @@ STATE = np.append(reference_posture("arms"), [0.0, 0.0])
 STDDEV = np.full(14, 0.1)
 CONFIG = WholeBodyConfig()
 EVIDENCE = Evidence(0.1, 0.05, 0.05, 1.0, 0.0, 0.05, STDDEV, STATE, 100)
-SEARCH = Search(np.array([STATE, STATE + 0.05]), np.array([0.1, 0.12]), 0.02, EVIDENCE, 0.1)
+STATES = np.array([STATE, STATE + 0.05])
+KEYPOINTS_M = COST.bodies(STATES).points.keypoints_m
+SEARCH = Search(STATES, np.array([0.1, 0.12]), KEYPOINTS_M, 0.02, EVIDENCE, 0.1)
 
 
 def seen(depth_m: np.ndarray | None = None) -> Frame:

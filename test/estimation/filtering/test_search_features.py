@@ -31,7 +31,8 @@ MIRROR = np.array([-1, -1, 1, -1, *[1] * 10])
 
 def search(states: np.ndarray, ratings: np.ndarray) -> Search:
     evidence = Evidence(0.1, 0.2, 0.3, 0.5, 0.05, 0.06, np.zeros(14), FRONT, 15)
-    return Search(states, ratings, 0.02, evidence, 0.7)
+    keypoints_m = COST.bodies(states).points.keypoints_m
+    return Search(states, ratings, keypoints_m, 0.02, evidence, 0.7)
 
 
 def places(points: np.ndarray) -> np.ndarray:
@@ -47,7 +48,7 @@ def test_means_and_deviations_of_the_places_are_weighted_by_fit() -> None:
     # A difference of 0.02 log(3) makes the second state a third as likely: 3/4 and 1/4.
     ratings = np.array([0.1, 0.1 + 0.02 * np.log(3.0)])
     result_m = COST.keypoints(FRONT)
-    found = features_of_search(search(np.array([FRONT, bent]), ratings), COST, result_m)
+    found = features_of_search(search(np.array([FRONT, bent]), ratings), result_m)
     assert found.shape == (2, SEARCH_FEATURES)
     shift = there[1] - there[0]
     mean, deviation = 0.25 * shift, np.sqrt(0.25 * 0.75) * np.abs(shift)
@@ -60,7 +61,7 @@ def test_means_and_deviations_of_the_places_are_weighted_by_fit() -> None:
 
 
 def test_the_evidence_follows() -> None:
-    found = features_of_search(search(FRONT[None], np.zeros(1)), COST, COST.keypoints(FRONT))
+    found = features_of_search(search(FRONT[None], np.zeros(1)), COST.keypoints(FRONT))
     expected = [0.1, 0.2, 0.3, np.log(0.5), 0.05, 0.06, np.exp(-1.0), 0.7]
     assert found[0, 30:] == pytest.approx(expected) and found[1, 30:] == pytest.approx(expected)
 
@@ -72,7 +73,7 @@ def test_the_right_arm_is_seen_as_a_left_one(seed: int) -> None:
     states = FRONT + 0.2 * rng.standard_normal((20, 14))
     ratings = 0.05 * rng.random(20)
     result = states.mean(axis=0)
-    found = features_of_search(search(states, ratings), COST, COST.keypoints(result))
+    found = features_of_search(search(states, ratings), COST.keypoints(result))
     other, result = MIRROR * states[:, OTHER_ARM], MIRROR * result[OTHER_ARM]
-    there = features_of_search(search(other, ratings), COST, COST.keypoints(result))
+    there = features_of_search(search(other, ratings), COST.keypoints(result))
     assert np.allclose(found, there[::-1], atol=1e-9)

@@ -57,15 +57,18 @@ def test_no_state_is_outside_its_limits(seed: int) -> None:
     of = made(seed)
     for i in range(6):
         follow(of, seen(wave(i / 5.0)))
-        assert np.all(of.states >= STATE_LIMITS[:, 0])
-        assert np.all(of.states <= STATE_LIMITS[:, 1])
-        assert np.all(np.isfinite(of.ratings))
+        assert np.all(of.rated.states >= STATE_LIMITS[:, 0])
+        assert np.all(of.rated.states <= STATE_LIMITS[:, 1])
+        assert np.all(np.isfinite(of.rated.ratings))
 
 
 def test_ratings_are_those_of_the_states() -> None:
     of = made()
     follow(of, seen(wave(0.3)))
-    np.testing.assert_allclose(of._cost.bodies(of.states)[0], of.ratings, rtol=1e-12)
+    again = of._cost.bodies(of.rated.states)
+    np.testing.assert_allclose(again.ratings, of.rated.ratings, rtol=1e-12)
+    np.testing.assert_array_equal(again.points.joints_m, of.rated.joints_m)
+    np.testing.assert_array_equal(again.points.keypoints_m, of.rated.keypoints_m)
 
 
 def test_the_best_of_a_still_person_never_becomes_worse() -> None:
@@ -75,7 +78,7 @@ def test_the_best_of_a_still_person_never_becomes_worse() -> None:
     for _ in range(6):
         follow(of, silhouette)
         # Without what the motion of the torso costs, which changes from frame to frame.
-        best.append(of._cost.bodies(of.states)[1].min())
+        best.append(of._cost.bodies(of.rated.states).costs_px.min())
     assert best[-1] <= best[0]
 
 
@@ -84,11 +87,12 @@ def test_survivors_are_the_best_and_then_apart() -> None:
     states[:, 5] += 0.001 * np.arange(30)  # all alike, but
     states[25:, 7] = 1.2 + 0.3 * np.arange(5)  # these bend an elbow
     ratings = np.arange(30.0)
-    chosen = state_choice.choose_apart(states, ratings, 16, 4, 0.1, COST.parts, COST.girdle)
+    joints_m = COST.bodies(states).points.joints_m
+    chosen = state_choice.choose_apart(states, ratings, joints_m, 16, 4, 0.1)
     assert chosen[:4].tolist() == [0, 1, 2, 3]
     assert chosen[4] == 25
     assert set(chosen[4:].tolist()) <= set(range(25, 30))
-    alike = state_choice.choose_apart(states, ratings, 16, 16, 0.1, COST.parts, COST.girdle)
+    alike = state_choice.choose_apart(states, ratings, joints_m, 16, 16, 0.1)
     assert alike.tolist() == list(range(16))
 
 
@@ -229,7 +233,7 @@ def test_smoothing_is_a_share_of_the_last_result() -> None:
     of = made(0, replace(default_preset(), whole_body=whole_body))
     first = follow(of, seen(wave(0.0)))
     second = follow(of, seen(wave(0.3)))
-    mean, _ = state_choice.mean_and_spread(of.states, of.ratings, 150, 0.02)
+    mean, _ = state_choice.mean_and_spread(of.rated.states, of.rated.ratings, 150, 0.02)
     np.testing.assert_allclose(second.posture, 0.5 * first.posture + 0.5 * mean[:12])
 
 
