@@ -172,9 +172,7 @@ def trunk_costs(
 
 
 @kernel
-def cover_trunk(
-    torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
-) -> np.int64:
+def cover_trunk(torso: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums) -> int:
     """Write the row sums outside of a trunk (4,) to ``covered``; return the gain of the trunk."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
@@ -183,15 +181,11 @@ def cover_trunk(
     torso_pose(torso, model.place, model.camera, work.torso, work.hip)
     _place_trunk(work)
     draw(work, model.camera, rows, width)
-    cover_patches(work.sides, work.extent, row_sums, covered)
-    gain: np.int64 = sum_union(work, TRUNK_PATCHES, row_sums)[0]
-    return gain
+    return cover_patches(work.sides, work.extent, row_sums, covered)
 
 
 @kernel
-def cover_arms(
-    posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums
-) -> np.int64:
+def cover_arms(posture: Floats, cardbox: CardboxTuple, row_sums: RowSums, covered: RowSums) -> int:
     """Write the row sums outside of the arms of a posture (12,); return the gain of the arms."""
     model = cardbox_of(cardbox)
     rows, width = row_sums.shape[0], row_sums.shape[1] - 1
@@ -202,9 +196,7 @@ def cover_arms(
         _shape_arm(model.parts, first, work.shape)
         _place_arm(work, first, angles_in(posture, arm), side_of(arm), model)
     draw(work, model.camera, rows, width)
-    cover_patches(work.sides, work.extent, row_sums, covered)
-    gain: np.int64 = sum_union(work, 2 * ARM_PATCHES, row_sums)[0]
-    return gain
+    return cover_patches(work.sides, work.extent, row_sums, covered)
 
 
 @kernel

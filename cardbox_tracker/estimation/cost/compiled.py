@@ -93,7 +93,7 @@ class CompiledObservation(SilhouetteObservation):
         if arms is not None:
             row_sums = np.empty_like(self.row_sums)
             posture = np.array(arms, dtype=np.float64)
-            base += int(kernels.cover_arms(posture, self.cardbox, self.row_sums, row_sums))
+            base += kernels.cover_arms(posture, self.cardbox, self.row_sums, row_sums)
 
         def costs(torsos: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(torsos, dtype=np.float64)
@@ -107,9 +107,8 @@ class CompiledObservation(SilhouetteObservation):
         """See :class:`SilhouetteObservation`."""
         pose = np.array(torso, dtype=np.float64)
         covered = np.empty_like(self.row_sums)
-        base = self.frame.foreground_px + int(
-            kernels.cover_trunk(pose, self.cardbox, self.row_sums, covered)
-        )
+        gain = kernels.cover_trunk(pose, self.cardbox, self.row_sums, covered)
+        base = self.frame.foreground_px + gain
 
         def costs(side: str, arms: FloatArray) -> FloatArray:
             particles = np.ascontiguousarray(arms, dtype=np.float64)

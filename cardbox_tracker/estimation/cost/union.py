@@ -207,12 +207,16 @@ def sum_union(work: Workspace, count: int, row_sums: RowSums) -> tuple[np.int64,
 
 
 @kernel
-def cover_patches(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowSums) -> None:
+def cover_patches(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowSums) -> int:
     """Write the row sums without the pixels under the patches to ``covered``.
 
     They are constant over a run, and behind it they are lower by the sum of the run.
+
+    Returns:
+        Sum of (1 - 2 f) over the pixels under the patches.
     """
     rows, columns = row_sums.shape
+    last = _index(columns - 1)
     for v in range(_index(rows)):
         for u in range(_index(columns)):
             covered[v, u] = row_sums[v, u]
@@ -226,3 +230,7 @@ def cover_patches(sides: Whole, extent: Counts, row_sums: RowSums, covered: RowS
                     covered[v, u] = level
                 for u in range(_index(end), _index(columns)):
                     covered[v, u] -= gain
+    total = 0
+    for v in range(_index(rows)):
+        total += int(row_sums[v, last]) - int(covered[v, last])
+    return total

@@ -178,8 +178,8 @@ class WholeBodyCost:
     def uncovered(self, arm: int) -> NDArray[Any]:
         """Return the row sums outside of the fixed torso and the arm opposite to ``arm``."""
         if self._beside_arm != arm:
-            drawn = True, arm == 1, arm == 0
-            kernels.cover(self._torso, drawn, self.body, self._seen, self._beside)
+            other = False, arm == 1, arm == 0
+            kernels.cover(self._torso, other, self.body, self._beside_trunk, self._beside)
             self._beside_arm = arm
         return self._beside
 

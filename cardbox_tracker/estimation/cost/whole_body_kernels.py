@@ -230,5 +230,4 @@ def cover(state: Floats, drawn: Drawn, body: BodyTuple, row_sums: RowSums, cover
             place_arm(arm, p, of.drawn, work.corners)
             p += ARM_PATCHES
     draw(work, of.camera, rows, width)
-    cover_patches(work.sides, work.extent, row_sums, covered)
-    return int(sum_union(work, patches, row_sums)[0])
+    return cover_patches(work.sides, work.extent, row_sums, covered)

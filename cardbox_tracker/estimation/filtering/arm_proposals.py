@@ -285,3 +285,17 @@ def around_best(
             value = source[d] + sigma_rad * normals[i, d]
             moved[i, d] = min(max(value, arm_limits[d, 0]), arm_limits[d, 1])
     return moved
+
+
+@kernel
+def best_of_each(arms: Floats, costs: Floats, candidates: int) -> Floats:
+    """Return the arm with the least of ``costs`` (N,) of each ``candidates`` arms (N, 4)."""
+    best = np.empty((arms.shape[0] // candidates, ARM_ANGLES))
+    for i in range(best.shape[0]):
+        least = i * candidates
+        for j in range(least + 1, (i + 1) * candidates):
+            if costs[j] < costs[least]:
+                least = j
+        for d in range(ARM_ANGLES):
+            best[i, d] = arms[least, d]
+    return best

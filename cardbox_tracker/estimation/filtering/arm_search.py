@@ -11,7 +11,7 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.filtering import arm_proposals, state_choice
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
-from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
+from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
 # Noise around the best arms, as a fraction of the usual noise.
 _AGAIN_NOISE = 0.45
@@ -24,9 +24,9 @@ class ArmSearch:
         spreads_m: deviations of left elbow and hand, right elbow and hand, in the last frame, m.
     """
 
-    def __init__(self, cost: MultiViewCost, plan: SearchPlan) -> None:
+    def __init__(self, cost: MultiViewCost, config: WholeBodyConfig) -> None:
         """Prepare for searches with ``cost``."""
-        self._cost, self._config, self._candidates = cost, plan.config, plan.candidates
+        self._cost, self._config = cost, config
         self.forget()
 
     def forget(self) -> None:
@@ -42,7 +42,7 @@ class ArmSearch:
             draws: random numbers.
         """
         config, cost = self._config, self._cost
-        arms = self._proposed(pool, arm, *draws.for_arms(self._candidates * config.arms))
+        arms = self._proposed(pool, arm, *draws.for_arms())
         ratings, joints_m = cost.arms(arms, arm)
         self.spreads_m[2 * arm : 2 * arm + 2] = state_choice.spread_of_arm(
             joints_m, ratings, config.spread
@@ -53,7 +53,7 @@ class ArmSearch:
             config.best_arms,
             _AGAIN_NOISE * config.arm_noise_rad,
             ARM_LIMITS,
-            draws.for_near_arms(self._candidates * config.arms_again),
+            draws.for_near_arms(),
         )
         near = self.promising(near, arm)
         return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)[0]])
@@ -65,10 +65,10 @@ class ArmSearch:
 
         Each camera uses its own uncovered foreground and line of sight.
         """
-        cost, times = self._cost, self._candidates
+        cost, candidates = self._cost, self._config.candidates
         seeing: Sequence[int] = cost.seeing
-        count = len(seeing)
-        ends = [times * (self._config.arms * part // count) for part in range(count + 1)]
+        count, rated = len(seeing), len(normals) // candidates
+        ends = [candidates * (rated * part // count) for part in range(count + 1)]
         arms = np.concatenate(
             [
                 propose_arms(
@@ -78,7 +78,6 @@ class ArmSearch:
                     cost.costs[number],
                     (normals[begin:end], uniforms[begin:end]),
                     count,
-                    times,
                 )
                 for number, begin, end in zip(seeing, ends, ends[1:], strict=False)
             ]
@@ -87,9 +86,10 @@ class ArmSearch:
 
     def promising(self, arms: FloatArray, arm: int) -> FloatArray:
         """Return the arm with the least approximate cost of each ``candidates`` arms (N, 4)."""
-        if self._candidates == 1:
+        candidates = self._config.candidates
+        if candidates == 1:
             return arms
         # Neighbouring arms are of one kind of proposal, so all kinds remain.
-        costs = self._cost.arms_by_points(arms, arm).reshape(-1, self._candidates)
-        best: FloatArray = arms[self._candidates * np.arange(len(costs)) + costs.argmin(axis=1)]
+        costs = self._cost.arms_by_points(arms, arm)
+        best: FloatArray = arm_proposals.best_of_each(arms, costs, candidates)
         return best

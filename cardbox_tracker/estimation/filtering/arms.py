@@ -33,7 +33,6 @@ def propose_arms(
     cost: WholeBodyCost,
     numbers: tuple[FloatArray, FloatArray],
     share: int = 1,
-    times: int = 1,
 ) -> FloatArray:
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of a pool.
 
@@ -44,12 +43,11 @@ def propose_arms(
         cost: cost of one camera with a fixed torso.
         numbers: random numbers, unit normal (N, 4) and uniform in 0..1 (N, 3).
         share: number of cameras, by which the numbers of ``config`` are divided.
-        times: candidates per rated arm, by which they are multiplied.
     """
-    mirrors, tips, banked = (
-        times * (count // share)
-        for count in (config.arm_mirrors, config.arm_tips, config.banked_arms)
-    )
+    left = len(numbers[0]) - 1
+    mirrors = min(config.arm_mirrors // share, left)
+    tips = min(config.arm_tips // share, left - mirrors)
+    banked = min(config.banked_arms // share, left - mirrors - tips)
     kinds = config.survivors, config.arm_noise_rad, mirrors, tips, banked
     plan = *kinds, bank_of_arms(), ARM_LIMITS
     return arm_proposals.propose_arms(pool, arm, plan, cost.uncovered(arm), cost.body, numbers)

@@ -15,17 +15,15 @@ _OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
 class Draws:
     """Supplies the normal numbers and the uniform numbers in 0..1 of one search."""
 
-    def __init__(self, rng: np.random.Generator, config: WholeBodyConfig, candidates: int) -> None:
-        """Draw all numbers.
-
-        Args:
-            rng: source of the numbers.
-            config: numbers of torsos, arms and states that are rated.
-            candidates: number of proposed arms per rated arm.
-        """
+    def __init__(self, rng: np.random.Generator, config: WholeBodyConfig) -> None:
+        """Draw all numbers; ``config`` has the numbers of torsos, arms and states."""
         c, together = config, config.rounds * config.together
-        arms, near = (2 * candidates * count for count in (c.arms, c.arms_again))
-        normals = c.torsos * N_STATE + (arms + near) * ARM_ANGLES + together * N_STATE
+        # Equal groups of arms, of each of which one is rated.
+        self._arms, self._near = (
+            max(count // c.candidates, 1) * c.candidates for count in (c.arms, c.arms_again)
+        )
+        arms = 2 * self._arms
+        normals = (c.torsos + together) * N_STATE + (arms + 2 * self._near) * ARM_ANGLES
         uniforms = c.torsos * _OF_TORSO + arms * _OF_ARM + together * _OF_STATE
         self._normals = _Numbers(rng.standard_normal(normals))
         self._uniforms = _Numbers(rng.random(uniforms))
@@ -34,13 +32,14 @@ class Draws:
         """Return normal numbers (count, 14) and uniform ones (count, 2)."""
         return self._normals.take(count, N_STATE), self._uniforms.take(count, _OF_TORSO)
 
-    def for_arms(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return normal numbers (count, 4) and uniform ones (count, 3)."""
+    def for_arms(self) -> tuple[FloatArray, FloatArray]:
+        """Return normal numbers (N, 4) and uniform ones (N, 3) for N proposed arms of a side."""
+        count = self._arms
         return self._normals.take(count, ARM_ANGLES), self._uniforms.take(count, _OF_ARM)
 
-    def for_near_arms(self, count: int) -> FloatArray:
-        """Return normal numbers (count, 4)."""
-        return self._normals.take(count, ARM_ANGLES)
+    def for_near_arms(self) -> FloatArray:
+        """Return normal numbers (N, 4) for the N arms of a side around the best ones."""
+        return self._normals.take(self._near, ARM_ANGLES)
 
     def for_states(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Return normal numbers (count, 14) and uniform ones (count, 2)."""

@@ -13,8 +13,9 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 # Rounds of all joints: fraction of states that move by differences, and factor on the noise from
 # one round to the next.
 _DIFFERING, _ROUND_DECAY = 0.8, 0.8
-# Fraction of the arms near the best ones that suffices if the most promising arms are selected.
-_NEAR_ARMS = 0.6
+# Factors on the numbers of proposed arms, of the best arms and of arms near them; proposed arms per
+# rated one. With as few arms as one camera needs, some searches of several cameras fail.
+_MORE_ARMS, _MORE_BEST, _NEAR_ARMS, _CANDIDATES = 4, 4 / 3, 0.6, 4
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,6 @@ class SearchPlan:
 
     Attributes:
         config: settings of the filter.
-        candidates: number of proposed arms per rated arm.
         crosses: whether an upright person is proposed at the intersection of the lines of sight.
         fits_outlines: whether a few different states are fitted to all outlines by Gauss-Newton
             steps before all joints move together.
@@ -31,7 +31,6 @@ class SearchPlan:
     """
 
     config: WholeBodyConfig
-    candidates: int = 1
     crosses: bool = False
     fits_outlines: bool = False
     keeps_result: bool = False
@@ -41,11 +40,18 @@ class SearchPlan:
         """Return the plan for settings and a number of cameras."""
         if cameras == 1:
             return cls(config)
+        again = max(int(_NEAR_ARMS * config.arms_again), 1)
         config = replace(
             config,
-            arms_again=max(int(_NEAR_ARMS * config.arms_again), 1),
+            candidates=_CANDIDATES,
+            arms=_MORE_ARMS * config.arms,
+            arm_mirrors=_MORE_ARMS * config.arm_mirrors,
+            arm_tips=_MORE_ARMS * config.arm_tips,
+            banked_arms=_MORE_ARMS * config.banked_arms,
+            best_arms=int(_MORE_BEST * config.best_arms),
+            arms_again=_MORE_ARMS * again,
             smoothing=config.smoothing / 3,
             round_decay=max(config.round_decay, _ROUND_DECAY),
             differing=max(config.differing, _DIFFERING),
         )
-        return cls(config, candidates=4, crosses=True, fits_outlines=True, keeps_result=True)
+        return cls(config, crosses=True, fits_outlines=True, keeps_result=True)

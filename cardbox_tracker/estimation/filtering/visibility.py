@@ -6,16 +6,21 @@ are rules of their own.
 
 from __future__ import annotations
 
-from math import dist
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.body_outline import TRUNK_PATCHES
+from cardbox_tracker.estimation.cost.body_outline import (
+    BODY_PATCHES,
+    TRUNK_PATCHES,
+    corners_of_body,
+)
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, body_of
+from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 
 BoolArray = NDArray[np.bool_]
 Lens = tuple[float, float, float, float]
@@ -36,21 +41,9 @@ _NEAREST_M = 1e-3
 
 def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
     """Return whether at least one camera that sees the person sees enough of a state (14,)."""
-    return any(_sees_enough(cost, number, state) for number in cost.seeing)
-
-
-def _sees_enough(cost: MultiViewCost, number: int, state: FloatArray) -> bool:
-    one, there = cost.costs[number], cost.to_views[number](state)
-    shoulders_m = one.keypoints(there)[list(_SHOULDERS)]
-    ahead_m = 0.5 * float(shoulders_m[0, 2] + shoulders_m[1, 2])
-    if ahead_m < NEAREST_TRACKED_M:
-        return False
-    breadth_m = dist(*shoulders_m.tolist())
-    fx, fy, cx, cy = one.view[:4]
-    if fx * breadth_m / ahead_m < LEAST_SHOULDERS_PX:
-        return False
-    return part_in_image(one.corners(there)[:TRUNK_PATCHES], (fx, fy, cx, cy), one.size) >= (
-        LEAST_IN_IMAGE
+    return any(
+        _sees_enough(cost.to_views[number](state), cost.costs[number].body, cost.costs[number].size)
+        for number in cost.seeing
     )
 
 
@@ -61,51 +54,49 @@ def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
     """
     hidden = np.ones(6, dtype=np.bool_)
     for number in cost.seeing:
-        there = cost.to_views[number](state)
-        hidden &= _are_hidden_before(cost.costs[number], there)
+        one = cost.costs[number]
+        _hide_fewer(cost.to_views[number](state), one.body, one.size, hidden)
     return hidden
-
-
-def _are_hidden_before(cost: WholeBodyCost, state: FloatArray) -> BoolArray:
-    points_m, trunk_m = cost.keypoints(state), cost.corners(state)[:TRUNK_PATCHES]
-    fx, fy, cx, cy = cost.view[:4]
-    hidden = np.empty(len(points_m), dtype=np.bool_)
-    _mark_hidden(points_m, trunk_m, (fx, fy, cx, cy), cost.size, hidden)
-    return hidden
-
-
-def part_in_image(corners_m: FloatArray, lens: Lens, size: tuple[int, int]) -> float:
-    """Return the share of corners (n, 4, 3), metres in the optical frame, that are in an image.
-
-    Args:
-        corners_m: the corners of n patches.
-        lens: focal lengths and principal point, px.
-        size: width and height of the image, px.
-    """
-    return float(_count_in_image(corners_m, lens, size) / (4 * len(corners_m)))
 
 
 @kernel
-def _count_in_image(corners_m: FloatArray, lens: Lens, size: tuple[int, int]) -> int:
+def _sees_enough(state: FloatArray, body: BodyTuple, size: tuple[int, int]) -> bool:
+    """Return whether a camera with an image of ``size``, px, sees enough of a state (14,)."""
+    points_m, corners_m = np.empty((6, 3)), np.empty((BODY_PATCHES, 4, 3))
+    keypoints(state, body, points_m)
+    left, right = _SHOULDERS
+    ahead_m = 0.5 * (points_m[left, 2] + points_m[right, 2])
+    if ahead_m < NEAREST_TRACKED_M:
+        return False
+    lens = body_of(body).camera[:4]
+    squares_m2 = 0.0
+    for axis in range(3):
+        squares_m2 += (points_m[left, axis] - points_m[right, axis]) ** 2
+    if lens[0] * sqrt(squares_m2) / ahead_m < LEAST_SHOULDERS_PX:
+        return False
+    corners_of_body(state, body, corners_m)
     count = 0
-    for patch in range(corners_m.shape[0]):
+    for patch in range(TRUNK_PATCHES):
         for corner in range(4):
             count += _is_in_image(corners_m[patch, corner], lens, size)
-    return count
+    return count >= LEAST_IN_IMAGE * 4 * TRUNK_PATCHES
 
 
 @kernel
-def _mark_hidden(
-    points_m: FloatArray, trunk_m: FloatArray, lens: Lens, size: tuple[int, int], hidden: BoolArray
+def _hide_fewer(
+    state: FloatArray, body: BodyTuple, size: tuple[int, int], hidden: BoolArray
 ) -> None:
-    """Write which keypoints (6, 3) are outside of the image or behind patches (n, 4, 3)."""
-    for number in range(points_m.shape[0]):
-        point = points_m[number]
-        hidden[number] = not _is_in_image(point, lens, size)
-        if number in _SHOULDERS:
-            continue
-        for patch in range(trunk_m.shape[0]):
-            hidden[number] |= _is_behind(point, trunk_m[patch], lens)
+    """Clear ``hidden`` (6,) for keypoints of a state (14,) that a camera sees."""
+    points_m, corners_m = np.empty((6, 3)), np.empty((BODY_PATCHES, 4, 3))
+    keypoints(state, body, points_m)
+    corners_of_body(state, body, corners_m)
+    lens = body_of(body).camera[:4]
+    for number in range(len(points_m)):
+        is_seen = _is_in_image(points_m[number], lens, size)
+        if is_seen and number not in _SHOULDERS:
+            for patch in range(TRUNK_PATCHES):
+                is_seen &= not _is_behind(points_m[number], corners_m[patch], lens)
+        hidden[number] &= not is_seen
 
 
 @kernel

@@ -97,7 +97,7 @@ class WholeBodyFilter:
         self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
         first, *others = cost.costs
         self._presence = PersonPresence(cost, self._config)
-        self._arm = ArmSearch(cost, self._plan)
+        self._arm = ArmSearch(cost, self._plan.config)
         self._points = PointFit(cost, self._config.cost, views)
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
         self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
@@ -171,7 +171,7 @@ class WholeBodyFilter:
     def _search(self, frames: Sequence[Frame], location: Location) -> None:
         """Run all stages once."""
         config, cost = self._config, self._cost
-        draws = Draws(self._rng, config, self._plan.candidates)
+        draws = Draws(self._rng, config)
         before = self._survivors[0].copy()
         approach, z_m = self.approach, float(before[TORSO_Z])
         approach.see(float(before[TORSO_X]))

@@ -70,7 +70,13 @@ class WholeBodyConfig(Settings):
         "best torsos that are rated with arms, both moved along and fixed in space",
         limits=(1, 1000),
     )
-    arms: int = restarting(90, "arms that are rated per side", limits=(2, 100_000))
+    arms: int = restarting(90, "arms that are proposed per side", limits=(2, 100_000))
+    candidates: int = restarting(
+        3,
+        "proposed arms per rated arm: the one of them that covers most uncovered foreground is "
+        "rated; 1 rates all",
+        limits=(1, 100),
+    )
     arm_mirrors: int = restarting(
         8,
         "number of the arms that are survivors mirrored in depth",
@@ -86,9 +92,11 @@ class WholeBodyConfig(Settings):
         "number of the arms that are drawn from the learned prior",
         limits=(0, 100_000),
     )
-    best_arms: int = restarting(20, "best arms around which others are rated", limits=(1, 100_000))
+    best_arms: int = restarting(
+        15, "best arms around which others are proposed", limits=(1, 100_000)
+    )
     arms_again: int = restarting(
-        50, "arms that are rated around the best ones", limits=(1, 100_000)
+        51, "arms that are proposed around the best ones", limits=(1, 100_000)
     )
     paired_arms: int = restarting(
         12, "best arms of either side that are combined", limits=(1, 100_000)
@@ -228,6 +236,8 @@ class WholeBodyConfig(Settings):
             ValueError: a value is out of range, or values contradict each other; the text names it.
         """
         super().__post_init__()
+        if self.candidates > self.arms:
+            raise ValueError(f"candidates is {self.candidates}; expected 1 to {self.arms}")
         special = self.arm_mirrors + self.arm_tips + self.banked_arms
         if special >= self.arms:
             raise ValueError(f"arms is {self.arms}; expected more than the {special} special ones")
@@ -241,7 +251,11 @@ class WholeBodyConfig(Settings):
             raise ValueError(f"alike is {self.alike}; expected 1 to {self.survivors}")
         if self.best_torsos > self.torsos:
             raise ValueError(f"best_torsos is {self.best_torsos}; expected 1 to {self.torsos}")
+        rated = self.arms // self.candidates
         for name in ("best_arms", "paired_arms"):
-            if getattr(self, name) > self.arms:
-                raise ValueError(f"{name} is {getattr(self, name)}; expected 1 to {self.arms}")
+            if getattr(self, name) > rated:
+                raise ValueError(
+                    f"{name} is {getattr(self, name)}; expected 1 to {rated}, the number of rated "
+                    f"arms: arms is {self.arms} and candidates {self.candidates}"
+                )
         self.scaled()
