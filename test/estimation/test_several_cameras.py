@@ -181,10 +181,10 @@ def test_of_four_arms_that_are_proposed_the_most_promising_one_is_rated(
     each = views.arms_by_points(arms, 0).reshape(10, 4)
     np.testing.assert_array_equal(views.arms_by_points(kept, 0), each.min(axis=1))
     # What either camera sees counts, and of a camera that does not see nothing does.
-    alone = [cost.arms_by_points(cost.joints(arms, 0), 0) for cost in views.costs]
+    alone = [cost.arms_by_points(arms, cost.joints(arms, 0), 0) for cost in views.costs]
     np.testing.assert_allclose(each.ravel(), (alone[0] + alone[1]) / 2)
     track(tracker, state_of(0.4), (1,))
-    second = views.costs[1].arms_by_points(views.costs[1].joints(arms, 0), 0)
+    second = views.costs[1].arms_by_points(arms, views.costs[1].joints(arms, 0), 0)
     np.testing.assert_allclose(views.arms_by_points(arms, 0), second, atol=1e-12)
 
 

@@ -157,9 +157,9 @@ class MultiViewCost:
         return ratings, joints_m
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
-        """Return approximate costs (N,) of arms (N, 4), 0 left or 1 right, without priors."""
+        """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors."""
         joints = self.costs[0].joints(arms, arm)
-        return self._sum(lambda cost, _: cost.arms_by_points(joints, arm))
+        return self._sum(lambda cost, _: cost.arms_by_points(arms, joints, arm))
 
     def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
         """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""

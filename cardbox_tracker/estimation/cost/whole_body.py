@@ -189,15 +189,20 @@ class WholeBodyCost:
         joints_of_arms(arms, 1.0 - 2.0 * arm, self.parts, self.girdle, joints)
         return joints
 
-    def arms_by_points(self, joints: FloatArray, arm: int) -> FloatArray:
-        """Return approximate costs (N,) of arms with ``joints``, 0 left or 1 right, without priors.
+    def arms_by_points(self, arms: FloatArray, joints: FloatArray, arm: int) -> FloatArray:
+        """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors.
 
-        See :mod:`cardbox_tracker.estimation.cost.arm_points`.
+        The silhouette's part is that of :mod:`cardbox_tracker.estimation.cost.arm_points`.
+
+        Args:
+            arms: angles, (N, 4), rad.
+            joints: their :meth:`joints`.
+            arm: 0 left, 1 right.
         """
-        costs = np.zeros(len(joints))
+        ratings = np.zeros(len(joints))
         seen = self.uncovered(arm), self._scale
-        add_costs_of_arms(joints, self._torso, self.body, *seen, costs)
-        return costs
+        add_costs_of_arms(joints, self._torso, self.body, *seen, ratings)
+        return self._with_terms(ratings, arms, arm)
 
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
@@ -208,9 +213,13 @@ class WholeBodyCost:
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
         seen = (self._beside_trunk, self._base_px, self._scale), self._prior
         kernels.rate_arms(arms, 1.0 - 2.0 * arm, self._torso, self.body, *seen, ratings, joints_m)
+        return self._with_terms(ratings, arms, arm), joints_m
+
+    def _with_terms(self, ratings: FloatArray, arms: FloatArray, arm: int) -> FloatArray:
+        """Add the further terms of arms (N, 4) to their ``ratings`` (N,), which are returned."""
         for costs in self._arm_terms:
             ratings += self._scale * costs(SIDES[arm], arms)
-        return ratings, joints_m
+        return ratings
 
     def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
         """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""

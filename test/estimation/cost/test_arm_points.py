@@ -31,7 +31,7 @@ def cost_of(silhouette: FloatArray) -> WholeBodyCost:
 
 
 def about_of(cost: WholeBodyCost, arms: FloatArray) -> FloatArray:
-    return cost.arms_by_points(cost.joints(arms, 0), 0)
+    return cost.arms_by_points(arms, cost.joints(arms, 0), 0)
 
 
 def everywhere(value: int) -> FloatArray:
