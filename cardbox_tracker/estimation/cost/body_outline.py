@@ -22,7 +22,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     UPPER_ARM,
     Body,
     BodyTuple,
-    Drawn,
     Floats,
     body_of,
 )
@@ -162,24 +161,22 @@ def new_scratch() -> tuple[Workspace, PosedArm]:
 
 
 @inlined_kernel
-def place_patches(state: Floats, drawn: Drawn, body: Body, work: Workspace, arm: PosedArm) -> None:
-    """Write the corners of the ``drawn`` parts of a state into ``work``."""
+def place_patches(state: Floats, body: Body, work: Workspace, arm: PosedArm) -> None:
+    """Write the corners of all patches of a state into ``work``."""
     state_pose(state, body.place, body.camera, work.torso, work.hip)
-    if drawn[0]:
-        place_trunk(work, body.drawn)
+    place_trunk(work, body.drawn)
     for k in range(2):
-        if drawn[1 + k]:
-            angles = angles_in(state, k)
-            pose_arm(angles, side_of(k), body.parts, body.girdle, arm.points, arm.directions)
-            turn_arm(arm, work.torso, work.hip)
-            place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, body.drawn, work.corners)
+        angles = angles_in(state, k)
+        pose_arm(angles, side_of(k), body.parts, body.girdle, arm.points, arm.directions)
+        turn_arm(arm, work.torso, work.hip)
+        place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, body.drawn, work.corners)
 
 
 @kernel
 def corners_of_body(state: Floats, body: BodyTuple, corners_m: Floats) -> None:
     """Write the patches of a state to ``corners_m`` (13, 4, 3), metres in the optical frame."""
     work, arm = new_scratch()
-    place_patches(state, (True, True, True), body_of(body), work, arm)
+    place_patches(state, body_of(body), work, arm)
     for p in range(BODY_PATCHES):
         for c in range(4):
             for j in range(3):

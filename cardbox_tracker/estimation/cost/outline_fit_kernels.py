@@ -18,19 +18,23 @@ from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.body_outline import (
     BODY_PATCHES,
-    TRUNK_PATCHES,
     new_scratch,
     place_patches,
 )
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
+from cardbox_tracker.estimation.cost.outline_motions import (
+    SEGMENTS,
+    TWIST,
+    add_moments,
+    segment_of,
+    write_twists,
+)
 from cardbox_tracker.estimation.cost.outline_points import (
     Ints,
     distance_at,
     find_outline,
-    first_points,
-    moved_patches,
     point_on_edge,
     project_corners,
 )
@@ -41,7 +45,9 @@ SHARES = (0.0, 0.2, 0.5, 1.0)
 # Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated.
 INFORMATION = 0.01
 _MOST_CHANGE = 0.25
-_ALL = (True, True, True)
+_PER_HALF = 1.0 / HALF_PX**2
+# Half of the stretch over which the distance's gradient is taken; shorter ones suffer from pixels.
+_APART_PX = 3.0
 
 
 class Seen(NamedTuple):
@@ -50,18 +56,18 @@ class Seen(NamedTuple):
     The state in the frame of this camera is ``turned`` @ (state of the first camera) + ``moved``.
 
     Attributes:
-        turned: (14, 14).
+        turned: (14, 14); combines only values that move the whole body.
         moved: (14,).
         lens: fx, fy, cx, cy of the image of ``field``, (4,).
         field: signed distances from the silhouette's outline, (H, W), px, negative inside.
-        end_row: first row that does not count.
+        within: first and last column, first and end row of the part that counts, (4,), px.
     """
 
     turned: Floats
     moved: Floats
     lens: Floats
     field: NDArray[np.float32]
-    end_row: float
+    within: Floats
 
 
 class Outline(NamedTuple):
@@ -76,19 +82,18 @@ class Outline(NamedTuple):
     points: Floats
 
 
-SeenTuple = tuple[Floats, Floats, Floats, NDArray[np.float32], float]
+SeenTuple = tuple[Floats, Floats, Floats, NDArray[np.float32], Floats]
 OutlineTuple = tuple[Ints, Floats]
-EquationsTuple = tuple[Floats, Floats]
+EquationsTuple = tuple[Floats, Floats, Floats]
 
 
 @kernel
 def _seen_from(state: Floats, turned: Floats, moved: Floats, there: Floats) -> None:
     """Write the state (14,) in the frame of another camera."""
-    for j in range(N_STATE):
-        total = 0.0
-        for i in range(N_STATE):
-            total += state[i] * turned[i, j]
-        there[j] = total + moved[j]
+    there[:] = moved
+    for i in range(N_STATE):
+        for j in range(N_STATE):
+            there[j] += state[i] * turned[i, j]
 
 
 @kernel
@@ -96,75 +101,69 @@ def add_equations(
     state: Floats,
     camera: SeenTuple,
     body: BodyTuple,
-    steps: Floats,
     equations: EquationsTuple,
     outline: OutlineTuple,
 ) -> int:
     """Add the outline in one camera to the normal equations of ``state`` (14,).
 
+    With the gradient (a, b) of the distance, px / px, and the line of sight (u, v, 1) of a point at
+    the depth z, force and torque of :mod:`.outline_motions` are
+
+        f = (fx a, fy b, -fx a u - fy b v) / z,    X x f = (u, v, 1) x z f
+
     Args:
         state: state for the first camera, (14,).
         camera: fields of :class:`Seen`.
         body: fields of :class:`~.kernel_arguments.Body`, before this camera.
-        steps: steps of the central differences, (14,).
-        equations: matrix (14, 14), lower triangle, and right side (14,); changed.
+        equations: matrix (14, 14), lower triangle, right side (14,), and costs of ``SHARES``, of
+            which only the first changes.
         outline: fields of :class:`Outline`, written, (312, 2) each.
 
     Returns:
         Number of points of the outline.
     """
     seen, of = Seen(*camera), body_of(body)
-    turned, moved, lens, field = seen.turned, seen.moved, seen.lens, seen.field
-    matrix, right = equations
+    turned, lens, field = seen.turned, seen.lens, seen.field
+    matrix, right, cost = equations
     edges, points = outline
     work, arm = new_scratch()
-    trial, there, behind = np.empty(N_STATE), np.empty(N_STATE), np.empty(N_STATE)
-    corners_px, less_px = np.empty((BODY_PATCHES, 4, 2)), np.empty((BODY_PATCHES, 4, 2))
-    _seen_from(state, turned, moved, there)
-    place_patches(there, _ALL, of, work, arm)
-    project_corners(work.corners, lens, 0, BODY_PATCHES, corners_px)
-    count = find_outline(corners_px, (field.shape[1], field.shape[0]), seen.end_row, edges, points)
-    first_point = np.empty(BODY_PATCHES + 1, np.int64)
-    first_points(edges, count, first_point)
-    now, weights, by_state = np.empty(count), np.empty(count), np.empty(count)
+    there, corners_px = np.empty(N_STATE), np.empty((BODY_PATCHES, 4, 3))
+    _seen_from(state, turned, seen.moved, there)
+    place_patches(there, of, work, arm)
+    project_corners(work.corners, lens, corners_px)
+    count = find_outline(corners_px, seen.within, edges, points)
+    sums, moments = np.zeros((SEGMENTS, TWIST)), np.zeros((SEGMENTS, TWIST, TWIST))
+    per_x, per_y = lens[0] / (2.0 * _APART_PX), lens[1] / (2.0 * _APART_PX)
+    wide, high = 1.0 / lens[0], 1.0 / lens[1]
+    slope = np.empty(TWIST)
     for i in range(count):
-        now[i] = distance_at(
-            field, *point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
-        )
-        outlying = 1.0 + (now[i] / HALF_PX) ** 2
-        weights[i] = INFORMATION * points[i, 1] / (outlying * outlying)
-    # Each value of a state moves only some of the points.
-    jacobian, span = np.empty((N_STATE, count)), np.empty((N_STATE, 2), np.int64)
-    for j in range(N_STATE):
-        trial[:] = state
-        trial[j] = state[j] + steps[j]
-        _seen_from(trial, turned, moved, there)
-        trial[j] = state[j] - steps[j]
-        _seen_from(trial, turned, moved, behind)
-        first, end = moved_patches(there, behind)
-        span[j, 0], span[j, 1] = first_point[first], first_point[end]
-        drawn = first == 0, first <= TRUNK_PATCHES < end, end == BODY_PATCHES
-        place_patches(there, drawn, of, work, arm)
-        project_corners(work.corners, lens, first, end, corners_px)
-        place_patches(behind, drawn, of, work, arm)
-        project_corners(work.corners, lens, first, end, less_px)
-        for i in range(span[j, 0], span[j, 1]):
-            p, c, share = edges[i, 0], edges[i, 1], points[i, 0]
-            more = distance_at(field, *point_on_edge(corners_px, p, c, share))
-            less = distance_at(field, *point_on_edge(less_px, p, c, share))
-            jacobian[j, i] = (more - less) / (2.0 * steps[j])
-    for j in range(N_STATE):
-        total = 0.0
-        for i in range(span[j, 0], span[j, 1]):
-            weighted = weights[i] * jacobian[j, i]
-            total += weighted * now[i]
-            by_state[i] = weighted
-        right[j] += total
-        for k in range(j + 1):
-            total = 0.0
-            for i in range(max(span[j, 0], span[k, 0]), min(span[j, 1], span[k, 1])):
-                total += by_state[i] * jacobian[k, i]
-            matrix[j, k] += total
+        p = edges[i, 0]
+        x, y, inverse = point_on_edge(corners_px, p, edges[i, 1], points[i, 0])
+        distance = distance_at(field, x, y)
+        a = distance_at(field, x + _APART_PX, y) - distance_at(field, x - _APART_PX, y)
+        b = distance_at(field, x, y + _APART_PX) - distance_at(field, x, y - _APART_PX)
+        a, b = per_x * a, per_y * b
+        u, v = (x - lens[2]) * wide, (y - lens[3]) * high
+        c = -a * u - b * v
+        slope[0], slope[1], slope[2] = a * inverse, b * inverse, c * inverse
+        slope[3], slope[4], slope[5] = v * c - b, a - u * c, u * b - v * a
+        outlying = 1.0 + distance**2 * _PER_HALF
+        cost[0] += INFORMATION * points[i, 1] * distance**2 / outlying
+        weight = INFORMATION * points[i, 1] / (outlying * outlying)
+        segment = segment_of(p)
+        for j in range(TWIST):
+            weighted = weight * slope[j]
+            sums[segment, j] += weighted * distance
+            for k in range(TWIST):
+                moments[segment, j, k] += weighted * slope[k]
+    own, twists = np.empty((N_STATE, TWIST)), np.zeros((N_STATE, TWIST))
+    write_twists(there, body, own)
+    for i in range(N_STATE):
+        for j in range(N_STATE):
+            if turned[i, j] != 0.0:
+                for k in range(TWIST):
+                    twists[i, k] += turned[i, j] * own[j, k]
+    add_moments(twists, sums, moments, matrix, right)
     return count
 
 
@@ -177,7 +176,7 @@ def costs_along(
     outline: OutlineTuple,
     costs: Floats,
 ) -> None:
-    """Add the costs of one camera's outline after each of ``SHARES`` of a change to ``costs``.
+    """Add the costs of one camera's outline after each of ``SHARES`` but the first to ``costs``.
 
     Args:
         state: state for the first camera, (14,).
@@ -191,24 +190,26 @@ def costs_along(
     edges, points = outline
     work, arm = new_scratch()
     trial, there = np.empty(N_STATE), np.empty(N_STATE)
-    corners_px = np.empty((BODY_PATCHES, 4, 2))
-    for number in range(len(SHARES)):
+    corners_px = np.empty((BODY_PATCHES, 4, 3))
+    for number in range(1, len(SHARES)):
         for j in range(N_STATE):
             trial[j] = state[j] + SHARES[number] * change[j]
         _seen_from(trial, seen.turned, seen.moved, there)
-        place_patches(there, _ALL, of, work, arm)
-        project_corners(work.corners, seen.lens, 0, BODY_PATCHES, corners_px)
+        place_patches(there, of, work, arm)
+        project_corners(work.corners, seen.lens, corners_px)
+        total = 0.0
         for i in range(len(points)):
-            x, y = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
+            x, y, _ = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
             square = distance_at(seen.field, x, y) ** 2
-            costs[number] += INFORMATION * points[i, 1] * square / (1.0 + square / HALF_PX**2)
+            total += points[i, 1] * square / (1.0 + square * _PER_HALF)
+        costs[number] += INFORMATION * total
 
 
 @kernel
 def solve_equations(
     state: Floats, begin: Floats, stddev: Floats, matrix: Floats, right: Floats, costs: Floats
 ) -> None:
-    """Write the change of ``state`` to ``right``, and the costs of the distance to ``begin``.
+    """Write the change of ``state`` to ``right``, and add the costs of the distance to ``begin``.
 
     Args:
         state: (14,).
@@ -216,7 +217,7 @@ def solve_equations(
         stddev: standard deviations of the prior, (14,).
         matrix: matrix of the normal equations, (14, 14); overwritten.
         right: right side, (14,); overwritten by the change.
-        costs: written, one for each of ``SHARES`` of the change.
+        costs: one for each of ``SHARES`` of the change; changed.
     """
     for j in range(N_STATE):
         matrix[j, j] += 1.0 / stddev[j] ** 2
@@ -225,7 +226,6 @@ def solve_equations(
     for j in range(N_STATE):
         right[j] = min(max(right[j], -_MOST_CHANGE), _MOST_CHANGE)
     for number in range(len(SHARES)):
-        costs[number] = 0.0
         for j in range(N_STATE):
             trial = state[j] + SHARES[number] * right[j]
             costs[number] += ((trial - begin[j]) / stddev[j]) ** 2

@@ -10,147 +10,155 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.posture import (
-    ARM_ANGLES,
-    FIRST_ANGLES,
-    PITCH,
-    ROLL,
-    TORSO_X,
-    TORSO_Y,
-    TORSO_Z,
-    YAW,
-)
-from cardbox_tracker.compiling import kernel
-from cardbox_tracker.estimation.cost.body_outline import (
-    ARM_PATCHES,
-    BODY_PATCHES,
-    TRUNK_PATCHES,
-)
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
-from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
 
 Ints = NDArray[np.int64]
 
-
+# With an unsigned index, numba compiles no code for negative indices.
+_index = np.uint64
 # Points on each edge of a patch.
 _ON_EDGE = 6
 POINTS = BODY_PATCHES * 4 * _ON_EDGE
-# Depth inside another patch at which a point is covered; margin of the image without points.
-_COVERED_PX, _BORDER_PX = 0.5, 3.0
+# Depth inside another patch at which a point is covered.
+_COVERED_PX = 0.5
 
 
 @kernel
-def project_corners(
-    corners_m: Floats, lens: Floats, first: int, end: int, corners_px: Floats
-) -> None:
-    """Write corners (13, 4, 2), px, of the patches ``first`` to ``end``.
+def project_corners(corners_m: Floats, lens: Floats, corners_px: Floats) -> None:
+    """Write the projected corners of all patches.
 
     Args:
         corners_m: corners of all patches, (3, 52), metres in the optical frame, see ``Workspace``.
         lens: fx, fy, cx, cy.
-        first: first patch.
-        end: index after the last patch.
-        corners_px: written.
-    """
-    for p in range(first, end):
-        for c in range(4):
-            e = c * BODY_PATCHES + p
-            x, y, z = corners_m[0, e], corners_m[1, e], max(corners_m[2, e], 0.05)
-            corners_px[p, c, 0] = lens[0] * x / z + lens[2]
-            corners_px[p, c, 1] = lens[1] * y / z + lens[3]
-
-
-@kernel
-def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[float, float]:
-    """Return the point at a fraction of the edge from corner ``c`` of patch ``p``, px."""
-    d = (c + 1) % 4
-    x, y = corners_px[p, c, 0], corners_px[p, c, 1]
-    return x + share * (corners_px[p, d, 0] - x), y + share * (corners_px[p, d, 1] - y)
-
-
-@kernel
-def _turns(corners_px: Floats, turns: Floats, sides_px: Floats) -> None:
-    """Write orientation and side lengths of the patches.
-
-    Args:
-        corners_px: (13, 4, 2).
-        turns: orientation of each patch, 1 or -1, (13,).
-        sides_px: length of each edge, (13, 4).
+        corners_px: written, (13, 4, 3): column and row, px, and inverse depth, 1 / m.
     """
     for p in range(BODY_PATCHES):
+        for c in range(4):
+            e = c * BODY_PATCHES + p
+            inverse = 1.0 / max(corners_m[2, e], 0.05)
+            corners_px[p, c, 0] = lens[0] * corners_m[0, e] * inverse + lens[2]
+            corners_px[p, c, 1] = lens[1] * corners_m[1, e] * inverse + lens[3]
+            corners_px[p, c, 2] = inverse
+
+
+@inlined_kernel
+def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[float, float, float]:
+    """Return column, row and inverse depth at a fraction of the edge from corner ``c``."""
+    begin, end = corners_px[_index(p), _index(c)], corners_px[_index(p), _index((c + 1) & 3)]
+    x, y, inverse = begin[0], begin[1], begin[2]
+    return (
+        x + share * (end[0] - x),
+        y + share * (end[1] - y),
+        inverse + share * (end[2] - inverse),
+    )
+
+
+@inlined_kernel
+def _bound(corners_px: Floats, sides_px: Floats, insides: Floats, boxes: Floats) -> None:
+    """Write edges and bounding boxes of the patches.
+
+    Args:
+        corners_px: (13, 4, 3).
+        sides_px: written: length of each edge, (13, 4).
+        insides: written, (13, 4, 3): a, b, c of each edge; at least ``_COVERED_PX`` inside of it is
+            a x + b y + c >= 0.
+        boxes: written: first and last column, first and last row, (13, 4).
+    """
+    for p in range(BODY_PATCHES):
+        corners, box = corners_px[p], boxes[p]
+        box[0], box[1] = corners[0, 0], corners[0, 0]
+        box[2], box[3] = corners[0, 1], corners[0, 1]
         twice_area = 0.0
         for c in range(4):
+            x, y = corners[c, 0], corners[c, 1]
+            next_x, next_y = corners[(c + 1) % 4, 0], corners[(c + 1) % 4, 1]
+            box[0], box[1] = min(box[0], x), max(box[1], x)
+            box[2], box[3] = min(box[2], y), max(box[3], y)
+            sides_px[p, c] = hypot(next_x - x, next_y - y)
+            twice_area += x * next_y - next_x * y
+        for c in range(4):
             d = (c + 1) % 4
-            sides_px[p, c] = hypot(
-                corners_px[p, d, 0] - corners_px[p, c, 0], corners_px[p, d, 1] - corners_px[p, c, 1]
-            )
-            twice_area += (
-                corners_px[p, c, 0] * corners_px[p, d, 1]
-                - corners_px[p, d, 0] * corners_px[p, c, 1]
-            )
-        turns[p] = 1.0 if twice_area > 0.0 else -1.0
+            length = sides_px[p, c]
+            scale = (1.0 if twice_area > 0.0 else -1.0) / max(length, 1e-9)
+            a = -scale * (corners[d, 1] - corners[c, 1])
+            b = scale * (corners[d, 0] - corners[c, 0])
+            # An edge without length bounds nothing, and a patch without area covers nothing.
+            bounds = length >= 1e-9 or abs(twice_area) < 1e-9
+            margin = _COVERED_PX if bounds else -_COVERED_PX
+            insides[p, c, 0], insides[p, c, 1] = a, b
+            insides[p, c, 2] = -a * corners[c, 0] - b * corners[c, 1] - margin
 
 
-@kernel
-def _is_inside(
-    corners_px: Floats, sides_px: Floats, p: int, turn: float, x: float, y: float
-) -> bool:
-    """Return whether a point is well inside the convex patch ``p`` with orientation ``turn``."""
+@inlined_kernel
+def _covered_share(
+    sides: Floats, x: float, y: float, along_x: float, along_y: float
+) -> tuple[float, float]:
+    """Return the fractions of a line between which a convex patch covers it.
+
+    The line leads from (x, y) to (x + along_x, y + along_y); ``sides`` are the patch's edges
+    (4, 3), see :func:`_bound`.
+    """
+    first, last = 0.0, 1.0
     for c in range(4):
-        d = (c + 1) % 4
-        along_x = corners_px[p, d, 0] - corners_px[p, c, 0]
-        along_y = corners_px[p, d, 1] - corners_px[p, c, 1]
-        length = sides_px[p, c]
-        if length < 1e-9:
-            continue
-        across = along_x * (y - corners_px[p, c, 1]) - along_y * (x - corners_px[p, c, 0])
-        if turn * across < _COVERED_PX * length:
-            return False
-    return True
+        begin = sides[c, 0] * x + sides[c, 1] * y + sides[c, 2]
+        change = sides[c, 0] * along_x + sides[c, 1] * along_y
+        if begin < 0.0:
+            if begin + change < 0.0:
+                return 1.0, 0.0
+            first = max(first, -begin / change)
+        elif begin + change < 0.0:
+            last = min(last, -begin / change)
+    return first, last
 
 
 @kernel
-def find_outline(
-    corners_px: Floats, size: tuple[int, int], end_row: float, edges: Ints, points: Floats
-) -> int:
+def find_outline(corners_px: Floats, within: Floats, edges: Ints, points: Floats) -> int:
     """Write the points that are on the outline.
 
     Args:
-        corners_px: (13, 4, 2).
-        size: width and height of the image.
-        end_row: first row that does not count.
+        corners_px: (13, 4, 3), see :func:`project_corners`.
+        within: first and last column, first and end row of the part that counts, (4,), px.
         edges: written: patch and first corner of the edge of each point, (312, 2).
         points: written: fraction of the edge, and length of the outline at the point, px, (312, 2).
 
     Returns:
         Number of points.
     """
-    width, height = size
-    end = min(end_row, height - _BORDER_PX)
-    turns = np.empty(BODY_PATCHES)
-    sides_px, boxes = np.empty((BODY_PATCHES, 4)), np.empty((BODY_PATCHES, 4))
-    _turns(corners_px, turns, sides_px)
-    for p in range(BODY_PATCHES):
-        boxes[p, 0], boxes[p, 1] = corners_px[p, :, 0].min(), corners_px[p, :, 0].max()
-        boxes[p, 2], boxes[p, 3] = corners_px[p, :, 1].min(), corners_px[p, :, 1].max()
+    left, right, top, bottom = within[0], within[1], within[2], within[3]
+    sides_px, insides = np.empty((BODY_PATCHES, 4)), np.empty((BODY_PATCHES, 4, 3))
+    boxes, near = np.empty((BODY_PATCHES, 4)), np.empty(BODY_PATCHES, np.int64)
+    _bound(corners_px, sides_px, insides, boxes)
+    covered = np.empty((BODY_PATCHES, 2))
     count = 0
     for p in range(BODY_PATCHES):
+        n_near, box = 0, boxes[p]
+        for other in range(BODY_PATCHES):
+            there = boxes[other]
+            beside = box[1] >= there[0] and there[1] >= box[0]
+            if other != p and beside and box[3] >= there[2] and there[3] >= box[2]:
+                near[n_near] = other
+                n_near += 1
         for c in range(4):
             length = sides_px[p, c]
             if length == 0.0:
                 continue
+            x, y = corners_px[p, c, 0], corners_px[p, c, 1]
+            along_x = corners_px[p, (c + 1) % 4, 0] - x
+            along_y = corners_px[p, (c + 1) % 4, 1] - y
+            n_covered = 0
+            for i in range(n_near):
+                first, last = _covered_share(insides[near[i]], x, y, along_x, along_y)
+                if first <= last:
+                    covered[n_covered, 0], covered[n_covered, 1] = first, last
+                    n_covered += 1
             for k in range(_ON_EDGE):
                 share = (k + 0.5) / _ON_EDGE
-                x, y = point_on_edge(corners_px, p, c, share)
-                counts = _BORDER_PX <= x <= width - 1 - _BORDER_PX and _BORDER_PX <= y < end
-                if counts:
-                    for other in range(BODY_PATCHES):
-                        box = boxes[other]
-                        if other == p or not (box[0] <= x <= box[1] and box[2] <= y <= box[3]):
-                            continue
-                        if _is_inside(corners_px, sides_px, other, turns[other], x, y):
-                            counts = False
-                            break
+                u, v = x + share * along_x, y + share * along_y
+                counts = left <= u <= right and top <= v < bottom
+                for i in range(n_covered):
+                    counts = counts and not covered[i, 0] <= share <= covered[i, 1]
                 if counts:
                     edges[count, 0], edges[count, 1] = p, c
                     points[count, 0], points[count, 1] = share, length / _ON_EDGE
@@ -158,7 +166,7 @@ def find_outline(
     return count
 
 
-@kernel
+@inlined_kernel
 def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
     """Return the value of ``field`` (H, W), 2x2 or larger, at a point by bilinear interpolation."""
     height, width = field.shape
@@ -167,40 +175,9 @@ def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
     y = min(max(0.0, y), height - 1.001)
     u, v = int(x), int(y)
     a, b = x - u, y - v
-    upper = field[v, u] * (1.0 - a) + field[v, u + 1] * a
-    lower = field[v + 1, u] * (1.0 - a) + field[v + 1, u + 1] * a
-    distance: float = min(max(upper * (1.0 - b) + lower * b, -FAR_PX), FAR_PX)
+    above, below = field[_index(v)], field[_index(v + 1)]
+    upper, lower = above[_index(u)], below[_index(u)]
+    upper += a * (above[_index(u + 1)] - upper)
+    lower += a * (below[_index(u + 1)] - lower)
+    distance: float = upper + b * (lower - upper)
     return distance
-
-
-@kernel
-def first_points(edges: Ints, count: int, first: Ints) -> None:
-    """Write the index of each patch's first point, and the end of the last patch, (14,).
-
-    Args:
-        edges: patches, in order, and corners of the points, (n, 2).
-        count: number of points.
-        first: written.
-    """
-    p = 0
-    for i in range(count):
-        while p <= edges[i, 0]:
-            first[p] = i
-            p += 1
-    for later in range(p, BODY_PATCHES + 1):
-        first[later] = count
-
-
-@kernel
-def moved_patches(one: Floats, other: Floats) -> tuple[int, int]:
-    """Return first and end index of the patches that differ between two states (14,)."""
-    for j in (TORSO_Y, ROLL, PITCH, YAW, TORSO_X, TORSO_Z):
-        if one[j] != other[j]:
-            return 0, BODY_PATCHES
-    first, end = BODY_PATCHES, 0
-    for arm in range(2):
-        for j in range(FIRST_ANGLES[arm], FIRST_ANGLES[arm] + ARM_ANGLES):
-            if one[j] != other[j]:
-                first = min(first, TRUNK_PATCHES + ARM_PATCHES * arm)
-                end = TRUNK_PATCHES + ARM_PATCHES * (arm + 1)
-    return min(first, end), end

@@ -17,8 +17,12 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
-from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, STATE_STEP, comparing
+from cardbox_tracker.estimation.cost.distance_field import (
+    FAR,
+    padded_width,
+    signed_distances_of,
+)
+from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, comparing
 from cardbox_tracker.estimation.cost.outline_fit_kernels import (
     SHARES,
     add_equations,
@@ -41,6 +45,8 @@ _DIFFERENT, _STEPS_OF_DIFFERENT = (3, 1, 0.1), 2
 _KEPT = 0.6
 # Margin around the silhouette, larger than the limit of the distances.
 _MARGIN_PX = 12
+# Border of the window, or of the image, where no point of the outline counts.
+_BORDER_PX = 3
 
 
 class _Lens:
@@ -53,6 +59,7 @@ class _Lens:
         self._turned, self._moved = turned, moved
         small = self._small
         self._lens = np.array([small.fx, small.fy, small.cx, small.cy])
+        self._points = np.empty((POINTS, 2), np.int64), np.empty((POINTS, 2))
 
     def look(self, silhouette: Silhouette, state: FloatArray) -> bool:
         """Set the silhouette of a person near ``state`` (14,); return False if it is empty."""
@@ -64,15 +71,17 @@ class _Lens:
             )
         there = state @ self._turned + self._moved
         row = self._cost.hip_row(there, camera) - ABOVE_HIPS_PX
-        left, top, field = signed_distances(silhouette, row)
+        left, top, field, within = signed_distances(silhouette, row)
         lens = self._lens - np.array([0.0, 0.0, left, top])
-        self._seen = self._turned, self._moved, lens, field, row - top
+        self._seen = self._turned, self._moved, lens, field, within
         return bool(field.size)
 
-    def add_equations(self, state: FloatArray, matrix: FloatArray, right: FloatArray) -> None:
-        edges, points = np.empty((POINTS, 2), np.int64), np.empty((POINTS, 2))
-        equations, outline = (matrix, right), (edges, points)
-        count = add_equations(state, self._seen, self._cost.body, STATE_STEP, equations, outline)
+    def add_equations(
+        self, state: FloatArray, matrix: FloatArray, right: FloatArray, costs: FloatArray
+    ) -> None:
+        equations = matrix, right, costs
+        count = add_equations(state, self._seen, self._cost.body, equations, self._points)
+        edges, points = self._points
         self._outline = edges[:count], points[:count]
 
     def add_costs(self, state: FloatArray, change: FloatArray, costs: FloatArray) -> None:
@@ -150,9 +159,9 @@ class OutlineFit:
         matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
         costs = np.empty(len(SHARES))
         for _ in range(steps):
-            matrix[:], change[:] = 0.0, 0.0
+            matrix[:], change[:], costs[:] = 0.0, 0.0, 0.0
             for lens in self._looking:
-                lens.add_equations(fitted, matrix, change)
+                lens.add_equations(fitted, matrix, change, costs)
             solve_equations(fitted, state, _STDDEV, matrix, change, costs)
             for lens in self._looking:
                 lens.add_costs(fitted, change, costs)
@@ -162,25 +171,32 @@ class OutlineFit:
 
 def signed_distances(
     silhouette: Silhouette, end_row: float
-) -> tuple[int, int, NDArray[np.float32]]:
+) -> tuple[int, int, NDArray[np.float32], FloatArray]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
     They are limited to -``FAR_PX``..``FAR_PX``.
 
     Returns:
         The first column and row of the window around the foreground above ``end_row``, and the
-        distances there, px; empty without foreground, or with a single row above ``end_row``.
+        distances there, px; empty without foreground, or with a single row above ``end_row``. Then
+        first and last column, first and end row of the window's part that counts, (4,), px.
     """
     rows = silhouette[: int(min(max(end_row + _MARGIN_PX, 0), len(silhouette)))]
     # The interpolation between pixels needs two rows.
-    if len(rows) < 2:
-        return 0, 0, np.zeros((0, 0), np.float32)
-    left, top, width, height = cv2.boundingRect(rows)
-    left, right = max(left - _MARGIN_PX, 0), left + width + _MARGIN_PX
-    top, bottom = max(top - _MARGIN_PX, 0), top + height + _MARGIN_PX
+    box = cv2.boundingRect(rows) if len(rows) > 1 else (0, 0, 0, 0)
+    left, top, width, height = box
     if not width:
-        return 0, 0, np.zeros((0, 0), np.float32)
+        return 0, 0, np.zeros((0, 0), np.float32), np.zeros(4)
+    first = max(left - _MARGIN_PX, 0) + _BORDER_PX
+    last = min(left + width + _MARGIN_PX, rows.shape[1]) - 1 - _BORDER_PX
+    top, bottom = max(top - _MARGIN_PX, 0), top + height + _MARGIN_PX
+    # The kernel continues the mask beside its border, which is background where there is some.
+    beside = _MARGIN_PX - FAR
+    left, right = max(left - beside, 0), left + width + beside
     _, inside = cv2.threshold(rows[top:bottom, left:right], 127, 1, cv2.THRESH_BINARY)
-    distances = np.empty(inside.shape, np.float32)
+    distances = np.empty((len(inside), padded_width(inside.shape[1])), np.float32)
     signed_distances_of(np.asarray(inside, np.uint8), distances)
-    return left, top, distances
+    left -= FAR
+    end = min(end_row - top, len(inside) - _BORDER_PX)
+    within = np.array([first - left, last - left, _BORDER_PX, end], np.float64)
+    return left, top, distances, within

@@ -8,14 +8,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.estimation.cost.distance_field import signed_distances_of
+from cardbox_tracker.estimation.cost.distance_field import (
+    FAR,
+    padded_width,
+    signed_distances_of,
+)
 from cardbox_tracker.estimation.cost.outline_distances import FAR_PX
 
 
-def distances(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
-    found = np.full(mask.shape, np.nan, np.float32)
+def padded(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
+    height, width = mask.shape
+    found = np.full((height, padded_width(width)), np.nan, np.float32)
     signed_distances_of(mask, found)
     return found
+
+
+def distances(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
+    return padded(mask)[:, FAR : FAR + mask.shape[1]]
 
 
 def by_definition(mask: NDArray[np.uint8]) -> NDArray[np.float64]:
@@ -54,3 +63,17 @@ def test_where_all_is_one_side_it_is_far_away(value: int) -> None:
 def test_they_are_euclidean(height: int, width: int, share: float, seed: int) -> None:
     mask = np.asarray(np.random.default_rng(seed).random((height, width)) < share, np.uint8)
     assert np.allclose(distances(mask), by_definition(mask), atol=1e-4)
+
+
+def test_beside_the_mask_its_outermost_columns_continue() -> None:
+    mask = np.zeros((4, 3), np.uint8)
+    mask[1:, 2] = 1
+    found = padded(mask)
+    assert found.shape[1] >= 3 + 2 * FAR
+    # 3 px to the left of the foreground, and so on up to the limit.
+    assert found[3, FAR - 1] == pytest.approx(3.0)
+    assert found[3, 0] == pytest.approx(FAR_PX)
+    # To its right the foreground continues, whose nearest background is above.
+    np.testing.assert_allclose(found[:, FAR + 4], [1.0, -1.0, -2.0, -3.0])
+    np.testing.assert_allclose(found[:, -1], [1.0, -1.0, -2.0, -3.0])
+    assert np.isfinite(found).all()

@@ -41,5 +41,5 @@ def test_a_point_that_is_nan_has_a_distance_of_the_field() -> None:
 def test_a_field_of_distances_has_two_rows_or_nothing(rows: int) -> None:
     """Between pixels of a single row, the row below would be read."""
     silhouette = np.full((40, 30), 255, np.uint8)
-    _, _, field = signed_distances(silhouette, rows - 12.0)
-    assert field.shape == ((rows, 30) if rows > 1 else (0, 0))
+    _, _, field, _ = signed_distances(silhouette, rows - 12.0)
+    assert len(field) == (rows if rows > 1 else 0)

@@ -148,7 +148,10 @@ def test_corrections_are_smoothed_until_it_is_forgotten() -> None:
 def test_distances_are_signed_and_cover_what_is_seen() -> None:
     silhouette = np.zeros((60, 80), np.uint8)
     silhouette[20:40, 30:50] = 255
-    left, top, field = signed_distances(silhouette, 60.0)
+    left, top, field, within = signed_distances(silhouette, 60.0)
     assert field[30 - top, 40 - left] == pytest.approx(-10.0, abs=1.0)
     assert field[30 - top, 25 - left] == pytest.approx(5.0, abs=1.0)
+    # 12 px around the foreground, less a border of 3 px.
+    shift = np.array([left, left, top, top])
+    np.testing.assert_array_equal(within + shift, [21, 58, 11, 49])
     assert signed_distances(silhouette, -100.0)[2].size == 0
