@@ -41,8 +41,10 @@ def check_array(
 
 
 def _fits(found: tuple[int, ...], shape: tuple[int, ...]) -> bool:
-    return len(found) == len(shape) and all(
-        length in (one, ANY) for length, one in zip(shape, found, strict=True)
+    # Usually all lengths are fixed, or all are free.
+    return len(found) == len(shape) and (
+        max(shape, default=ANY) == ANY
+        or all(one in (length, ANY) for length, one in zip(found, shape, strict=True))
     )
 
 

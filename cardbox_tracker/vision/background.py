@@ -29,7 +29,7 @@ from cardbox_tracker.vision.foreground import segment_foreground
 from cardbox_tracker.vision.given_arrays import image_from
 from cardbox_tracker.vision.light import LightFollower
 from cardbox_tracker.vision.partial_scene import merged
-from cardbox_tracker.vision.regions import clean_silhouette
+from cardbox_tracker.vision.regions import clean_in_window
 from cardbox_tracker.vision.shadows import decide_shadows
 from cardbox_tracker.vision.window import Window, window_of
 
@@ -69,6 +69,7 @@ class SilhouetteExtractor:
         # Window of the last silhouette, and number of images compared by colour.
         self._last, self._images = Window(0, 0, 0, 0), 0
         self._colors = ColorReader(model.mean.shape)
+        self._is_even = not any(length % 2 for length in model.mean.shape)
         # Scratch memory is allocated once, since allocation takes longer than the arithmetic.
         self._scratch = tuple(np.empty_like(model.mean) for _ in range(2))
 
@@ -153,40 +154,24 @@ class SilhouetteExtractor:
         )
         if config.smoothing_px > 0:
             cv2.GaussianBlur(signed, self._kernel_size, config.smoothing_px, dst=signed)
-        foreground = segment_foreground(signed, self._brighter, self._darker, config.edge, score)
-        window = window_of(foreground)
-        colored, is_whole = None, False
-        if self._chroma is not None and image.ndim == 3:
-            window, looked_at = self._colored_window(window, foreground.shape)
-            is_whole = looked_at is None
-            colored = self._chroma(self._colors.colors, self.model.mean.shape, looked_at)
-        else:
-            window = window.grown(_MARGIN_PX, foreground.shape)
-        if config.soft_shadow > 0:
-            decide_shadows(
-                foreground,
-                signed,
-                self._per_level,
-                colored,
-                config.darkest_shadow,
-                config.soft_shadow,
-                window,
-            )
-        elif colored is not None:
-            foreground[window.slices] |= colored
-        if is_whole:
-            window = window_of(foreground).grown(_MARGIN_PX, foreground.shape)
-        silhouette = clean_silhouette(foreground, config.min_area, config.max_hole, window)
-        self._last = window_of(silhouette)
+        foreground, window = segment_foreground(
+            signed, self._brighter, self._darker, config.edge, score
+        )
+        near: Window | None = window.grown(_MARGIN_PX, foreground.shape)
+        if has_color:
+            near = self._near(window, foreground.shape)
+        self._decide(foreground, near, has_color)
+        window = near or window_of(foreground).grown(_MARGIN_PX, foreground.shape)
+        silhouette, self._last = clean_in_window(
+            foreground, config.min_area, config.max_hole, window
+        )
         if self._light is not None:
-            self._light.exclude(silhouette)
+            self._light.exclude(silhouette, self._last)
         self._absorb(image, brightness, silhouette, stamp_ns)
         return silhouette
 
-    def _colored_window(
-        self, window: Window, shape: tuple[int, ...]
-    ) -> tuple[Window, Window | None]:
-        """Return where foreground can be, and where to look for its colour; None: everywhere.
+    def _near(self, window: Window, shape: tuple[int, ...]) -> Window | None:
+        """Return where to look for foreground by its colour; None: everywhere.
 
         Args:
             window: of the foreground by brightness.
@@ -194,11 +179,26 @@ class SilhouetteExtractor:
         """
         number, self._images = self._images, self._images + 1
         is_settling = self._light is not None and self._light.is_settling
+        if number % _WHOLE_EVERY == 0 or is_settling or not self._is_even:
+            return None
         near = window.joined(self._last).grown(_COLOR_MARGIN_PX, shape)
-        is_odd = shape[0] % 2 or shape[1] % 2
-        if number % _WHOLE_EVERY == 0 or is_settling or is_odd or near.is_empty:
-            return Window(0, shape[0], 0, shape[1]), None
-        return near, near
+        return None if near.is_empty else near
+
+    def _decide(self, foreground: ImageArray, window: Window | None, has_color: bool) -> None:
+        """Add coloured pixels in a window (None: everywhere), and remove soft shadows."""
+        signed, config, colored = self._scratch[0], self.config, None
+        shadow = config.darkest_shadow, config.soft_shadow
+        if has_color and self._chroma is not None:
+            colors = self._colors.colors
+            if self._is_even and config.soft_shadow > 0:
+                self._chroma.decide(colors, foreground, signed, self._per_level, shadow, window)
+                return
+            colored = self._chroma(colors, foreground.shape, window)
+        if config.soft_shadow > 0:
+            decide_shadows(foreground, signed, self._per_level, colored, *shadow, window)
+        elif colored is not None:
+            part = ... if window is None else window.slices
+            foreground[part] |= colored
 
     def restart(self) -> None:
         """Forget the light and the absorbed objects: the next image is not the successor."""

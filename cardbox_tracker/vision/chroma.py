@@ -9,12 +9,13 @@ falls to a fraction of its maximum nearby.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.chroma_kernels import (
     DARKEST,
@@ -24,6 +25,7 @@ from cardbox_tracker.vision.chroma_kernels import (
     rate_colors,
 )
 from cardbox_tracker.vision.color_reader import halved
+from cardbox_tracker.vision.shadows import decide_pixels
 from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]
@@ -99,12 +101,12 @@ class ChromaScore:
             np.reshape(highest, (1, *mean.shape[1:])),
         )
         self._background = np.concatenate(planes).astype(np.float32)
-        self._edge = np.float32(edge)
+        self._edge = edge
         size = mean[0].size
         self._step = step = max(1, round((size / _SAMPLES) ** 0.5))
         samples = mean[0, step // 2 :: step, step // 2 :: step].size
         self._shares = np.empty((2, samples if follow else 0), np.float32)
-        self._cast: tuple[np.float32, np.float32] = (np.float32(0), np.float32(0))
+        self._cast = 0.0, 0.0
         if before is not None:
             self._cast = before._cast
         # Allocation takes longer than the arithmetic.
@@ -139,27 +141,68 @@ class ChromaScore:
             if self._shares.size:
                 self._see_cast(colors)
             return self._compared(colors, (0, 0), size)
-        window.check_within(size, 2)
-        if window.is_empty or window.top % 2 or window.bottom % 2:
-            raise ValueError(f"{window} is empty or has odd edges; expected neither")
+        _check(window, size, 2)
         sides = window.bottom - window.top, window.right - window.left
         return self._compared(colors, (window.top // 2, window.left // 2), sides)
+
+    def decide(
+        self,
+        colors: ImageArray,
+        foreground: ImageArray,
+        difference: FloatImage,
+        per_level: FloatImage,
+        shadow: tuple[float, float],
+        window: Window | None = None,
+    ) -> None:
+        """Add coloured pixels to ``foreground`` and remove soft shadows from it, in place.
+
+        This does in one call what :meth:`__call__` and
+        :func:`~cardbox_tracker.vision.shadows.decide_shadows` do.
+
+        Args:
+            colors: as for :meth:`__call__`.
+            foreground: (H, W), 0 or 255, found by brightness alone; H and W are even.
+            difference: image minus background, (H, W), grey levels.
+            per_level: one grey level as a fraction of the background, (H, W).
+            shadow: darkest and softest, as for ``decide_shadows``.
+            window: as for :meth:`__call__`, and as for ``decide_shadows``.
+
+        Raises:
+            ValueError: an array has another shape or type or is read-only, or the window does not
+                fit.
+        """
+        _, rows, columns = self._background.shape
+        shape = 2 * rows, 2 * columns
+        check_array("colors", colors, (3, rows, columns))
+        check_array("foreground", foreground, shape, is_written=True)
+        check_array("difference", difference, shape, np.float32, is_written=True)
+        check_array("per_level", per_level, shape, np.float32, is_written=True)
+        if window is None:
+            window = Window(0, shape[0], 0, shape[1])
+            if self._shares.size:
+                self._see_cast(colors)
+        else:
+            _check(window, shape, 2 if shape[1] % 8 else 8)
+        _decide_with_colors(
+            *(colors, self._background, *self._cast, self._edge),
+            *(self._score, self._margin, self._mask, foreground, difference, per_level),
+            *(*shadow, *window),
+        )
 
     def _compared(
         self, colors: ImageArray, place: tuple[int, int], sides: tuple[int, ...]
     ) -> ImageArray:
         """Return the mask of a part of the height and width ``sides`` whose colours begin there."""
-        half = max(sides[0] // 2, 1), max(sides[1] // 2, 1)
-        count = half[0] * half[1]
-        score, margin = self._score[:count].reshape(half), self._margin[:count].reshape(half)
-        rated = (*place, self._background, *self._cast, self._edge, score, margin)
-        if sides != (2 * half[0], 2 * half[1]):
-            rate_colors(colors, *rated)
+        height, width = half = max(sides[0] // 2, 1), max(sides[1] // 2, 1)
+        count = height * width
+        rated = (*place, *half, self._background, *self._cast, self._edge)
+        if sides != (2 * height, 2 * width):
+            rate_colors(colors, *rated, self._score, self._margin)
+            margin = self._margin[:count].reshape(half)
             whole = cv2.resize(margin, (sides[1], sides[0]))
             return np.asarray(cv2.inRange(whole, 0.0, np.inf), np.uint8)
-        mask = self._mask[: 4 * count].reshape(sides)
-        find_colors(colors, *rated, mask.view(np.uint16))
-        return mask
+        find_colors(colors, *rated, self._score, self._margin, self._mask)
+        return self._mask[: 4 * count].reshape(sides)
 
     def without_cast(self, model: ChromaModel) -> ChromaModel:
         """Convert colours of the present white balance to that of the learned scene."""
@@ -174,5 +217,44 @@ class ChromaScore:
         collect_shares(colors, self._background, self._step, self._shares)
         middle = self._shares.shape[1] // 2
         medians = np.partition(self._shares, middle, axis=1)[:, middle]
-        red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST).astype(np.float32)
-        self._cast = red, blue
+        red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST)
+        self._cast = float(red), float(blue)
+
+
+def _check(window: Window, shape: tuple[int, ...], unit: int) -> None:
+    """Refuse a window that is empty, or not at even rows and columns in steps of ``unit`` px."""
+    window.check_within(shape, unit)
+    if window.is_empty or window.top % 2 or window.bottom % 2:
+        raise ValueError(f"{window} is empty or has odd edges; expected neither")
+
+
+@kernel
+def _decide_with_colors(
+    colors: Any,
+    background: Any,
+    red_cast: Any,
+    blue_cast: Any,
+    edge: Any,
+    score: Any,
+    margin: Any,
+    mask: Any,
+    foreground: Any,
+    difference: Any,
+    per_level: Any,
+    darkest: Any,
+    softest: Any,
+    top: Any,
+    bottom: Any,
+    left: Any,
+    right: Any,
+) -> None:
+    """Compare a window by colour, and decide about shadows in it."""
+    height, width = bottom - top, right - left
+    find_colors(
+        *(colors, top // 2, left // 2, height // 2, width // 2),
+        *(background, red_cast, blue_cast, edge, score, margin, mask),
+    )
+    colored = mask[: height * width].reshape((height, width))
+    decide_pixels(
+        foreground, colored, difference, per_level, -darkest, softest, top, bottom, left, right
+    )

@@ -137,6 +137,8 @@ def rate_colors(
     colors: Any,
     top: Any,
     left: Any,
+    height: Any,
+    width: Any,
     background: Any,
     red_cast: Any,
     blue_cast: Any,
@@ -149,19 +151,28 @@ def rate_colors(
     Args:
         colors: brightness, Cr and Cb at half the resolution, (3, H, W) uint8. In the window, they
             are smoothed by 3x3 px.
-        top: first row of the window of h rows and w columns.
+        top: first row of the window.
         left: its first column.
+        height: its number of rows, h.
+        width: its number of columns, w.
         background: planes of the model, (6, H, W): what one grey level is of the brightness, Cr
             and Cb less that of grey, what one level of each is of its limit, the brightest channel.
         red_cast: Cr that the white balance adds, as a share of the brightness.
         blue_cast: Cb that it adds.
         edge: fraction of the highest score nearby at which the outline is put.
-        score: scratch, (h, w).
-        margin: result, (h, w).
+        score: scratch, one for each pixel of a window of any size.
+        margin: result, (h, w) in its first elements; it has the same size.
     """
-    rows = np.empty((3, score.shape[1] + 2 * REACH_PX), np.float32)
-    _rate(colors, (top, left), background, (red_cast, blue_cast), rows, score)
-    _subtract_edge(score, edge, rows[0], margin)
+    scores, margins = _part(score, height, width), _part(margin, height, width)
+    rows = np.empty((3, width + 2 * REACH_PX), np.float32)
+    _rate(colors, (top, left), background, (_f32(red_cast), _f32(blue_cast)), rows, scores)
+    _subtract_edge(scores, _f32(edge), rows[0], margins)
+
+
+@inlined_kernel
+def _part(memory: Any, height: Any, width: Any) -> Any:
+    """Return the first elements of flat memory as an array (height, width)."""
+    return memory[: height * width].reshape((height, width))
 
 
 @inlined_kernel
@@ -193,6 +204,8 @@ def find_colors(
     colors: Any,
     top: Any,
     left: Any,
+    height: Any,
+    width: Any,
     background: Any,
     red_cast: Any,
     blue_cast: Any,
@@ -203,8 +216,11 @@ def find_colors(
 ) -> None:
     """Write 255 where the margin is at least 0 at twice the resolution, else 0.
 
-    ``mask`` is the result, two pixels of a row in a number, (2 h, w) uint16. The other arguments
-    are those of :func:`rate_colors`.
+    ``mask`` has the result, (2 h, 2 w) uint8, in its first elements. The other arguments are those
+    of :func:`rate_colors`.
     """
-    rate_colors(colors, top, left, background, red_cast, blue_cast, edge, score, margin)
-    _enlarge(margin, np.empty(score.shape[1] + 2, np.float32), mask)
+    rate_colors(
+        colors, top, left, height, width, background, red_cast, blue_cast, edge, score, margin
+    )
+    pairs = _part(mask.view(np.uint16), 2 * height, width)
+    _enlarge(_part(margin, height, width), np.empty(width + 2, np.float32), pairs)

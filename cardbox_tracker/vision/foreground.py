@@ -1,6 +1,7 @@
 """Classifies the pixels that differ enough from the background as foreground.
 
-A single pass over the image replaces six of OpenCV, so that the rows stay in the cache.
+A single pass over the image replaces six of OpenCV, so that the rows stay in the cache. It also
+finds the window of the foreground.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.vision.array_checks import ANY, check_array
+from cardbox_tracker.vision.window import Window, find_edges
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -23,7 +25,7 @@ def segment_foreground(
     darker: FloatImage,
     edge: float,
     score: FloatImage,
-) -> ImageArray:
+) -> tuple[ImageArray, Window]:
     """Mark the pixels whose score is at least 1 and at least ``edge`` times their neighbours'.
 
     The score of a difference is the larger of its products with ``brighter`` and ``darker``.
@@ -37,24 +39,26 @@ def segment_foreground(
         score: scratch, (H, W).
 
     Returns:
-        (H, W), 0 or 255.
+        (H, W), 0 or 255, and its window as :func:`~cardbox_tracker.vision.window.window_of` has it.
 
     Raises:
         ValueError: the arrays differ in shape, or one is read-only.
     """
     check_array("difference", difference, (ANY, ANY), np.float32, is_written=True)
-    named = {"brighter": brighter, "darker": darker, "score": score}
-    for name, array in named.items():
-        check_array(name, array, difference.shape, np.float32, is_written=True)
-    foreground = np.empty(difference.shape, np.uint8)
-    _foreground(difference, brighter, darker, np.float32(edge), score, foreground)
-    return foreground
+    shape = difference.shape
+    check_array("brighter", brighter, shape, np.float32, is_written=True)
+    check_array("darker", darker, shape, np.float32, is_written=True)
+    check_array("score", score, shape, np.float32, is_written=True)
+    foreground = np.empty(shape, np.uint8)
+    edges = _foreground(difference, brighter, darker, np.float32(edge), score, foreground)
+    return foreground, Window(*edges)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _foreground(
     difference: Any, brighter: Any, darker: Any, edge: Any, score: Any, foreground: Any
-) -> None:
+) -> Any:
+    """Write the foreground (H, W), and return the edges of its window."""
     height, width = difference.shape
     one = np.float32(1)
     for v in range(height):
@@ -70,3 +74,4 @@ def _foreground(
         for u in range(width):
             limit = edge * max(max(columns[u], columns[u + 1]), columns[u + 2])
             foreground[v, u] = 255 * ((here[u] >= limit) & (here[u] >= one))
+    return find_edges(foreground)

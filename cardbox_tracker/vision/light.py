@@ -26,6 +26,7 @@ from cardbox_tracker.vision.light_samples import (
     sum_cells,
     take_samples,
 )
+from cardbox_tracker.vision.window import Window
 
 FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
@@ -93,7 +94,6 @@ class LightFollower:
         self._ratios = np.empty(count + 2, np.float32)
         self._ratio_bits = self._ratios.view(np.int32)
         self._samples = np.empty(self._size[::-1], np.uint8)
-        self._flat_samples = self._samples.ravel()
         self._means = np.empty(self._size[::-1], np.float32)
         self._smooth = np.zeros(self._size[::-1], np.bool_)
         self._cells = np.zeros((*_CELLS[::-1], 2), np.float32)
@@ -127,7 +127,6 @@ class LightFollower:
         self._small_brightest = np.where(self._small > _DARKEST, brightest, np.inf).astype(
             np.float32
         )
-        self._flat_small, self._flat_brightest = self._small.ravel(), self._small_brightest.ravel()
         self._highest = float(self._brightest.max())
         starts = np.arange(0, mean.size, BLOCK)
         self._highest_of_blocks = np.maximum.reduceat(self._brightest, starts)
@@ -187,11 +186,9 @@ class LightFollower:
 
     def _estimate(self, brightness: ImageArray) -> None:
         self._brightness = brightness
-        take_samples(brightness, self._samples)
         measured = measure_level(
-            *(self._flat_samples, self._flat_small, self._flat_brightest, self._fine.ravel()),
-            *(self._person.ravel(), self._ratios, self._ratio_bits, np.float32(self.level)),
-            _ENOUGH,
+            *(brightness, self._samples, self._small, self._small_brightest, self._fine),
+            *(self._person, self._ratios, self._ratio_bits, self.level, _ENOUGH),
         )
         if not measured >= 0.0:
             return
@@ -240,35 +237,40 @@ class LightFollower:
             multiply_field(self._mean, self._field, self._scaled)
             self._relative = self._scaled
 
-    def exclude(self, silhouette: ImageArray) -> None:
-        """Exclude the person, given the silhouette (H, W) of the last image."""
+    def exclude(self, silhouette: ImageArray, window: Window | None = None) -> None:
+        """Exclude the person.
+
+        Args:
+            silhouette: the silhouette of the last image, (H, W).
+            window: a window that contains all of it; the whole image if None.
+        """
         check_array("silhouette", silhouette, self._mean.shape)
-        if cv2.countNonZero(silhouette) > _COVERAGE * silhouette.size:
+        least = _COVERAGE * silhouette.size
+        if (window is None or window.area_px > least) and cv2.countNonZero(silhouette) > least:
             self._settling = _SETTLING - 1
             return
-        person = np.empty(self._size[::-1], np.uint8)
-        take_samples(silhouette, person)
         if self._settling > 0 or self._is_lit or self._images % _EVERY == 0:
             # Darker pixels may be the person's shadow, which moves with the person.
-            count = self._find_smooth(person)
-            self._is_lit = count > _LIT * person.size
+            count = self._find_smooth(silhouette)
+            self._is_lit = count > _LIT * self._lit.size
         if self._settling > 0:
             self._settling -= 1
-            person[self._smooth] = 0
-            self._passing = person
+            self._passing = np.empty(self._size[::-1], np.uint8)
+            take_samples(silhouette, self._passing)
+            self._passing[self._smooth] = 0
             return
-        grow_person(person, self._lit, self._person)
+        grow_person(silhouette, self._lit, self._person)
         self._passing = None
 
-    def _find_smooth(self, person: ImageArray) -> int:
-        """Find foreground (h, w) without an outline, and return the size of its brighter part."""
+    def _find_smooth(self, silhouette: ImageArray) -> int:
+        """Find parts of a silhouette (H, W) without an outline; return the brighter ones' size."""
         height, width = self._mean.shape
         quads = None if height % STEP_PX or width % STEP_PX else self._brightness.view(np.uint32)
         if quads is None or not quads.flags.aligned:
             self._means[:] = cv2.resize(
                 self._brightness, self._size, interpolation=cv2.INTER_AREA
-            ).reshape(person.shape)
+            ).reshape(self._means.shape)
         else:
             average_blocks(quads, self._means)
-        parts = self._means, self._blocks, self._fine, np.float32(self.level)
-        return int(find_smooth(*parts, person, self._smooth, self._lit))
+        parts = self._means, self._blocks, self._fine, self.level
+        return int(find_smooth(*parts, silhouette, self._smooth, self._lit))

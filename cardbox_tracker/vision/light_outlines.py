@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.vision.light_samples import take_samples
 
 # Light varies by less than this fraction within 12 px; an outline does not.
 _SOFT = 0.06
@@ -44,7 +45,7 @@ def average_blocks(quads: Any, means: Any) -> None:
 
 @kernel
 def find_smooth(
-    means: Any, blocks: Any, fine: Any, level: Any, person: Any, smooth: Any, lit: Any
+    means: Any, blocks: Any, fine: Any, level: Any, silhouette: Any, smooth: Any, lit: Any
 ) -> Any:
     """Find foreground into which the brightness passes smoothly from the background.
 
@@ -53,7 +54,7 @@ def find_smooth(
         blocks: brightness of the background, (h, w).
         fine: expected factors of the level, (h, w).
         level: brightness of the scene relative to the learned background.
-        person: foreground, (h, w), not 0 where set.
+        silhouette: foreground at the resolution of the image, (H, W), not 0 where set.
         smooth: result, (h, w) bool.
         lit: result: its part that is brighter than the background, (h, w) bool.
 
@@ -61,7 +62,9 @@ def find_smooth(
         Number of pixels of ``lit``.
     """
     height, width = means.shape
-    one = _f32(1)
+    one, level = _f32(1), _f32(level)
+    person = np.empty((height, width), np.uint8)
+    take_samples(silhouette, person)
     for v in range(height):
         row, dark, factor = means[v], blocks[v], fine[v]
         for u in range(width):
@@ -128,15 +131,17 @@ def _flood(state: Any, reached: Any) -> None:
 
 
 @kernel
-def grow_person(person: Any, without: Any, grown: Any) -> None:
-    """Write the person with a margin, (h, w): 0, or the highest value nearby.
+def grow_person(silhouette: Any, without: Any, grown: Any) -> None:
+    """Write the samples of a silhouette with a margin, (h, w): 0, or the highest value nearby.
 
     Args:
-        person: foreground, (h, w) uint8; it becomes 0 where ``without`` is set.
-        without: pixels that are not the person, (h, w) bool.
+        silhouette: foreground at the resolution of the image, (H, W) uint8.
+        without: samples that are not the person, (h, w) bool.
         grown: result.
     """
-    height, width = person.shape
+    height, width = grown.shape
+    person = np.empty((height, width), np.uint8)
+    take_samples(silhouette, person)
     for v in range(height):
         row, left_out = person[v], without[v]
         for u in range(width):

@@ -32,7 +32,8 @@ def take_samples(image: Any, samples: Any) -> None:
 
 @kernel
 def measure_level(
-    small: Any,
+    image: Any,
+    samples: Any,
     mean: Any,
     brightest: Any,
     field: Any,
@@ -44,24 +45,27 @@ def measure_level(
 ) -> Any:
     """Return the median relative brightness outside the person; -1 without usable pixels.
 
-    All arrays are of n pixels, except the scratch. With too few usable pixels outside the person,
-    those of the person are used, too.
+    With too few usable pixels outside the person, those of the person are used, too. The arrays of
+    samples are (h, w), with n elements.
 
     Args:
-        small: brightness of an image, uint8.
-        mean: brightness of the background.
-        brightest: the brightest channel of the background; infinite where it must not be used.
-        field: expected brightness of each pixel as a factor of the level.
+        image: brightness of an image, (H, W) uint8.
+        samples: result: its samples.
+        mean: brightness of the background's samples.
+        brightest: their brightest channel; infinite where it must not be used.
+        field: their expected brightness as factors of the level.
         person: not 0 where the person is.
         ratios: scratch, (n + 2,) float32.
         bits: the same memory, int32.
         last: the last level, near which the median is found sooner.
         share: smallest share of usable pixels outside the person.
     """
-    n = len(small)
-    count = _collect(small, mean, brightest, field, person, ratios)
+    take_samples(image, samples)
+    n, last = samples.size, _f32(last)
+    count = _collect(samples, mean, brightest, field, person, ratios)
     if count < share * n:
-        count = _collect(small, mean, brightest, field, np.zeros(n, np.uint8), ratios)
+        nobody = np.zeros(samples.shape, np.uint8)
+        count = _collect(samples, mean, brightest, field, nobody, ratios)
     # Two spare elements turn the limits into bits, and the result into a number.
     ratios[n], ratios[n + 1] = last * _f32(1 - _NEAR), last * _f32(1 + _NEAR)
     rank, low, high = count // 2, bits[n], bits[n + 1]
@@ -74,14 +78,18 @@ def measure_level(
 
 
 @inlined_kernel
-def _collect(small: Any, mean: Any, brightest: Any, field: Any, person: Any, ratios: Any) -> Any:
+def _collect(samples: Any, mean: Any, brightest: Any, field: Any, person: Any, ratios: Any) -> Any:
     """Write the relative brightness of usable pixels, else infinity; return their number."""
     count, one, infinite = _i32(0), _f32(1), _f32(np.inf)
-    for i in range(len(small)):
-        ratio = _f32(small[i]) / max(mean[i], one)
-        is_known = (person[i] == 0) & (ratio * brightest[i] < _f32(CUT_OFF))
-        ratios[i] = ratio / field[i] if is_known else infinite
-        count += _i32(is_known)
+    height, width = samples.shape
+    for v in range(height):
+        now, before, most, light = samples[v], mean[v], brightest[v], field[v]
+        hidden, out = person[v], ratios[width * v : width * (v + 1)]
+        for u in range(width):
+            ratio = _f32(now[u]) / max(before[u], one)
+            is_known = (hidden[u] == 0) & (ratio * most[u] < _f32(CUT_OFF))
+            out[u] = ratio / light[u] if is_known else infinite
+            count += _i32(is_known)
     return count
 
 

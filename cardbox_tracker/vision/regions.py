@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import njit
 from cardbox_tracker.vision.array_checks import ANY, check_array
-from cardbox_tracker.vision.window import Window
+from cardbox_tracker.vision.window import Window, find_edges
 
 ImageArray = NDArray[np.uint8]
 
@@ -80,24 +80,36 @@ def clean_silhouette(
     Raises:
         ValueError: the image is of another type or layout.
     """
+    return clean_in_window(foreground, min_area, max_hole, window)[0]
+
+
+def clean_in_window(
+    foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
+) -> tuple[ImageArray, Window]:
+    """Return what :func:`clean_silhouette` does, and the window of its foreground.
+
+    The window's columns are multiples of 8 if the image's width and the given window's are.
+    """
     check_array("foreground", foreground, (ANY, ANY))
     silhouette = np.zeros(foreground.shape, np.uint8)
     if not foreground.size or (window is not None and window.is_empty):
-        return silhouette
+        return silhouette, Window(0, 0, 0, 0)
     # Background in a window is at least as long as a side; unless holes are smaller than that, the
     # whole image is used.
     sides = () if window is None else (window.bottom - window.top, window.right - window.left)
     if window is None or max_hole * foreground.size > min(sides):
         window = Window(0, foreground.shape[0], 0, foreground.shape[1])
-    part = window.slices
     # Closing joins parts that noise separated; opening would remove thin fingers.
-    closed = np.ascontiguousarray(
-        cv2.morphologyEx(foreground[part], cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8
-    )
-    remove_small_regions(closed, 255, min_area * foreground.size)
-    remove_small_regions(closed, 0, max_hole * foreground.size)
-    silhouette[part] = closed
-    return silhouette
+    part = foreground[window.slices]
+    closed = np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, _CLOSING_KERNEL), np.uint8)
+    check_array("part of the foreground", closed, part.shape, is_written=True)
+    height, width = part.shape
+    words = closed.view(np.uint64) if width % 8 == 0 else _NO_WORDS
+    runs = np.empty((4, height * (width // 2 + 1)), np.int32)
+    specks, holes = float(min_area * foreground.size), float(max_hole * foreground.size)
+    top, left = window.top, window.left
+    edges = _clean(closed, words, specks, holes, runs, silhouette, top, left)
+    return silhouette, Window(*edges)
 
 
 def find_regions(image: ImageArray) -> Regions:
@@ -197,6 +209,31 @@ def _number_regions(firsts: Any, runs: Any, rows: Any) -> Any:
             else:
                 parents[run] = parents[root]
     return count
+
+
+@njit(cache=True, nogil=True)
+def _clean(
+    part: Any,
+    words: Any,
+    specks_px: float,
+    holes_px: float,
+    runs: Any,
+    silhouette: Any,
+    top: Any,
+    left: Any,
+) -> Any:
+    """Recolour small regions of a part, copy it to the silhouette and return its window there."""
+    _recolour(part, words, np.uint8(255), specks_px, runs)
+    _recolour(part, words, np.uint8(0), holes_px, runs)
+    height, width = part.shape
+    for v in range(height):
+        row, out = part[v], silhouette[top + v, left : left + width]
+        for u in range(width):
+            out[u] = row[u]
+    first, end, begin, last = find_edges(part)
+    if end == 0:
+        return 0, 0, 0, 0
+    return top + first, top + end, left + begin, left + last
 
 
 @njit(cache=True, nogil=True)

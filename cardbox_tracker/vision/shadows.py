@@ -25,10 +25,6 @@ _DARK = 128
 _REACH_PX = 2
 
 
-# Eight pixels are processed at a time where the width is a multiple of eight.
-_NO_WORDS = np.zeros((1, 0), np.uint64)
-
-
 def decide_shadows(
     foreground: ImageArray,
     difference: FloatImage,
@@ -66,14 +62,7 @@ def decide_shadows(
         check_array("colored", colored, sides)
     window.check_within(shape, 1 if width % 8 else 8)
     by_color = np.zeros(sides, np.uint8) if colored is None else colored
-    words = colored_words = _NO_WORDS
-    if width % 8 == 0:
-        words, colored_words = foreground.view(np.uint64), by_color.view(np.uint64)
-    # Tuples of arrays take longer to pass on than arrays.
-    _decide(
-        *(foreground, words, by_color, colored_words, difference, per_level),
-        *(np.float32(-darkest), np.float32(softest), *window),
-    )
+    decide_pixels(foreground, by_color, difference, per_level, -darkest, softest, *window)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -100,11 +89,9 @@ def _is_soft(difference: Any, per_level: Any, v: Any, u: Any, softest: Any) -> A
 
 
 @njit(cache=True, nogil=True)
-def _decide(
+def decide_pixels(
     foreground: Any,
-    words: Any,
     colored: Any,
-    colored_words: Any,
     difference: Any,
     per_level: Any,
     darkest: Any,
@@ -114,15 +101,18 @@ def _decide(
     left: Any,
     right: Any,
 ) -> None:
+    """Do what :func:`decide_shadows` does with the same arguments and the edges of a window."""
     height, width = foreground.shape
-    dark = np.uint8(_DARK)
+    dark, darkest, softest = np.uint8(_DARK), np.float32(darkest), np.float32(softest)
     # Row and first column of each eight pixels with candidates.
     begins = np.empty(2 * (bottom - top) * ((right - left + 7) // 8), np.int32)
     chunks = 0
+    words = colored_words = np.empty((0, 0), np.uint64)
+    if width % 8 == 0:
+        words, colored_words = foreground.view(np.uint64), colored.view(np.uint64)
     for v in range(top, bottom):
-        row, by_color = foreground[v, left:right], colored[v - top]
-        darker, level = difference[v, left:right], per_level[v, left:right]
-        if words.shape[1] > 0:
+        if width % 8 == 0:
+            # Eight pixels are processed at a time; coloured ones are no candidates.
             seen, added = words[v, left // 8 : right // 8], colored_words[v - top]
             unexplained = np.uint64(0)
             for k in range(len(seen)):
@@ -130,12 +120,14 @@ def _decide(
                 seen[k] |= added[k]
             if unexplained == 0:
                 continue
+            darker, level = difference[v, left:right], per_level[v, left:right]
             for k in range(len(seen)):
-                # Coloured pixels are no candidates.
-                if seen[k] != added[k] and _mark(row, by_color, darker, level, darkest, 8 * k, 8):
+                if seen[k] != added[k] and _mark_word(seen, added, darker, level, darkest, k):
                     begins[2 * chunks], begins[2 * chunks + 1] = v, left + 8 * k
                     chunks += 1
         else:
+            row, by_color = foreground[v, left:right], colored[v - top]
+            darker, level = difference[v, left:right], per_level[v, left:right]
             for start in range(0, right - left, 8):
                 size = min(8, right - left - start)
                 if _mark(row, by_color, darker, level, darkest, start, size):
@@ -206,4 +198,24 @@ def _mark(
         is_dark = (seen > by_color[u]) & (darkest < darker) & (darker < zero)
         row[u] = dark if is_dark else seen
         found |= np.uint8(is_dark)
+    return found > 0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _mark_word(
+    seen: Any, by_color: Any, difference: Any, per_level: Any, darkest: Any, place: Any
+) -> Any:
+    """Mark candidates among eight pixels of a row, and return whether there are any.
+
+    The numbers ``seen`` and ``by_color`` have eight pixels each, the others one.
+    """
+    found = np.uint64(0)
+    for k in range(8):
+        darker = difference[8 * place + k] * per_level[8 * place + k]
+        is_dark = (darkest < darker) & (darker < np.float32(0))
+        # The highest bit of a pixel is the value of a candidate.
+        found |= np.uint64(is_dark) << np.uint64(8 * k + 7)
+    found &= seen[place] & ~by_color[place]
+    # From 255 to 128.
+    seen[place] ^= found - (found >> np.uint64(7))
     return found > 0

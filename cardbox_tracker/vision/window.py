@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import njit
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.vision.array_checks import ANY, check_array
 
 ImageArray = NDArray[np.uint8]
@@ -30,6 +30,11 @@ class Window(NamedTuple):
     def is_empty(self) -> bool:
         """Whether the window has no pixels."""
         return self.bottom <= self.top or self.right <= self.left
+
+    @property
+    def area_px(self) -> int:
+        """Number of its pixels."""
+        return max(self.bottom - self.top, 0) * max(self.right - self.left, 0)
 
     def check_within(self, shape: tuple[int, ...], unit: int) -> None:
         """Refuse a window that is not in an image of ``shape``, or not in steps of ``unit`` px.
@@ -85,17 +90,27 @@ def window_of(image: ImageArray) -> Window:
     if flags is None or not (flags.c_contiguous and flags.writeable and flags.aligned):
         image = np.require(image, requirements=("C", "W", "A"))
     check_array("image", image, (ANY, ANY))
-    if not image.size:
-        return Window(0, 0, 0, 0)
+    return Window(*find_edges(image))
+
+
+@kernel
+def find_edges(image: Any) -> Any:
+    """Return first row, row after the last, first column and column after the last of a window.
+
+    Args:
+        image: (H, W) uint8. The columns of the window are multiples of 8 if W is one.
+    """
     if image.shape[1] % 8:
-        return Window(*_bounds(image.view(np.uint8), 1))
-    return Window(*_bounds(image.view(np.uint64), 8))
+        return _edges(image, 1)
+    return _edges(image.view(np.uint64), 8)
 
 
-@njit(cache=True, nogil=True)
-def _bounds(words: Any, pixels: Any) -> Any:
-    """Return first row, row after the last, first column and column after the last, px."""
+@kernel
+def _edges(words: Any, pixels: Any) -> Any:
+    """Return the edges of a window, given so many pixels of a row in each number."""
     height, width = words.shape
+    if width == 0:
+        return 0, 0, 0, 0
     top, bottom = height, 0
     columns = np.zeros(width, words.dtype)
     for v in range(height):

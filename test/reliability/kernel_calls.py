@@ -143,6 +143,12 @@ def score_chroma(take: Take, numbers: Iterator[int]) -> None:
     score(take("u1", small), take.size, window(numbers))  # type: ignore[attr-defined]
 
 
+def decide_colors(take: Take, numbers: Iterator[int]) -> None:
+    small = (3, *(max(length // 2, 1) for length in take.size))  # type: ignore[attr-defined]
+    score = ChromaScore(ChromaModel(take("f4", small), take("f4", small)), 3.0, 2.0, 0.5, True)
+    score.decide(take("u1", small), take(), take("f4"), take("f4"), (0.6, 0.1), window(numbers))
+
+
 def read_colors(take: Take, _: Iterator[int]) -> None:
     reader = ColorReader(take.size)  # type: ignore[attr-defined]
     reader.read(take(more=(3,)))
@@ -262,6 +268,7 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     ),
     "decide_shadows": decide,
     "ChromaScore": score_chroma,
+    "ChromaScore.decide": decide_colors,
     "ColorReader": read_colors,
     "StillRegions": find_still,
     "median": lambda take, _: median(take("f4")),

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from cardbox_tracker.vision.background import SilhouetteExtractor
 from cardbox_tracker.vision.background_config import BackgroundConfig
 from cardbox_tracker.vision.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.vision.regions import clean_silhouette
+from cardbox_tracker.vision.regions import clean_in_window, clean_silhouette
 from cardbox_tracker.vision.window import window_of
 
 PLAIN = BackgroundConfig(clean_up=False)
@@ -201,6 +201,6 @@ def test_cleaning_in_a_window_gives_the_same(seed: int, rare: float, max_hole: f
     noise = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, (60, 80)), (0, 0), 2.0)
     made = np.where(noise > rare * noise.std(), 255, 0).astype(np.uint8)
     window = window_of(made).grown(2, made.shape)
-    np.testing.assert_array_equal(
-        clean_silhouette(made, 0.01, max_hole, window), clean_silhouette(made, 0.01, max_hole)
-    )
+    cleaned, found = clean_in_window(made, 0.01, max_hole, window)
+    np.testing.assert_array_equal(cleaned, clean_silhouette(made, 0.01, max_hole))
+    assert found == window_of(cleaned)

@@ -14,6 +14,7 @@ from cardbox_tracker.vision.chroma import ChromaModel, ChromaScore, bgr_of, chro
 from cardbox_tracker.vision.chroma_kernels import collect_shares
 from cardbox_tracker.vision.color_reader import ColorReader, halved
 from cardbox_tracker.vision.empty_scene import BackgroundLearner
+from cardbox_tracker.vision.shadows import decide_shadows
 from cardbox_tracker.vision.window import Window
 
 H, W = 120, 160
@@ -166,6 +167,29 @@ def test_a_window_gives_the_same_inside() -> None:
     assert 0 < np.count_nonzero(part) < part.size
     # At its edges the surroundings are missing.
     np.testing.assert_array_equal(part[8:-8, 8:-8], whole[window.slices][8:-8, 8:-8])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(40, 64), (30, 44)]), st.booleans())
+def test_colours_and_shadows_in_one_call_are_those_of_two(
+    seed: int, shape: tuple[int, int], has_window: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    mean = rng.uniform(80, 160, (3, shape[0] // 2, shape[1] // 2)).astype(np.float32)
+    score = ChromaScore(ChromaModel(mean, np.full_like(mean, 9)), 2.0, 7.0, 0.5)
+    colors = np.clip(mean + rng.normal(0, 7, mean.shape), 0, 255).astype(np.uint8)
+    window = Window(8, 24, 16, 40) if has_window else None
+    inside = np.zeros(shape, bool)
+    inside[window.slices if window else ...] = True
+    noise = cv2.GaussianBlur(rng.normal(0, 1, shape), (0, 0), 2.0)
+    difference = (80 * noise / noise.std() - 40).astype(np.float32)
+    expected = np.where((np.abs(difference) > 20) & inside, 255, 0).astype(np.uint8)
+    made, per_level = expected.copy(), np.full(shape, 0.005, np.float32)
+    score.decide(colors, made, difference, per_level, (0.4, 0.25), window)
+    colored = score(colors, shape, window)
+    assert 0 < np.count_nonzero(colored) < colored.size
+    decide_shadows(expected, difference, per_level, colored, 0.4, 0.25, window)
+    np.testing.assert_array_equal(made, expected)
 
 
 def test_what_only_its_colour_shows_is_followed_from_image_to_image() -> None:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.vision.foreground import segment_foreground
+from cardbox_tracker.vision.window import window_of
 
 BRIGHTER, DARKER = 0.1, -0.05
 
@@ -22,7 +23,7 @@ def found(difference: np.ndarray, edge: float) -> np.ndarray:
         np.full_like(values, DARKER),
         edge,
         np.empty_like(values),
-    )
+    )[0]
 
 
 @pytest.mark.parametrize(
@@ -55,5 +56,6 @@ def test_equal_to_passes_of_opencv(seed: int, shape: tuple[int, int], edge: floa
     score = np.maximum(difference * brighter, difference * darker)
     around = np.asarray(cv2.dilate(score, np.ones((3, 3), np.uint8))).reshape(shape)
     limit = np.maximum(around * np.float32(edge), np.float32(1))
-    made = segment_foreground(difference, brighter, darker, edge, np.empty_like(score))
+    made, window = segment_foreground(difference, brighter, darker, edge, np.empty_like(score))
     np.testing.assert_array_equal(made, np.where(score >= limit, 255, 0))
+    assert window == window_of(made)

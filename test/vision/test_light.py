@@ -197,13 +197,16 @@ def test_the_sums_are_those_of_numpy(seed: int, shape: tuple[int, int], last: fl
     person = (rng.random(shape) < 0.3).astype(np.uint8)
     ratio = small / np.maximum(mean, np.float32(1))
     known = (person == 0) & (ratio * brightest < 250)
+    image, samples = rng.integers(0, 256, [4 * length for length in shape], np.uint8), small + 1
+    image[1::4, 1::4] = small
     ratios = np.zeros(small.size + 2, np.float32)
-    flat = [array.ravel() for array in (small, mean, brightest, field, person)]
-    level = measure_level(*flat, ratios, ratios.view(np.int32), np.float32(last), 0.0)
+    given = image, samples, mean, brightest, field, person, ratios, ratios.view(np.int32), last
+    level = measure_level(*given, 0.0)
+    np.testing.assert_array_equal(samples, small)
     usable = np.sort((ratio / field)[known])
     assert level == (pytest.approx(usable[len(usable) // 2], rel=1e-5) if len(usable) else -1)
     # With too few pixels outside the person, those of the person count.
-    level = measure_level(*flat, ratios, ratios.view(np.int32), np.float32(last), 1.1)
+    level = measure_level(*given, 1.1)
     usable = np.sort((ratio / field)[ratio * brightest < 250])
     assert level == (pytest.approx(usable[len(usable) // 2], rel=1e-5) if len(usable) else -1)
     cells = np.empty((3, 4, 2), np.float32)
@@ -258,11 +261,10 @@ def test_samples_blocks_and_margins_are_those_of_opencv(seed: int, shape: tuple[
     average_blocks(image.view(np.uint32), means)
     small = cv2.resize(image, shape[::-1], interpolation=cv2.INTER_AREA).reshape(shape)
     np.testing.assert_array_equal(means, small)
-    person = np.where(rng.random(shape) < 0.3, 255, 0).astype(np.uint8)
-    without = rng.random(shape) < 0.3
-    rest, grown = np.where(without, 0, person).astype(np.uint8), np.empty_like(person)
-    grow_person(person, without, grown)
-    np.testing.assert_array_equal(person, rest)
+    silhouette = np.where(rng.random(image.shape) < 0.3, 255, 0).astype(np.uint8)
+    without, grown = rng.random(shape) < 0.3, np.empty(shape, np.uint8)
+    rest = np.where(without, 0, silhouette[1::4, 1::4]).astype(np.uint8)
+    grow_person(silhouette, without, grown)
     expected = cv2.dilate(rest, np.ones((5, 5), np.uint8)).reshape(shape)
     np.testing.assert_array_equal(grown, expected)
 
@@ -281,7 +283,8 @@ def test_smooth_foreground_is_that_of_opencv(
     means = (100 + 5 * noise / max(noise.std(), 1e-9)).astype(np.float32)
     blocks = np.full(shape, 100, np.float32)
     fine = rng.uniform(0.99, 1.01, shape).astype(np.float32)
-    person = np.where(rng.random(shape) < 0.6, 255, 0).astype(np.uint8)
+    silhouette = np.where(rng.random([4 * length for length in shape]) < 0.6, 255, 0)
+    person = silhouette[1::4, 1::4]
     relative = means / (blocks * fine * np.float32(1.01))
     square = np.ones((3, 3), np.uint8)
     varies = (cv2.dilate(relative, square) - cv2.erode(relative, square)).reshape(shape)
@@ -289,7 +292,7 @@ def test_smooth_foreground_is_that_of_opencv(
     labels = labels.reshape(shape)
     reached = np.isin(labels, np.setdiff1d(labels[person == 0], [0]))
     smooth, lit = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
-    count = find_smooth(means, blocks, fine, np.float32(1.01), person, smooth, lit)
+    count = find_smooth(means, blocks, fine, 1.01, silhouette.astype(np.uint8), smooth, lit)
     np.testing.assert_array_equal(smooth, reached & (person > 0))
     np.testing.assert_array_equal(lit, smooth & (relative > 1))
     assert count == np.count_nonzero(lit)
