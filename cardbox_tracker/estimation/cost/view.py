@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z, YAW
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.errors import BodyModelError, CameraError
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
@@ -122,8 +123,9 @@ class View:
 
     def states(self, states: FloatArray) -> FloatArray:
         """Return states (N, 14) or (14,) of the first camera in the frame of this camera."""
-        moved: FloatArray = states @ self.turned + self.moved
-        return moved
+        here = np.ascontiguousarray(states, np.float64)
+        there: FloatArray = _moved_states(here.reshape(-1, N_STATE), self.turned, self.moved)
+        return there.reshape(here.shape)
 
     def points(self, points_m: FloatArray) -> FloatArray:
         """Return points (..., 3) of the first level frame in this camera's level frame, metres."""
@@ -183,6 +185,17 @@ class View:
         place = -level.T @ self.offset_m
         direction = level.T @ np.array([-1.0, bearing, 0.0])
         return place[:2], direction[:2] / np.linalg.norm(direction[:2])
+
+
+@kernel
+def _moved_states(states: FloatArray, turned: FloatArray, moved: FloatArray) -> FloatArray:
+    """Return states (N, 14) @ ``turned`` + ``moved``; only the place on the floor is turned."""
+    there = states + moved
+    for i in range(states.shape[0]):
+        x_m, y_m = states[i, TORSO_X], states[i, TORSO_Y]
+        for j in (TORSO_X, TORSO_Y):
+            there[i, j] = x_m * turned[TORSO_X, j] + y_m * turned[TORSO_Y, j] + moved[j]
+    return there
 
 
 def _about_vertical(yaw_rad: float) -> FloatArray:

@@ -101,6 +101,7 @@ class WholeBodyCost:
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
+        self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
         front = body.reference_state()[None]
         self.see(np.zeros((camera.height, camera.width), np.uint8), front[0])
         self.frontal_px = max(1, int(self.bodies(front).areas_px[0]))
@@ -271,10 +272,6 @@ class WholeBodyCost:
     def rows(self) -> int:
         """Number of rows of the present silhouette that count, from the top."""
         return len(self._seen)
-
-    @property
-    def _prior(self) -> priors.PriorTuple:
-        return self.anchor, self._rules, self._gaussians
 
 
 def _new_points(count: int) -> PointsTuple:

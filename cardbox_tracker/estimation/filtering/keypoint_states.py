@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
+from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.correction import FAR_M
@@ -71,18 +74,33 @@ def chances_by_spread(cost: WholeBodyCost, state: FloatArray, stddev: FloatArray
         state: state (14,), rad and m.
         stddev: its standard deviations, (14,).
     """
-    middle_m = cost.keypoints(state)
-    variances_m2 = np.zeros(len(middle_m))
-    for number in np.flatnonzero(stddev):
-        moved = state.copy()
-        moved[number] += _STEP
-        slopes = (cost.keypoints(moved) - middle_m) / _STEP
-        variances_m2 += np.sum(slopes * slopes, axis=1) * stddev[number] ** 2
-    return np.array([_beyond(sqrt(one)) for one in variances_m2])
+    chances = np.zeros(6)
+    _fill_chances(state, stddev, cost.body, chances)
+    return chances
 
 
-def _beyond(deviation_m: float) -> float:
-    return erfc(FAR_M / (deviation_m * sqrt(2.0))) if deviation_m > 0.0 else 0.0
+@kernel
+def _fill_chances(
+    state: FloatArray, stddev: FloatArray, body: BodyTuple, chances: FloatArray
+) -> None:
+    """Write :func:`chances_by_spread` to ``chances`` (6,), whose values are 0."""
+    middle_m, moved_m, moved = np.empty((6, 3)), np.empty((6, 3)), state.copy()
+    variances_m2 = np.zeros(6)
+    keypoints(state, body, middle_m)
+    for number in range(len(state)):
+        if stddev[number] == 0.0:
+            continue
+        moved[number] = state[number] + _STEP
+        keypoints(moved, body, moved_m)
+        moved[number] = state[number]
+        for point in range(6):
+            squares = 0.0
+            for axis in range(3):
+                squares += ((moved_m[point, axis] - middle_m[point, axis]) / _STEP) ** 2
+            variances_m2[point] += squares * stddev[number] ** 2
+    for point in range(6):
+        if variances_m2[point] > 0.0:
+            chances[point] = erfc(FAR_M / sqrt(2.0 * variances_m2[point]))
 
 
 def are_sure(chances: FloatArray) -> bool:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.estimation.filtering import state_choice
 
+_SHAPES = (N_STATE,), (), (6, 3), (6, 3)
 
-class RatedStates(NamedTuple):
-    """N rated states.
+
+class RatedStates:
+    """Rated states of one frame; others can be added.
 
     Attributes:
         states: states of the first camera, (N, 14).
@@ -21,26 +23,33 @@ class RatedStates(NamedTuple):
         keypoints_m: the same in the optical frame, (N, 6, 3), metres.
     """
 
-    states: FloatArray
-    ratings: FloatArray
-    joints_m: FloatArray
-    keypoints_m: FloatArray
+    def __init__(self, cost: MultiViewCost, expected: int) -> None:
+        """Start without states; ``expected`` of them need no further memory."""
+        self._cost, self._expected = cost, expected
+        self._storage = [np.empty((expected, *shape)) for shape in _SHAPES]
+        self._use(0)
 
-    @classmethod
-    def of(cls, states: FloatArray, cost: MultiViewCost) -> RatedStates:
-        """Rate states (N, 14)."""
-        rated = cost.bodies(states)
-        return cls(states, rated.ratings, *rated.points)
+    def _use(self, count: int) -> None:
+        self.states, self.ratings, self.joints_m, self.keypoints_m = (
+            stored[:count] for stored in self._storage
+        )
 
-    @classmethod
-    def of_pairs(cls, states: FloatArray, cost: MultiViewCost) -> RatedStates:
-        """Rate states (N, 14), N > 0, with the trunk that ``cost`` has fixed."""
-        ratings, points = cost.pairs(states)
-        return cls(states, ratings, *points)
+    def add(self, states: FloatArray) -> None:
+        """Rate and add states (N, 14)."""
+        rated = self._cost.bodies(states)
+        self._add(states, rated.ratings, rated.points)
 
-    def joined(self, other: RatedStates) -> RatedStates:
-        """Return these states, and then those of ``other``."""
-        return RatedStates(*(np.concatenate(both) for both in zip(self, other, strict=True)))
+    def add_pairs(self, states: FloatArray) -> None:
+        """Rate and add states (N, 14), N > 0, with the trunk that the cost has fixed."""
+        self._add(states, *self._cost.pairs(states))
+
+    def _add(self, states: FloatArray, ratings: FloatArray, points: Points) -> None:
+        begin, count = len(self.states), len(self.states) + len(states)
+        while count > len(self._storage[0]):
+            self._storage = [np.concatenate([stored, stored]) for stored in self._storage]
+        for stored, more in zip(self._storage, (states, ratings, *points), strict=True):
+            stored[begin:count] = more
+        self._use(count)
 
     def best(self, count: int) -> FloatArray:
         """Return the best ``count`` states, (count, 14), best first; all if there are fewer."""

@@ -55,6 +55,8 @@ from cardbox_tracker.estimation.filtering.visibility import is_trackable
 
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
+# States for which there is memory beside those of the settings: other distances, fits.
+_FURTHER = 48
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 
@@ -89,6 +91,8 @@ class WholeBodyFilter:
         self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
         self.approach = Approach(c.home_rate)
+        pool = c.survivors + 2 * c.best_torsos + c.torso_explorers
+        self._expected = pool + 2 * c.paired_arms + c.rounds * c.together + _FURTHER
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
@@ -178,12 +182,14 @@ class WholeBodyFilter:
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
         pool = self._torsos(before, location, draws)
-        rated = RatedStates.of(pool, cost)
+        self.rated = rated = RatedStates(cost, self._expected)
+        rated.add(pool)
         best = rated.best(config.survivors)
         cost.fix_torso(best[0])
         left, right = (self._arm(best, arm, draws) for arm in (0, 1))
         pairs = joint_moves.combine(best[0], *left, *right, config.paired_arms)
-        self._together(frames, rated.joined(RatedStates.of_pairs(pairs, cost)), draws)
+        rated.add_pairs(pairs)
+        self._together(frames, draws)
 
     def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
         """Return states (N, 14): the survivors, and the best new torsos with arms."""
@@ -211,14 +217,13 @@ class WholeBodyFilter:
             more.append(self._points.torsos(self._survivors, before, self._reference))
         return np.concatenate([pool, *more])
 
-    def _together(self, frames: Sequence[Frame], rated: RatedStates, draws: Draws) -> None:
+    def _together(self, frames: Sequence[Frame], draws: Draws) -> None:
         """Move all joints of the best states together; then choose the survivors."""
-        config, cost = self._config, self._cost
+        config, cost, rated = self._config, self._cost, self.rated
         if self._plan.fits_outlines:
-            fitted = self.refine.outline.different(frames, rated)
-            rated = rated.joined(RatedStates.of(fitted, cost))
+            rated.add(self.refine.outline.different(frames, rated))
         if self._points.is_given:
-            rated = rated.joined(RatedStates.of(self._points.bodies(rated), cost))
+            rated.add(self._points.bodies(rated))
         sigma = config.together_noise * self._sigma
         different = config.survivors, config.alike, config.apart_m
         sources = rated.different(*different)
@@ -232,9 +237,8 @@ class WholeBodyFilter:
                 config.difference_scale,
                 draws.for_states(config.together),
             )
-            rated = rated.joined(RatedStates.of(moved, cost))
+            rated.add(moved)
             sigma = config.round_decay * sigma
-        self.rated = rated
         self._survivors = rated.different(*different)
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:

@@ -138,6 +138,12 @@ def test_a_camera_without_points_does_not_matter(detected: Detect) -> None:
     assert np.abs(kept - seen)[:, :2].max() < 2.5
 
 
+def rated(cost: MultiViewCost, states: np.ndarray) -> RatedStates:
+    found = RatedStates(cost, 1)
+    found.add(states)
+    return found
+
+
 @settings(max_examples=40)
 @given(off=OFF, wrong_px=st.floats(-1e6, 1e6))
 def test_a_fit_is_finite_and_within_the_limits_whatever_a_point_says(
@@ -150,7 +156,7 @@ def test_a_fit_is_finite_and_within_the_limits_whatever_a_point_says(
     fit = one.see(replace(points, px=px))
     states = np.array([BEGIN, FRONT])
     for found in (
-        fit.bodies(RatedStates.of(states, one.cost)),
+        fit.bodies(rated(one.cost, states)),
         fit.torsos(states, BEGIN, FRONT),
         fit.polished(BEGIN)[None],
     ):
@@ -161,7 +167,7 @@ def test_fits_do_not_write_to_the_states_they_begin_with(detected: Detect) -> No
     one = Fit()
     fit = one.see(detected(BODY, CAMERA, near([0.1] * 14)))
     states, before = np.array([BEGIN, FRONT]), np.array([BEGIN, FRONT])
-    fit.bodies(RatedStates.of(states, one.cost))
+    fit.bodies(rated(one.cost, states))
     fit.torsos(states, states[0], states[1])
     fit.polished(states[0])
     np.testing.assert_array_equal(states, before)
@@ -174,7 +180,7 @@ def test_a_fit_costs_less_than_its_begin(detected: Detect) -> None:
     one = Fit()
     fit = one.see(detected(BODY, CAMERA, wanted))
     before = one.cost.point_costs(FRONT[None])[0]
-    fitted = fit.bodies(RatedStates.of(np.array([FRONT, BEGIN]), one.cost))
+    fitted = fit.bodies(rated(one.cost, np.array([FRONT, BEGIN])))
     assert one.cost.point_costs(fitted).min() < 0.2 * before
 
 
