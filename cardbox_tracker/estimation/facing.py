@@ -37,6 +37,8 @@ _EVERY_S, _NOW_S, _USUAL_S = 0.2, 0.5, 4.0
 _KNOWN_S, _USUAL_CHANGE = 1.0, 0.1
 # Yaw of a person who faces the camera, and lean that shows the top of the head, rad.
 _FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(6.0)
+# Height above its middle that an upright head reaches, as a share of the ellipse's half axis.
+_TOP = 0.65
 # Weight of a sample in the low-pass filter of the torso's brightness.
 _LIGHT = 0.5
 # Longest time that a sample stands for, s.
@@ -82,12 +84,13 @@ class Facing:
         if self._appearance is None or frame.image is None or frame.image.ndim != 3:
             return
         self._elapsed_s += frame.interval_s
-        if state[PITCH] > _LEAN_RAD:
+        zones = self._view.zones(state)
+        if state[PITCH] > _LEAN_RAD or _is_low(zones, frame.silhouette):
             self.shows_back, self._now = False, None
             return
         if self._elapsed_s < _EVERY_S:
             return
-        hair = self._hair(frame.image, frame.silhouette, state)
+        hair = self._hair(frame.image, frame.silhouette, zones)
         if hair is not None:
             self._add(hair, abs(float(state[YAW])) < _FACING_RAD)
         self._elapsed_s = 0.0
@@ -106,11 +109,10 @@ class Facing:
             self._known_s += passed_s
             self._usual += passed_s / min(self._known_s, _USUAL_S) * (hair - self._usual)
 
-    def _hair(self, image: Image, silhouette: Silhouette, state: FloatArray) -> float | None:
+    def _hair(self, image: Image, silhouette: Silhouette, zones: FloatArray) -> float | None:
         """Return the share of hair in the face's place; None if it is hardly in the silhouette."""
         appearance = self._appearance
         assert appearance is not None
-        zones = self._view.zones(state)
         chest = chest_levels(image, silhouette, zones)
         if chest is not None:
             self._brightness = self._brightness + _LIGHT * (chest - self._brightness)
@@ -129,3 +131,14 @@ class Facing:
         for channel, of_level in enumerate(steps):
             bins = bins * COLOR_STEPS + of_level[pixels[:, channel]]
         return float(np.mean(self._is_hair[bins]))
+
+
+def _is_low(zones: FloatArray, silhouette: Silhouette) -> bool:
+    """Return whether the head is lower than the model's: a person who leans shows the hair.
+
+    The lean itself is often missed, as an outline hardly shows it.
+    """
+    u, v, _, half_height = zones[:4].tolist()
+    row, column = round(v - _TOP * half_height), round(u)
+    height, width = silhouette.shape
+    return 0 <= row < height and 0 <= column < width and not silhouette[row, column]

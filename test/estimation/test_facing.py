@@ -83,8 +83,9 @@ def see(asked: Facing, frame: Frame, seconds: float, state: np.ndarray = STATE) 
 def test_the_share_of_hair_does_not_depend_on_the_light(hair: float, light: float) -> None:
     asked, frame = facing(), seen(hair, light)
     assert frame.image is not None
+    zones = asked._view.zones(STATE)
     for _ in range(20):
-        share = asked._hair(frame.image, frame.silhouette, STATE)
+        share = asked._hair(frame.image, frame.silhouette, zones)
     assert share == hair
 
 
@@ -135,6 +136,19 @@ def test_grey_images_missing_ones_and_unknown_colours_show_nothing() -> None:
     unknown = facing(appearance=None)
     see(unknown, face, 5.0)
     assert not any(see(unknown, back, 5.0))
+
+
+def test_a_head_that_is_lower_than_the_models_is_no_back() -> None:
+    """The tracked lean is zero, but the outline ends below the top of the model's head."""
+    asked = facing()
+    see(asked, seen(0.0), 5.0)
+    back = seen(1.0)
+    zones = ArmView.of(BODY, CAMERA, np.zeros(2), lifts_shoulders=True).zones(STATE)
+    low = back.silhouette.copy()
+    low[: int(zones[1] - 0.5 * zones[3])] = 0
+    assert not any(see(asked, replace(back, silhouette=low), 5.0))
+    low[: int(zones[1] - 0.5 * zones[3])] = 255
+    assert see(asked, replace(back, silhouette=low), 2.0)[-1]
 
 
 def test_who_leans_forward_shows_the_top_of_the_head() -> None:
