@@ -347,12 +347,21 @@ def test_an_inverted_pose_is_told_once_and_a_right_one_is_not() -> None:
 
 
 def followed(
-    frames: list[Sighting], cameras: tuple[Camera, Camera], given: Extrinsics
+    frames: list[Sighting], cameras: tuple[Camera, Camera], given: Extrinsics, seed: int = 0
 ) -> list[Estimate]:
     """Results from the twelfth frame on, since a verdict takes that many."""
-    tracker = Tracker(BODY, cameras[0], default_preset(), others=[OtherCamera(cameras[1], given)])
+    rng, others = np.random.default_rng(seed), [OtherCamera(cameras[1], given)]
+    tracker = Tracker(BODY, cameras[0], default_preset(), rng, others=others)
     pairs = [[Observation(frame.first), Observation(frame.other)] for frame in frames]
     return [tracker.track(pair) for pair in pairs][12:]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whoever_waves_in_the_first_image_is_tracked(seed: int) -> None:
+    """A torso that is turned away, with arms that fit, is better than one with hanging arms."""
+    pose = aside(np.radians(29.0))
+    found = followed(sightings(waving(20, 1.0 / 15.0), pose=pose), (CAMERA, OTHER), pose, seed)
+    assert all(one.state == TRACKING for one in found)
 
 
 @pytest.mark.parametrize("degrees", [9.0, 29.0, 69.0])

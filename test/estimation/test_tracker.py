@@ -240,6 +240,17 @@ def test_whoever_was_lost_is_found(seed: int) -> None:
     assert estimates[-1].posture[0] == pytest.approx(0.4, abs=0.05)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_after_foreground_everywhere_the_person_is_found_at_once(seed: int) -> None:
+    """Noise in the whole image looks like a person near the camera after a second."""
+    tracker = make(default_preset(), seed)
+    person = seen(front())
+    for silhouette in [person] * 10 + [np.full_like(person, 255)] * 30:
+        tracker.track(silhouette)
+    ious = [tracker.track(person).iou or 0.0 for _ in range(15)]
+    assert max(ious[:5]) > 0.7 and min(ious[5:]) > 0.7
+
+
 def test_a_paper_tracker_that_may_search_again_finds_whom_it_lost_at_once() -> None:
     tracker = make(replace(paper_preset(), relocalize=True, cycles=2))
     tracker.track(seen(front()))

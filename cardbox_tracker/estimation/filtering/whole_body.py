@@ -57,6 +57,8 @@ from cardbox_tracker.estimation.filtering.visibility import is_trackable
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # States for which there is memory beside those of the settings: other distances, fits.
 _FURTHER = 48
+# Factor on the foreground by which it decreases only if the person is elsewhere.
+_SUDDEN = 4
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 
@@ -121,6 +123,7 @@ class WholeBodyFilter:
         self.refine.forget()
         self._arm.forget()
         self._chance: float | None = None
+        self._foreground_px = 0
 
     def recover(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
@@ -140,6 +143,11 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
         presence, self._seeing = self._presence.see(frames, self._survivors[0])
+        if presence is Presence.PERSON:
+            now_px, before_px = sum(f.foreground_px for f in frames), self._foreground_px
+            # Somebody who seemed near, such as noise in the whole image, is elsewhere.
+            self._is_lost = self._is_lost or before_px > _SUDDEN * now_px
+            self._foreground_px = now_px
         self._is_lost = self._is_lost or self._presence.is_too_long_too_much
         return presence
 
@@ -181,18 +189,33 @@ class WholeBodyFilter:
         approach.see(float(before[TORSO_X]))
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
-        pool = self._torsos(before, location, draws)
+        pool, upright = self._torsos(before, location, draws)
         self.rated = rated = RatedStates(cost, self._expected)
         rated.add(pool)
         best = rated.best(config.survivors)
-        cost.fix_torso(best[0])
-        left, right = (self._arm(best, arm, draws) for arm in (0, 1))
-        pairs = joint_moves.combine(best[0], *left, *right, config.paired_arms)
-        rated.add_pairs(pairs)
+        if (self._is_new or self._is_lost) and len(pool[upright]):
+            # Its own arms make a wrong torso better than an upright one with hanging arms.
+            standing = pool[upright][np.argmin(rated.ratings[upright])]
+            self._add_arms(np.concatenate([standing[None], best]), Draws(self._rng, config))
+        self._add_arms(best, draws)
         self._together(frames, draws)
 
-    def _torsos(self, before: FloatArray, location: Location, draws: Draws) -> FloatArray:
-        """Return states (N, 14): the survivors, and the best new torsos with arms."""
+    def _add_arms(self, pool: FloatArray, draws: Draws) -> None:
+        """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
+        torso = pool[0]
+        self._cost.fix_torso(torso)
+        left, right = (self._arm(pool, arm, draws) for arm in (0, 1))
+        pairs = joint_moves.combine(torso, *left, *right, self._config.paired_arms)
+        self.rated.add_pairs(pairs)
+
+    def _torsos(
+        self, before: FloatArray, location: Location, draws: Draws
+    ) -> tuple[FloatArray, slice]:
+        """Return states (N, 14): the survivors, and the best new torsos with arms.
+
+        Returns:
+            The states, and where the upright ones are.
+        """
         config, cost = self._config, self._cost
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
         fresh = self._reference.copy()
@@ -215,7 +238,7 @@ class WholeBodyFilter:
         more = [torsos[len(torsos) - upright :], self.approach.nearer_and_farther(before, cost)]
         if self._points.is_given:
             more.append(self._points.torsos(self._survivors, before, self._reference))
-        return np.concatenate([pool, *more])
+        return np.concatenate([pool, *more]), slice(len(pool), len(pool) + upright)
 
     def _together(self, frames: Sequence[Frame], draws: Draws) -> None:
         """Move all joints of the best states together; then choose the survivors."""
