@@ -37,6 +37,7 @@ VALUES: dict[str, Any] = {
     "filter": "whole_body",
     "whole_body.corrector": "none",
     "whole_body.smallest_person": 1.0,
+    "whole_body.lost_from": 0.05,
 }
 
 

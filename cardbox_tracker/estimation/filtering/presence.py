@@ -13,6 +13,8 @@ from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConf
 
 # Frames with too much foreground after which it is assumed to be a near person.
 _TOO_MUCH_FRAMES = 15
+# Factor on the foreground by which it decreases only if the person is elsewhere.
+_SUDDEN = 4
 
 
 class PersonPresence:
@@ -26,14 +28,21 @@ class PersonPresence:
 
     def forget(self) -> None:
         """Forget the last frames."""
-        self._too_much = 0
+        self._too_much = self._foreground_px = 0
+        self._is_sudden = False
 
     @property
-    def is_too_long_too_much(self) -> bool:
-        """Whether there has been too much foreground for so long that it is a near person.
+    def is_elsewhere(self) -> bool:
+        """Whether the person must be sought anew.
 
-        The background model would have learned another light by then.
+        There has been too much foreground for so long that it is a near person, or most of the
+        foreground of somebody who seemed near, such as noise in the whole image, is gone.
         """
+        return self._is_too_long_too_much or self._is_sudden
+
+    @property
+    def _is_too_long_too_much(self) -> bool:
+        # The background model would have learned another light by then.
         return self._too_much > _TOO_MUCH_FRAMES
 
     def see(self, frames: Sequence[Frame], near: FloatArray) -> tuple[Presence, list[int]]:
@@ -48,10 +57,12 @@ class PersonPresence:
             for share, frame in zip(self._cost.shares(near), frames, strict=True)
         ]
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0
-        if self.is_too_long_too_much:
+        if self._is_too_long_too_much:
             found = [Presence.PERSON if one is Presence.TOO_MUCH else one for one in found]
         seeing = [number for number, one in enumerate(found) if one is Presence.PERSON]
         if seeing:
+            now_px, before_px = sum(f.foreground_px for f in frames), self._foreground_px
+            self._is_sudden, self._foreground_px = before_px > _SUDDEN * now_px, now_px
             return Presence.PERSON, seeing
         return (Presence.TOO_MUCH if Presence.TOO_MUCH in found else Presence.NOBODY), seeing
 

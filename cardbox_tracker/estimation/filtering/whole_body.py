@@ -57,8 +57,6 @@ from cardbox_tracker.estimation.filtering.visibility import is_trackable
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # States for which there is memory beside those of the settings: other distances, fits.
 _FURTHER = 48
-# Factor on the foreground by which it decreases only if the person is elsewhere.
-_SUDDEN = 4
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 
@@ -123,7 +121,6 @@ class WholeBodyFilter:
         self.refine.forget()
         self._arm.forget()
         self._chance: float | None = None
-        self._foreground_px = 0
 
     def recover(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
@@ -131,8 +128,7 @@ class WholeBodyFilter:
         The survivors are kept, because the silhouettes may stay poor for a while.
         """
         self._is_lost = True
-        # A wrong result must not be smoothed into the next one.
-        self._output = None
+        self._output = None  # a wrong result must not be smoothed into the next one
         self.refine.forget()
 
     def configure(self, config: TrackerConfig) -> None:
@@ -143,12 +139,7 @@ class WholeBodyFilter:
         """See :class:`~.pose_filter.PoseFilter`; one camera that shows a person is enough."""
         self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
         presence, self._seeing = self._presence.see(frames, self._survivors[0])
-        if presence is Presence.PERSON:
-            now_px, before_px = sum(f.foreground_px for f in frames), self._foreground_px
-            # Somebody who seemed near, such as noise in the whole image, is elsewhere.
-            self._is_lost = self._is_lost or before_px > _SUDDEN * now_px
-            self._foreground_px = now_px
-        self._is_lost = self._is_lost or self._presence.is_too_long_too_much
+        self._is_lost = self._is_lost or self._presence.is_elsewhere
         return presence
 
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
@@ -202,20 +193,15 @@ class WholeBodyFilter:
 
     def _add_arms(self, pool: FloatArray, draws: Draws) -> None:
         """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
-        torso = pool[0]
-        self._cost.fix_torso(torso)
+        self._cost.fix_torso(pool[0])
         left, right = (self._arm(pool, arm, draws) for arm in (0, 1))
-        pairs = joint_moves.combine(torso, *left, *right, self._config.paired_arms)
-        self.rated.add_pairs(pairs)
+        most = self._config.paired_arms
+        self.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
 
     def _torsos(
         self, before: FloatArray, location: Location, draws: Draws
     ) -> tuple[FloatArray, slice]:
-        """Return states (N, 14): the survivors, and the best new torsos with arms.
-
-        Returns:
-            The states, and where the upright ones are.
-        """
+        """Return states (N, 14), survivors and new torsos with arms, and where upright ones are."""
         config, cost = self._config, self._cost
         is_settled = not self._is_new and self._age > _SETTLED_FRAMES
         fresh = self._reference.copy()
