@@ -23,6 +23,7 @@ from cardbox_tracker.estimation.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
@@ -329,7 +330,15 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     assert len(session.joint_states) == before
     graph.wait(lambda: len(states) == 2, "the state of both images")
     assert [state.data for state in states] == ["no_person"] * 2
-    graph.diagnosis("tracker", "nobody is in the image")
+    arrays = graph.collect(DiagnosticArray, "/diagnostics")
+
+    def told() -> bool:
+        # Diagnostics come once a second, and other words follow when the images cease.
+        session.show(None, 1)
+        graph.spin(0.2)
+        return any("nobody is in the image" in s.message for a in arrays for s in a.status)
+
+    graph.wait(told, "diagnostics of an image without a person")
 
 
 def test_joints_and_urdf_of_rep155_put_the_hands_at_the_keypoints(
