@@ -44,6 +44,7 @@ def propose_arms(
         numbers: random numbers, unit normal (N, 4) and uniform in 0..1 (N, 3).
         share: number of cameras, by which the numbers of ``config`` are divided.
     """
+    # With several cameras, rounding may leave fewer arms than these kinds need together.
     left = len(numbers[0]) - 1
     mirrors = min(config.arm_mirrors // share, left)
     tips = min(config.arm_tips // share, left - mirrors)

@@ -18,7 +18,7 @@ class Draws:
     def __init__(self, rng: np.random.Generator, config: WholeBodyConfig) -> None:
         """Draw all numbers; ``config`` has the numbers of torsos, arms and states."""
         c, together = config, config.rounds * config.together
-        # Equal groups of arms, of each of which one is rated.
+        # One arm of each group of candidates is rated, and all groups are complete.
         self._arms, self._near = (
             max(count // c.candidates, 1) * c.candidates for count in (c.arms, c.arms_again)
         )

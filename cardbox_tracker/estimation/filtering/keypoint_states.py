@@ -74,18 +74,14 @@ def chances_by_spread(cost: WholeBodyCost, state: FloatArray, stddev: FloatArray
         state: state (14,), rad and m.
         stddev: its standard deviations, (14,).
     """
-    chances = np.zeros(6)
-    _fill_chances(state, stddev, cost.body, chances)
-    return chances
+    return _chances(state, stddev, cost.body)
 
 
 @kernel
-def _fill_chances(
-    state: FloatArray, stddev: FloatArray, body: BodyTuple, chances: FloatArray
-) -> None:
-    """Write :func:`chances_by_spread` to ``chances`` (6,), whose values are 0."""
+def _chances(state: FloatArray, stddev: FloatArray, body: BodyTuple) -> FloatArray:
+    """Return :func:`chances_by_spread` of a body with these fields."""
     middle_m, moved_m, moved = np.empty((6, 3)), np.empty((6, 3)), state.copy()
-    variances_m2 = np.zeros(6)
+    variances_m2, chances = np.zeros(6), np.zeros(6)
     keypoints(state, body, middle_m)
     for number in range(len(state)):
         if stddev[number] == 0.0:
@@ -101,6 +97,7 @@ def _fill_chances(
     for point in range(6):
         if variances_m2[point] > 0.0:
             chances[point] = erfc(FAR_M / sqrt(2.0 * variances_m2[point]))
+    return chances
 
 
 def are_sure(chances: FloatArray) -> bool:

@@ -11,6 +11,8 @@ from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.estimation.filtering import state_choice
 
 _SHAPES = (N_STATE,), (), (6, 3), (6, 3)
+# States for which there is memory at first.
+_USUAL = 256
 
 
 class RatedStates:
@@ -23,9 +25,9 @@ class RatedStates:
         keypoints_m: the same in the optical frame, (N, 6, 3), metres.
     """
 
-    def __init__(self, cost: MultiViewCost, expected: int) -> None:
-        """Start without states; ``expected`` of them need no further memory."""
-        self._cost, self._expected = cost, expected
+    def __init__(self, cost: MultiViewCost, expected: int = _USUAL) -> None:
+        """Start without states; ``expected`` of them, at least one, need no further memory."""
+        self._cost = cost
         self._storage = [np.empty((expected, *shape)) for shape in _SHAPES]
         self._use(0)
 

@@ -37,11 +37,25 @@ class SearchPlan:
 
     @classmethod
     def of(cls, config: WholeBodyConfig, cameras: int) -> SearchPlan:
-        """Return the plan for settings and a number of cameras."""
+        """Return the plan for settings and a number of cameras.
+
+        Raises:
+            ValueError: there would be more arms than are allowed.
+        """
         if cameras == 1:
             return cls(config)
-        again = max(int(_NEAR_ARMS * config.arms_again), 1)
         config = replace(
+            _with_more_arms(config),
+            smoothing=config.smoothing / 3,
+            round_decay=max(config.round_decay, _ROUND_DECAY),
+            differing=max(config.differing, _DIFFERING),
+        )
+        return cls(config, crosses=True, fits_outlines=True, keeps_result=True)
+
+
+def _with_more_arms(config: WholeBodyConfig) -> WholeBodyConfig:
+    try:
+        return replace(
             config,
             candidates=_CANDIDATES,
             arms=_MORE_ARMS * config.arms,
@@ -49,9 +63,8 @@ class SearchPlan:
             arm_tips=_MORE_ARMS * config.arm_tips,
             banked_arms=_MORE_ARMS * config.banked_arms,
             best_arms=int(_MORE_BEST * config.best_arms),
-            arms_again=_MORE_ARMS * again,
-            smoothing=config.smoothing / 3,
-            round_decay=max(config.round_decay, _ROUND_DECAY),
-            differing=max(config.differing, _DIFFERING),
+            arms_again=_MORE_ARMS * max(int(_NEAR_ARMS * config.arms_again), 1),
         )
-        return cls(config, crosses=True, fits_outlines=True, keeps_result=True)
+    except ValueError as error:
+        text = f"several cameras propose {_MORE_ARMS} times as many arms, so {error}"
+        raise ValueError(text) from None

@@ -55,8 +55,6 @@ from cardbox_tracker.estimation.filtering.visibility import is_trackable
 
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
-# States for which there is memory beside those of the settings: other distances, fits.
-_FURTHER = 48
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 
@@ -91,8 +89,6 @@ class WholeBodyFilter:
         self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
         self.approach = Approach(c.home_rate)
-        pool = c.survivors + 2 * c.best_torsos + c.torso_explorers
-        self._expected = pool + 2 * c.paired_arms + c.rounds * c.together + _FURTHER
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
@@ -128,7 +124,8 @@ class WholeBodyFilter:
         The survivors are kept, because the silhouettes may stay poor for a while.
         """
         self._is_lost = True
-        self._output = None  # a wrong result must not be smoothed into the next one
+        # A wrong result must not be smoothed into the next one.
+        self._output = None
         self.refine.forget()
 
     def configure(self, config: TrackerConfig) -> None:
@@ -181,7 +178,7 @@ class WholeBodyFilter:
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
 
         pool, upright = self._torsos(before, location, draws)
-        self.rated = rated = RatedStates(cost, self._expected)
+        self.rated = rated = RatedStates(cost)
         rated.add(pool)
         best = rated.best(config.survivors)
         if (self._is_new or self._is_lost) and len(pool[upright]):

@@ -73,8 +73,8 @@ class WholeBodyConfig(Settings):
     arms: int = restarting(90, "arms that are proposed per side", limits=(2, 100_000))
     candidates: int = restarting(
         3,
-        "proposed arms per rated arm: the one of them that covers most uncovered foreground is "
-        "rated; 1 rates all",
+        "proposed arms per rated arm, which is the most promising of them; 1: all are rated. "
+        "Several cameras propose four times as many arms and rate a quarter of them",
         limits=(1, 100),
     )
     arm_mirrors: int = restarting(

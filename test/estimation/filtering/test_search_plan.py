@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
@@ -19,3 +21,9 @@ def test_with_several_cameras_the_search_is_another_one() -> None:
     assert plan.config.smoothing < CONFIG.smoothing
     rated = [c.arms // c.candidates for c in (plan.config, CONFIG)]
     assert rated[0] > rated[1]
+
+
+def test_more_arms_than_several_cameras_may_have_are_refused_with_the_reason() -> None:
+    config = WholeBodyConfig(arms=30_000)
+    with pytest.raises(ValueError, match=r"several cameras propose 4 times .* arms is 120000"):
+        SearchPlan.of(config, 2)
