@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
 # Rounds of all joints: fraction of states that move by differences, and factor on the noise from
@@ -40,7 +41,7 @@ class SearchPlan:
         """Return the plan for settings and a number of cameras.
 
         Raises:
-            ValueError: there would be more arms than are allowed.
+            CardboxError: there would be more arms than are allowed.
         """
         if cameras == 1:
             return cls(config)
@@ -67,4 +68,4 @@ def _with_more_arms(config: WholeBodyConfig) -> WholeBodyConfig:
         )
     except ValueError as error:
         text = f"several cameras propose {_MORE_ARMS} times as many arms, so {error}"
-        raise ValueError(text) from None
+        raise CardboxError(text) from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
@@ -25,5 +26,5 @@ def test_with_several_cameras_the_search_is_another_one() -> None:
 
 def test_more_arms_than_several_cameras_may_have_are_refused_with_the_reason() -> None:
     config = WholeBodyConfig(arms=30_000)
-    with pytest.raises(ValueError, match=r"several cameras propose 4 times .* arms is 120000"):
+    with pytest.raises(CardboxError, match=r"several cameras propose 4 times .* arms is 120000"):
         SearchPlan.of(config, 2)
