@@ -112,8 +112,11 @@ def _row(y: float, rows: float) -> float:
 
 
 @inlined_kernel
-def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
+def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> bool:
     """Write sides and extent of all patches from their corners.
+
+    Returns:
+        Whether a corner is behind the near plane, so that its ``pixels`` have no meaning.
 
     An edge from its upper end (x0, y0) to its lower end (x1, y1) has the slope
     s = (x1 - x0) / (y1 - y0), first meets row v0 = ceil(y0), crosses it at x0 + (v0 - y0) s and
@@ -132,7 +135,7 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
     if behind > 0:
         for p in range(patches):
             _draw_cut(work, p, camera, rows, width)
-        return
+        return True
     limit = float(rows)
     for p in range(patches):
         pixels[0, _index(4 * patches + p)] = pixels[0, _index(p)]
@@ -166,6 +169,7 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> None:
         _cross(edges, p + patches, p, _index(b), work.sides, width)
         _cross(edges, p + 2 * patches, p, _index(c), work.sides, width)
         _cross(edges, p + 3 * patches, p, _index(d), work.sides, width)
+    return False
 
 
 @inlined_kernel

@@ -25,6 +25,7 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import body_priors as priors
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms, joints_of_arms
+from cardbox_tracker.estimation.cost.bit_masks import fill_planes, new_planes
 from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
@@ -99,6 +100,7 @@ class WholeBodyCost:
         shape = (camera.height, camera.width + 1)
         self._beside_arm: int | None = None
         self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
+        self._planes = new_planes(camera.width, camera.height)
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
@@ -127,6 +129,7 @@ class WholeBodyCost:
             ends = (min(max(int(end), 0), camera.width) for end in (column - half, column + half))
             self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
+        fill_planes(self._seen, self._planes)
 
     def loosen_x(self, factor: float) -> None:
         """Multiply the units of the priors of ``torso_x`` by ``factor``, at any call the same."""
@@ -151,6 +154,7 @@ class WholeBodyCost:
         """Ignore this frame's silhouette and terms: ratings are the priors alone."""
         self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
         self._seen[:] = 0
+        fill_planes(self._seen, self._planes)
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
 
     def bearing(self) -> float:
@@ -234,7 +238,8 @@ class WholeBodyCost:
     def bodies(self, states: FloatArray) -> Bodies:
         """Rate whole states (N, 14)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))
-        seen = (self._seen, self.silhouette_px, self._scale), self._prior
+        of_image = self._planes, self.rows, self._camera.width, self.silhouette_px, self._scale
+        seen = of_image, self._prior
         points = _new_points(len(states))
         kernels.rate_bodies(states, self.body, *seen, ratings, (costs_px, areas_px), points)
         for term in self.terms:

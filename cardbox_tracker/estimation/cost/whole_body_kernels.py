@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.bit_masks import Words, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
     BODY_PATCHES,
@@ -52,6 +53,24 @@ class Observed(NamedTuple):
     scale: float
 
 
+class ObservedPlanes(NamedTuple):
+    """A silhouette as bits.
+
+    Attributes:
+        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_masks`.
+        rows: number of rows that count, from the top.
+        width: width of the image, px.
+        base_px: cost without a body, px.
+        scale: 1 / (pixels of the silhouette).
+    """
+
+    planes: Words
+    rows: int
+    width: int
+    base_px: int
+    scale: float
+
+
 class Points(NamedTuple):
     """Shoulder, elbow and hand of the left, then of the right arm of N states.
 
@@ -65,6 +84,7 @@ class Points(NamedTuple):
 
 
 ObservedTuple = tuple[RowSums, int, float]
+PlanesTuple = tuple[Words, int, int, int, float]
 PointsTuple = tuple[Floats, Floats]
 
 
@@ -128,7 +148,7 @@ def rate_arms(
 def rate_bodies(
     states: Floats,
     body: BodyTuple,
-    observed: ObservedTuple,
+    observed: PlanesTuple,
     prior: PriorTuple,
     ratings: Floats,
     pixels: tuple[Floats, Floats],
@@ -139,15 +159,15 @@ def rate_bodies(
     Args:
         states: (N, 14).
         body: fields of :class:`~.kernel_arguments.Body`.
-        observed: fields of :class:`Observed`.
+        observed: fields of :class:`ObservedPlanes`.
         prior: fields of :class:`~.body_priors.Prior`.
         ratings: written, (N,).
         pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
         points: fields of :class:`Points`, written.
     """
-    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
-    work, arm = new_workspace(BODY_PATCHES, rows), new_arm()
+    of, seen, given = body_of(body), ObservedPlanes(*observed), Prior(*prior)
+    work, arm = new_workspace(BODY_PATCHES, seen.planes.shape[2]), new_arm()
+    masks = new_masks(BODY_PATCHES, seen.planes)
     logs = np.empty(given.gaussians.shape[1])
     costs_px, areas_px = pixels
     joints_m, keypoints_m = points
@@ -163,8 +183,8 @@ def rate_bodies(
             _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
             _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
             rated += arm_prior(arm, side, of.parts, given, logs)
-        draw(work, of.camera, rows, width)
-        gain, area = sum_union(work, BODY_PATCHES, seen.row_sums)
+        has_cuts = draw(work, of.camera, seen.rows, seen.width)
+        gain, area = sum_masks(work, has_cuts, seen.width, seen.planes, masks)
         costs_px[i] = seen.base_px + gain
         areas_px[i] = area
         ratings[i] = costs_px[i] * seen.scale + rated
