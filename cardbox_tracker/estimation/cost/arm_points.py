@@ -1,12 +1,12 @@
 """Approximate costs of arms from a few points along their bones, a tenth of the work of drawing.
 
-A limb is a bar, and each point of its axis represents the part of the bar around it. Let S be the
-row sums of the pixels that trunk and other arm leave uncovered. The cost of an arm is about
+A limb is a bar, and each point of its axis represents the part of the bar around it. The cost of an
+arm is about
 
-    scale * sum over its points of (pixels of that part) * (S(v, u + 1) - S(v, u))
+    scale * sum over its points of (pixels of that part) * (1 - 2 f)
 
-where (u, v) is the point's pixel. The difference is -1 for uncovered foreground, 0 for covered
-pixels and 1 for background. The approximation selects the arms that are drawn.
+where 1 - 2 f is -1 if the point's pixel is foreground that trunk and other arm leave uncovered, 0
+if it is covered, and 1 if it is background. The approximation selects the arms that are drawn.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from math import sqrt
 import numpy as np
 
 from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.cost.bit_planes import Planes, value_at
 from cardbox_tracker.estimation.cost.kernel_arguments import (
     HEIGHT,
     TOP_WIDTH,
@@ -25,7 +26,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     body_of,
 )
 from cardbox_tracker.estimation.cost.kinematics import pose_arm, state_pose
-from cardbox_tracker.estimation.cost.row_sums import RowSums
 
 # Points of the upper arm, including the elbow, and of the forearm, up to the fingertips.
 _POINTS = (3, 4)
@@ -51,7 +51,8 @@ def add_costs_of_arms(
     joints: Floats,
     torso: Floats,
     body: BodyTuple,
-    uncovered: RowSums,
+    uncovered: Planes,
+    size: tuple[int, int],
     scale: float,
     costs: Floats,
 ) -> None:
@@ -61,11 +62,12 @@ def add_costs_of_arms(
         joints: joints of the arms in the torso's frame, (N, 3, 3), metres.
         torso: state of the trunk to which the arms belong.
         body: fields of :class:`~.kernel_arguments.Body`.
-        uncovered: row sums outside of trunk and other arm, (rows, W + 1).
+        uncovered: planes outside of trunk and other arm, (2, words, rows or more).
+        size: number of rows that count, and width, px.
         scale: 1 / (pixels of the silhouette).
         costs: changed; as fractions of the silhouette.
     """
-    rows, width = uncovered.shape[0], uncovered.shape[1] - 1
+    rows, width = size
     of = body_of(body)
     lens, drawn, parts = of.camera, of.drawn, of.parts
     rotation, hip = np.empty((3, 3)), np.empty(3)
@@ -97,6 +99,5 @@ def add_costs_of_arms(
                 column = lens.fx * (start[0] + along_m * axis[0]) / ahead_m + lens.cx + 0.5
                 row = lens.fy * (start[1] + along_m * axis[1]) / ahead_m + lens.cy + 0.5
                 if 0.0 <= column < width and 0.0 <= row < rows:
-                    u, v = int(column), int(row)
-                    total += part_px * (uncovered[v, u + 1] - uncovered[v, u])
+                    total += part_px * value_at(uncovered, int(row), int(column))
         costs[i] += scale * total

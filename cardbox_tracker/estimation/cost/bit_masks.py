@@ -1,11 +1,8 @@
-"""Compiled sums of (1 - 2 f) over the union of many patches, which are drawn as bits.
+"""Compiled sums of (1 - 2 f) over the union of patches, which are drawn as bits.
 
-Where many patches overlap, bits are faster than runs of columns (:mod:`.union`), because no step
-depends on the order of the patches in a row. The results are equal.
-
-A word has 31 pixels of one row, so that a shift by the number of pixels before a column is always
-below 32. The words of one column of words are consecutive in memory, so that the loops over rows
-can be vectorized; their rows are padded to a multiple of 16 for the same reason.
+No step depends on the order of the patches in a row, so this is faster than runs of columns
+(:mod:`.union`) where many patches overlap. The results are equal. :mod:`.bit_planes` defines the
+words.
 """
 
 from __future__ import annotations
@@ -13,24 +10,31 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.bit_planes import (
+    COUNTED,
+    FOREGROUND,
+    PIXELS,
+    ROWS,
+    Planes,
+    count_bits,
+    left_of,
+    padded,
+)
 from cardbox_tracker.estimation.cost.kernel_arguments import Counts, Whole
 from cardbox_tracker.estimation.cost.rasterisation import Workspace
-from cardbox_tracker.estimation.cost.row_sums import RowSums
 
-Words = NDArray[np.uint32]
-
-_PIXELS, _ROWS = 31, 16
 # Rounding moves a crossing by far less than this beyond the corners of its patch, px.
 _MARGIN_PX = 1.0
 
 # With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 _Index = int | np.integer[Any]
+Drawn = NDArray[np.uint32]
+
+_padded = inlined_kernel(padded)
 
 
 class Masks(NamedTuple):
@@ -42,77 +46,13 @@ class Masks(NamedTuple):
         rows_of: first and end row of each column of words, (words, 2).
     """
 
-    drawn: Words
+    drawn: Drawn
     words_of: Counts
     rows_of: Counts
 
 
-def _low_bits(typing_context: Any, count: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        (value,) = arguments
-        one = value.type(1)
-        return builder.sub(builder.shl(one, value), one)
-
-    return types.uint32(types.int32), generate
-
-
-def _set_bits(typing_context: Any, word: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.ctpop(arguments[0])
-
-    return types.int32(types.uint32), generate
-
-
-_below: Any = intrinsic(_low_bits)
-"""Compiled function: a word (uint32) whose lowest bits are set, as many (int32) as given, 0..31."""
-
-_count_bits: Any = intrinsic(_set_bits)
-"""Compiled function: the number (int32) of bits of a word (uint32) that are set."""
-
-
-def padded(rows: int) -> int:
-    """Return a number of rows, rounded up to that of the loops."""
-    return (rows + _ROWS - 1) // _ROWS * _ROWS
-
-
-_padded = inlined_kernel(padded)
-
-
-def new_planes(width: int, rows: int) -> Words:
-    """Allocate the planes of :func:`fill_planes` for images of up to this size, px."""
-    return np.zeros((2, (width + _PIXELS - 1) // _PIXELS, padded(rows)), np.uint32)
-
-
-@kernel
-def fill_planes(row_sums: RowSums, planes: Words) -> None:
-    """Write the pixels that count, and the foreground among them, of (rows, W + 1) row sums.
-
-    Args:
-        row_sums: running sums of 1 - 2 f, which do not change over a pixel that does not count.
-        planes: (2, words, rows or more), written.
-    """
-    width, words = row_sums.shape[1] - 1, planes.shape[1]
-    for v in range(_index(row_sums.shape[0])):
-        for w in range(_index(words)):
-            begin = w * _index(_PIXELS)
-            pixels = min(_PIXELS, width - int(begin))
-            change = int(row_sums[v, begin + _index(pixels)]) - int(row_sums[v, begin])
-            counted = seen = np.uint32(0)
-            if change == pixels or change == -pixels:
-                counted = _below(np.int32(pixels))
-                seen = counted if change < 0 else seen
-            else:
-                for i in range(pixels):
-                    column = begin + _index(i)
-                    step = int(row_sums[v, column + _index(1)]) - int(row_sums[v, column])
-                    counted |= np.uint32(step != 0) << np.uint32(i)
-                    seen |= np.uint32(step < 0) << np.uint32(i)
-            planes[0, w, v] = counted
-            planes[1, w, v] = seen
-
-
 @inlined_kernel
-def new_masks(patches: int, planes: Words) -> Masks:
+def new_masks(patches: int, planes: Planes) -> Masks:
     """Return the scratch arrays for a number of patches before the planes (2, words, rows)."""
     words, rows = planes.shape[1:]
     return Masks(
@@ -141,7 +81,7 @@ def _place(work: Workspace, has_cuts: bool, width: int, masks: Masks) -> None:
             right = min(right, max(max(a, b), max(c, d)) + _MARGIN_PX)
         begin = end = 0
         if first < last and left < right:
-            begin, end = int(left / _PIXELS), min(int(right / _PIXELS) + 1, words)
+            begin, end = int(left / PIXELS), min(int(right / PIXELS) + 1, words)
         words_of[k, 0], words_of[k, 1] = begin, end
         for w in range(_index(begin), _index(end)):
             rows_of[w, 0], rows_of[w, 1] = min(rows_of[w, 0], first), max(rows_of[w, 1], last)
@@ -150,27 +90,19 @@ def _place(work: Workspace, has_cuts: bool, width: int, masks: Masks) -> None:
             drawn[w, v] = np.uint32(0)
 
 
-@inlined_kernel
-def _below_column(column: np.int32, begin: np.int32) -> np.uint32:
-    """Return the pixels of the word that starts at ``begin`` that are left of a column."""
-    within = np.int32(min(max(np.int32(column - begin), np.int32(0)), np.int32(_PIXELS)))
-    pixels: np.uint32 = _below(within)
-    return pixels
-
-
 @kernel
-def _add(sides: Whole, k: _Index, extent: Counts, words: Counts, drawn: Words) -> None:
+def _add(sides: Whole, k: _Index, extent: Counts, words: Counts, drawn: Drawn) -> None:
     """Add patch ``k`` with its ``extent`` (2,) and its columns of ``words`` (2,)."""
     first, count = np.int32(extent[0]), np.uint32(extent[1] - extent[0])
-    begin, end = extent[0] // _ROWS, _padded(extent[1]) // _ROWS
+    begin, end = extent[0] // ROWS, _padded(extent[1]) // ROWS
     for w in range(_index(words[0]), _index(words[1])):
-        column = np.int32(_PIXELS) * np.int32(w)
+        column = np.int32(PIXELS) * np.int32(w)
         for group in range(_index(begin), _index(end)):
             # A constant number of rows is vectorized without a remainder.
-            for i in range(_ROWS):
-                v = group * _index(_ROWS) + _index(i)
-                one = _below_column(sides[k, 0, v], column)
-                other = _below_column(sides[k, 1, v], column)
+            for i in range(ROWS):
+                v = group * _index(ROWS) + _index(i)
+                one = left_of(sides[k, 0, v], column)
+                other = left_of(sides[k, 1, v], column)
                 # The sides are in any order, and those of other rows are undefined.
                 is_inside = np.uint32(np.int32(v) - first) < count
                 added = np.uint32(one ^ other) if is_inside else np.uint32(0)
@@ -178,20 +110,20 @@ def _add(sides: Whole, k: _Index, extent: Counts, words: Counts, drawn: Words) -
 
 
 @kernel
-def _count(drawn: Words, w: _Index, rows: Counts, planes: Words) -> tuple[int, int]:
+def _count(drawn: Drawn, w: _Index, rows: Counts, planes: Planes) -> tuple[int, int]:
     """Return drawn pixels and their sum of (1 - 2 f), in ``rows`` (2,) of a column of words."""
     area, counted, seen = np.int32(0), np.int32(0), np.int32(0)
     for v in range(_index(rows[0]), _index(rows[1])):
         word = drawn[w, v]
-        area = np.int32(area + _count_bits(word))
-        counted = np.int32(counted + _count_bits(np.uint32(word & planes[0, w, v])))
-        seen = np.int32(seen + _count_bits(np.uint32(word & planes[1, w, v])))
+        area = np.int32(area + count_bits(word))
+        counted = np.int32(counted + count_bits(np.uint32(word & planes[COUNTED, w, v])))
+        seen = np.int32(seen + count_bits(np.uint32(word & planes[FOREGROUND, w, v])))
     return int(area), int(counted) - 2 * int(seen)
 
 
 @inlined_kernel
 def sum_masks(
-    work: Workspace, has_cuts: bool, width: int, planes: Words, masks: Masks
+    work: Workspace, has_cuts: bool, width: int, planes: Planes, masks: Masks
 ) -> tuple[int, int]:
     """Return sum of (1 - 2 f) and area, px, of the union of all patches.
 
@@ -199,7 +131,7 @@ def sum_masks(
         work: the patches, with sides of as many rows as the planes.
         has_cuts: whether a corner is behind the near plane, from :func:`~.rasterisation.draw`.
         width: width of the image, px.
-        planes: (2, words, rows), see :func:`fill_planes`.
+        planes: (2, words, rows), see :func:`~.bit_planes.fill_planes`.
         masks: scratch arrays for as many patches.
     """
     _place(work, has_cuts, width, masks)
@@ -214,3 +146,16 @@ def sum_masks(
             area += pixels
             gain += change
     return gain, area
+
+
+@inlined_kernel
+def cover_masks(masks: Masks, planes: Planes, covered: Planes) -> None:
+    """Write the planes to ``covered`` without the pixels of the last union."""
+    drawn, rows_of = masks.drawn, masks.rows_of
+    for w in range(_index(drawn.shape[0])):
+        for v in range(_index(drawn.shape[1])):
+            covered[COUNTED, w, v] = planes[COUNTED, w, v]
+            covered[FOREGROUND, w, v] = planes[FOREGROUND, w, v]
+        for v in range(_index(rows_of[w, 0]), _index(rows_of[w, 1])):
+            covered[COUNTED, w, v] &= ~drawn[w, v]
+            covered[FOREGROUND, w, v] &= ~drawn[w, v]

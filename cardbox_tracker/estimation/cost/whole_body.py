@@ -8,10 +8,9 @@ depend on the last place of the hips.
 from __future__ import annotations
 
 from math import ceil
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
@@ -25,7 +24,13 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import body_priors as priors
 from cardbox_tracker.estimation.cost import whole_body_kernels as kernels
 from cardbox_tracker.estimation.cost.arm_points import add_costs_of_arms, joints_of_arms
-from cardbox_tracker.estimation.cost.bit_masks import fill_planes, new_planes
+from cardbox_tracker.estimation.cost.bit_planes import (
+    Planes,
+    fill_planes,
+    leave_out,
+    median_column,
+    new_planes,
+)
 from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
@@ -35,7 +40,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 )
 from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
-from cardbox_tracker.estimation.cost.row_sums import fill_row_sums, leave_out, median_column
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.cost.whole_body_kernels import Points, PointsTuple
@@ -78,6 +82,7 @@ class WholeBodyCost:
         pitch_rad: pitch of the camera, rad, positive downwards.
         is_measured: whether the body was measured, not estimated from proportions.
         frontal_px: pixels of the model in the front reference posture.
+        counted: number of rows of the present silhouette that count, from the top, and width, px.
         silhouette_px: foreground pixels that count in the present silhouette.
         anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
         terms: observations of further terms in the present frame.
@@ -95,12 +100,10 @@ class WholeBodyCost:
         self._rules = _rules(config)
         self._waist_m = float(body.size("waist_width"))
         self._gaussians = np.ascontiguousarray(load_gmm().T)
-        # 16 bits suffice for images narrower than 32768 px, and less memory stays in the cache.
-        kind = np.int16 if camera.width < 2**15 else np.int32
-        shape = (camera.height, camera.width + 1)
         self._beside_arm: int | None = None
-        self._all_rows: tuple[NDArray[Any], ...] = tuple(np.zeros(shape, kind) for _ in range(3))
-        self._planes = new_planes(camera.width, camera.height)
+        self._seen, self._beside, self._beside_trunk = (
+            new_planes(camera.width, camera.height) for _ in range(3)
+        )
         self.terms: tuple[TermObservation, ...] = ()
         self.anchor = np.zeros(4)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
@@ -121,15 +124,19 @@ class WholeBodyCost:
             for end in (row, row + config.below_hips_m * camera.fy / depth_m)
         )
         upper = np.ascontiguousarray(silhouette[:rows])
-        words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
-        self._seen, self._beside, self._beside_trunk = (table[:rows] for table in self._all_rows)
-        self.silhouette_px = int(fill_row_sums(upper, words, self._seen))
+        words = upper.view(np.uint64) if camera.width % 8 == 0 else _NO_WORDS
+        self.counted = rows, camera.width
+        self.silhouette_px = int(fill_planes(upper, words, self._seen))
         if hip_row < rows:
             half = config.legs * self._waist_m * camera.fx / depth_m
             ends = (min(max(int(end), 0), camera.width) for end in (column - half, column + half))
-            self.silhouette_px -= leave_out(self._seen, hip_row, *ends)
+            self.silhouette_px -= leave_out(self._seen, hip_row, rows, *ends)
         self._scale = 1.0 / max(self.silhouette_px, 1)
-        fill_planes(self._seen, self._planes)
+        self._by_body = self._by(self._seen, self.silhouette_px)
+
+    def _by(self, planes: Planes, base_px: int) -> tuple[kernels.ObservedTuple, priors.PriorTuple]:
+        """Return the arguments of the kernels that rate by pixels of ``planes`` and priors."""
+        return (planes, *self.counted, base_px, self._scale), self._prior
 
     def loosen_x(self, factor: float) -> None:
         """Multiply the units of the priors of ``torso_x`` by ``factor``, at any call the same."""
@@ -152,23 +159,22 @@ class WholeBodyCost:
 
     def see_nothing(self) -> None:
         """Ignore this frame's silhouette and terms: ratings are the priors alone."""
-        self._seen, self._beside, self._beside_trunk = (table[:1] for table in self._all_rows)
-        self._seen[:] = 0
-        fill_planes(self._seen, self._planes)
+        self._seen[:], self.counted = 0, (1, self.size[0])
         self.silhouette_px, self._scale, self.terms = 0, 0.0, ()
+        self._by_body = self._by(self._seen, 0)
 
     def bearing(self) -> float:
         """Bearing of the silhouette's median column: lateral coordinate divided by depth."""
-        column = median_column(self._seen)
+        column = median_column(self._seen, *self.counted)
         return (float(column) - self._camera.cx) / self._camera.fx
 
     def torsos(self, states: FloatArray, arms_of: FloatArray) -> FloatArray:
         """Rate torsos (N,); the arms of the state ``arms_of`` keep their place in the image."""
         self._beside_arm = None
-        gain = kernels.cover(arms_of, _BOTH_ARMS, self.body, self._seen, self._beside)
+        gain = kernels.cover(arms_of, _BOTH_ARMS, self.body, self.counted, self._seen, self._beside)
         ratings = np.empty(len(states))
-        observed = self._beside, self.silhouette_px + gain, self._scale
-        kernels.rate_trunks(states, self.body, observed, self._prior, ratings)
+        seen = self._by(self._beside, self.silhouette_px + gain)
+        kernels.rate_trunks(states, self.body, *seen, ratings)
         for term in self.terms:
             ratings += self._scale * term.torsos_beside(None)(states[:, _TORSO_OF_TERMS])
         return ratings
@@ -176,15 +182,16 @@ class WholeBodyCost:
     def fix_torso(self, torso: FloatArray) -> None:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
         self._torso, self._beside_arm = torso, None
-        gain = kernels.cover(torso, _TRUNK, self.body, self._seen, self._beside_trunk)
-        self._base_px = self.silhouette_px + gain
+        gain = kernels.cover(torso, _TRUNK, self.body, self.counted, self._seen, self._beside_trunk)
+        self._by_arms = self._by(self._beside_trunk, self.silhouette_px + gain)
         self._arm_terms = [term.arms_beside(torso[_TORSO_OF_TERMS]) for term in self.terms]
 
-    def uncovered(self, arm: int) -> NDArray[Any]:
-        """Return the row sums outside of the fixed torso and the arm opposite to ``arm``."""
+    def uncovered(self, arm: int) -> Planes:
+        """Return the planes outside of the fixed torso and the arm opposite to ``arm``."""
         if self._beside_arm != arm:
             other = False, arm == 1, arm == 0
-            kernels.cover(self._torso, other, self.body, self._beside_trunk, self._beside)
+            uncovered = self._beside_trunk, self._beside
+            kernels.cover(self._torso, other, self.body, self.counted, *uncovered)
             self._beside_arm = arm
         return self._beside
 
@@ -205,7 +212,7 @@ class WholeBodyCost:
             arm: 0 left, 1 right.
         """
         ratings = np.zeros(len(joints))
-        seen = self.uncovered(arm), self._scale
+        seen = self.uncovered(arm), self.counted, self._scale
         add_costs_of_arms(joints, self._torso, self.body, *seen, ratings)
         return self._with_terms(ratings, arms, arm)
 
@@ -216,8 +223,8 @@ class WholeBodyCost:
             Ratings (N,); shoulder, elbow and hand in the torso's frame, (N, 3, 3), metres.
         """
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
-        seen = (self._beside_trunk, self._base_px, self._scale), self._prior
-        kernels.rate_arms(arms, 1.0 - 2.0 * arm, self._torso, self.body, *seen, ratings, joints_m)
+        of_arms = 1.0 - 2.0 * arm, self._torso, self.body, *self._by_arms
+        kernels.rate_arms(arms, *of_arms, ratings, joints_m)
         return self._with_terms(ratings, arms, arm), joints_m
 
     def _with_terms(self, ratings: FloatArray, arms: FloatArray, arm: int) -> FloatArray:
@@ -229,8 +236,7 @@ class WholeBodyCost:
     def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
         """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
         ratings, points = np.empty(len(states)), _new_points(len(states))
-        seen = (self._beside_trunk, self._base_px, self._scale), self._prior
-        kernels.rate_pairs(states, self.body, *seen, ratings, points)
+        kernels.rate_pairs(states, self.body, *self._by_arms, ratings, points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
         return ratings, Points(*points)
@@ -238,10 +244,8 @@ class WholeBodyCost:
     def bodies(self, states: FloatArray) -> Bodies:
         """Rate whole states (N, 14)."""
         ratings, costs_px, areas_px = np.empty((3, len(states)))
-        of_image = self._planes, self.rows, self._camera.width, self.silhouette_px, self._scale
-        seen = of_image, self._prior
-        points = _new_points(len(states))
-        kernels.rate_bodies(states, self.body, *seen, ratings, (costs_px, areas_px), points)
+        points, pixels = _new_points(len(states)), (costs_px, areas_px)
+        kernels.rate_bodies(states, self.body, *self._by_body, ratings, pixels, points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
         return Bodies(ratings, costs_px, areas_px, Points(*points))
@@ -272,11 +276,6 @@ class WholeBodyCost:
         moved = *self.body[:3], place_of(body), intrinsics_of(camera)
         corners_of_body(state, moved, corners_m)
         return corners_m
-
-    @property
-    def rows(self) -> int:
-        """Number of rows of the present silhouette that count, from the top."""
-        return len(self._seen)
 
 
 def _new_points(count: int) -> PointsTuple:

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.bit_masks import Words, new_masks, sum_masks
+from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
+from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
     BODY_PATCHES,
@@ -35,36 +36,20 @@ from cardbox_tracker.estimation.cost.kinematics import (
     turn_arm,
 )
 from cardbox_tracker.estimation.cost.rasterisation import draw, new_workspace
-from cardbox_tracker.estimation.cost.row_sums import RowSums
-from cardbox_tracker.estimation.cost.union import cover_patches, sum_union
 
 
 class Observed(NamedTuple):
     """A silhouette, or the part of it outside of parts that are already drawn.
 
     Attributes:
-        row_sums: running sums of 1 - 2 f along each row, (rows, W + 1).
+        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`.
+        rows: number of rows that count, from the top.
+        width: width of the image, px.
         base_px: cost without further parts, px.
         scale: 1 / (pixels of the silhouette).
     """
 
-    row_sums: RowSums
-    base_px: int
-    scale: float
-
-
-class ObservedPlanes(NamedTuple):
-    """A silhouette as bits.
-
-    Attributes:
-        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_masks`.
-        rows: number of rows that count, from the top.
-        width: width of the image, px.
-        base_px: cost without a body, px.
-        scale: 1 / (pixels of the silhouette).
-    """
-
-    planes: Words
+    planes: Planes
     rows: int
     width: int
     base_px: int
@@ -83,8 +68,7 @@ class Points(NamedTuple):
     keypoints_m: Floats
 
 
-ObservedTuple = tuple[RowSums, int, float]
-PlanesTuple = tuple[Words, int, int, int, float]
+ObservedTuple = tuple[Planes, int, int, int, float]
 PointsTuple = tuple[Floats, Floats]
 
 
@@ -102,13 +86,13 @@ def rate_trunks(
 ) -> None:
     """Write ratings (N,) of the trunks of states (N, 14)."""
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
-    work = new_workspace(TRUNK_PATCHES, rows)
+    work = new_workspace(TRUNK_PATCHES, seen.planes.shape[2])
+    masks = new_masks(TRUNK_PATCHES, seen.planes)
     for i in range(states.shape[0]):
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
-        draw(work, of.camera, rows, width)
-        gain = sum_union(work, TRUNK_PATCHES, seen.row_sums)[0]
+        has_cuts = draw(work, of.camera, seen.rows, seen.width)
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
         ratings[i] = (seen.base_px + gain) * seen.scale + torso_prior(states[i], given)
 
 
@@ -129,8 +113,8 @@ def rate_arms(
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
-    work, arm = new_workspace(ARM_PATCHES, rows), new_arm()
+    work, arm = new_workspace(ARM_PATCHES, seen.planes.shape[2]), new_arm()
+    masks = new_masks(ARM_PATCHES, seen.planes)
     logs = np.empty(given.gaussians.shape[1])
     state_pose(torso, of.place, of.camera, work.torso, work.hip)
     for i in range(arms.shape[0]):
@@ -138,8 +122,8 @@ def rate_arms(
         turn_arm(arm, work.torso, work.hip)
         place_arm(arm, 0, of.drawn, work.corners)
         _copy(arm.points, joints_m[i])
-        draw(work, of.camera, rows, width)
-        gain = sum_union(work, ARM_PATCHES, seen.row_sums)[0]
+        has_cuts = draw(work, of.camera, seen.rows, seen.width)
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
         rated = arm_prior(arm, side, of.parts, given, logs)
         ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
@@ -148,7 +132,7 @@ def rate_arms(
 def rate_bodies(
     states: Floats,
     body: BodyTuple,
-    observed: PlanesTuple,
+    observed: ObservedTuple,
     prior: PriorTuple,
     ratings: Floats,
     pixels: tuple[Floats, Floats],
@@ -159,13 +143,13 @@ def rate_bodies(
     Args:
         states: (N, 14).
         body: fields of :class:`~.kernel_arguments.Body`.
-        observed: fields of :class:`ObservedPlanes`.
+        observed: fields of :class:`Observed`.
         prior: fields of :class:`~.body_priors.Prior`.
         ratings: written, (N,).
         pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
         points: fields of :class:`Points`, written.
     """
-    of, seen, given = body_of(body), ObservedPlanes(*observed), Prior(*prior)
+    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
     work, arm = new_workspace(BODY_PATCHES, seen.planes.shape[2]), new_arm()
     masks = new_masks(BODY_PATCHES, seen.planes)
     logs = np.empty(given.gaussians.shape[1])
@@ -205,8 +189,8 @@ def rate_pairs(
     are those of :func:`rate_bodies`.
     """
     of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    rows, width = seen.row_sums.shape[0], seen.row_sums.shape[1] - 1
-    work, arm = new_workspace(2 * ARM_PATCHES, rows), new_arm()
+    work, arm = new_workspace(2 * ARM_PATCHES, seen.planes.shape[2]), new_arm()
+    masks = new_masks(2 * ARM_PATCHES, seen.planes)
     logs = np.empty(given.gaussians.shape[1])
     state_pose(states[0], of.place, of.camera, work.torso, work.hip)
     of_torso = torso_prior(states[0], given)
@@ -221,22 +205,31 @@ def rate_pairs(
             _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
             _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
             rated += arm_prior(arm, side, of.parts, given, logs)
-        draw(work, of.camera, rows, width)
-        gain = sum_union(work, 2 * ARM_PATCHES, seen.row_sums)[0]
+        has_cuts = draw(work, of.camera, seen.rows, seen.width)
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
         ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
 @kernel
-def cover(state: Floats, drawn: Drawn, body: BodyTuple, row_sums: RowSums, covered: RowSums) -> int:
-    """Write the row sums outside of the ``drawn`` parts of a state; return the gain of the parts.
+def cover(
+    state: Floats,
+    drawn: Drawn,
+    body: BodyTuple,
+    size: tuple[int, int],
+    planes: Planes,
+    covered: Planes,
+) -> int:
+    """Write the planes outside of the ``drawn`` parts of a state; return the gain of the parts.
 
-    The gain is the sum of (1 - 2 f) under these parts.
+    The gain is the sum of (1 - 2 f) under these parts; ``size`` is the number of rows that count,
+    and the width.
     """
     of = body_of(body)
     has_trunk, has_left, has_right = drawn
-    rows, width = row_sums.shape[0], row_sums.shape[1] - 1
+    rows, width = size
     patches = TRUNK_PATCHES * has_trunk + ARM_PATCHES * (int(has_left) + int(has_right))
-    work, arm = new_workspace(patches, rows), new_arm()
+    work, arm = new_workspace(patches, planes.shape[2]), new_arm()
+    masks = new_masks(patches, planes)
     state_pose(state, of.place, of.camera, work.torso, work.hip)
     p = 0
     if has_trunk:
@@ -249,5 +242,7 @@ def cover(state: Floats, drawn: Drawn, body: BodyTuple, row_sums: RowSums, cover
             turn_arm(arm, work.torso, work.hip)
             place_arm(arm, p, of.drawn, work.corners)
             p += ARM_PATCHES
-    draw(work, of.camera, rows, width)
-    return cover_patches(work.sides, work.extent, row_sums, covered)
+    has_cuts = draw(work, of.camera, rows, width)
+    gain = sum_masks(work, has_cuts, width, planes, masks)[0]
+    cover_masks(masks, planes, covered)
+    return gain

@@ -12,6 +12,7 @@ import numpy as np
 
 from cardbox_tracker.body.posture import ARM_ANGLES
 from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.kernel_arguments import (
     FOREARM,
     HEIGHT,
@@ -28,9 +29,10 @@ from cardbox_tracker.estimation.cost.kinematics import (
     side_of,
     state_pose,
 )
-from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.filtering.joint_moves import NumbersTuple
 from cardbox_tracker.estimation.filtering.mirroring import mirror
+from cardbox_tracker.estimation.filtering.state_choice import least_of
+from cardbox_tracker.estimation.filtering.uncovered import farthest_uncovered
 
 # Margins of the distance from shoulder to hand of an arm that reaches for a pixel, against the
 # difference and the sum of the bones' lengths, m.
@@ -40,9 +42,9 @@ _NEARER = 0.8
 # Direction (forwards, outwards, up) of an elbow that hangs down.
 _ELBOW_HANGS = (-0.2, 0.4, -1.0)
 _ELBOW_TURNS_RAD = 1.2 * pi
-# Search of the tip of an arm: spacing of the grid, px; radius in arm lengths from the shoulder;
-# least number of uncovered points.
-_GRID_PX, _REACH, _FEWEST_TIPS = 3, 1.1, 3
+# Search of the tip of an arm: radius in arm lengths from the shoulder; least number of uncovered
+# points.
+_REACH, _FEWEST_TIPS = 1.1, 3
 _INWARDS_PX = 3.0
 
 
@@ -156,7 +158,8 @@ def propose_arms(
     pool: Floats,
     arm: int,
     plan: ArmPlanTuple,
-    uncovered: RowSums,
+    uncovered: Planes,
+    size: tuple[int, int],
     body: BodyTuple,
     numbers: NumbersTuple,
 ) -> Floats:
@@ -170,7 +173,8 @@ def propose_arms(
         pool: states, the best first.
         arm: 0 left, 1 right.
         plan: fields of :class:`ArmPlan`.
-        uncovered: row sums outside of trunk and other arm.
+        uncovered: planes outside of trunk and other arm, (2, words, rows or more).
+        size: number of rows that count, and width, px.
         body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
         numbers: fields of :class:`~.joint_moves.Numbers`, (N, 4) and (N, 3).
     """
@@ -214,7 +218,7 @@ def propose_arms(
     fx, fy, cx, cy = of.camera.fx, of.camera.fy, of.camera.cx, of.camera.cy
     u, v = fx * shoulder[0] / shoulder[2] + cx, fy * shoulder[1] / shoulder[2] + cy
     length_px = (parts[UPPER_ARM, HEIGHT] + parts[FOREARM, HEIGHT]) * fx / shoulder[2]
-    count, tip_u, tip_v = farthest_uncovered(uncovered, u, v, _REACH * length_px)
+    count, tip_u, tip_v = farthest_uncovered(uncovered, size, u, v, _REACH * length_px)
     if count >= _FEWEST_TIPS:
         # The keypoint of the hand lies before the end of the outline.
         far = sqrt((u - tip_u) ** 2 + (v - tip_v) ** 2) + 1e-9
@@ -236,48 +240,11 @@ def propose_arms(
 
 
 @kernel
-def farthest_uncovered(
-    uncovered: RowSums, u: float, v: float, reach_px: float
-) -> tuple[int, float, float]:
-    """Find the farthest uncovered foreground from the pixel (u, v).
-
-    ``uncovered`` (rows, W + 1) are row sums, which are constant over covered pixels. A point of the
-    grid counts if four of the five pixels around it in its row are foreground, and the same is true
-    for the point above or below.
-
-    Returns:
-        Number of points within ``reach_px``, and column and row of the farthest one.
-    """
-    rows, width = uncovered.shape[0], uncovered.shape[1] - 1
-    count, best = 0, -1.0
-    tip_u, tip_v = 0.0, 0.0
-    step = _GRID_PX
-    left, right = max(int(u - reach_px), step), min(int(u + reach_px), width - step - 1)
-    top, bottom = max(int(v - reach_px), step), min(int(v + reach_px), rows - step - 1)
-    for row in range(top, bottom, step):
-        for column in range(left, right, step):
-            if uncovered[row, column + 1] - uncovered[row, column] != -1:
-                continue
-            if uncovered[row, column + 3] - uncovered[row, column - 2] > -4:
-                continue
-            above = uncovered[row - step, column + 1] - uncovered[row - step, column]
-            below = uncovered[row + step, column + 1] - uncovered[row + step, column]
-            if above != -1 and below != -1:
-                continue
-            far = (column - u) ** 2 + (row - v) ** 2
-            if far <= reach_px * reach_px:
-                count += 1
-                if far > best:
-                    best, tip_u, tip_v = far, float(column), float(row)
-    return count, tip_u, tip_v
-
-
-@kernel
 def around_best(
     arms: Floats, ratings: Floats, count: int, sigma_rad: float, arm_limits: Floats, normals: Floats
 ) -> Floats:
     """Return arms (N, 4) around the best ``count`` of ``arms`` (M, 4); ``normals`` are (N, 4)."""
-    order = np.argsort(ratings, kind="mergesort")
+    order = least_of(ratings, count)
     moved = np.empty_like(normals)
     for i in range(normals.shape[0]):
         source = arms[order[i % count]]

@@ -51,4 +51,5 @@ def propose_arms(
     banked = min(config.banked_arms // share, left - mirrors - tips)
     kinds = config.survivors, config.arm_noise_rad, mirrors, tips, banked
     plan = *kinds, bank_of_arms(), ARM_LIMITS
-    return arm_proposals.propose_arms(pool, arm, plan, cost.uncovered(arm), cost.body, numbers)
+    seen = cost.uncovered(arm), cost.counted
+    return arm_proposals.propose_arms(pool, arm, plan, *seen, cost.body, numbers)

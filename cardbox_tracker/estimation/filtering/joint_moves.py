@@ -21,6 +21,7 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
+from cardbox_tracker.estimation.filtering.state_choice import least_of
 
 # Fraction of the noise that is added to a move by a difference.
 _NOISE_OF_DIFFERENCE = 0.2
@@ -80,8 +81,7 @@ def combine(
     The first n states pair the i-th best left arm with the i-th best right arm. The others pair the
     best left arm with the second to the (n/2 + 1)-th best right arm, and vice versa.
     """
-    lefts = np.argsort(left_ratings, kind="mergesort")
-    rights = np.argsort(right_ratings, kind="mergesort")
+    lefts, rights = least_of(left_ratings, n + 1), least_of(right_ratings, n + 1)
     states = np.empty((2 * n, N_STATE))
     for i in range(2 * n):
         states[i] = torso

@@ -33,6 +33,7 @@ from cardbox_tracker.estimation.filtering.joint_moves import (
     clip_state,
     pivot,
 )
+from cardbox_tracker.estimation.filtering.state_choice import least_of
 
 # Explorers: half of them bow within this range, two fifths get any yaw, the others mirror the yaw;
 # the distance of all has this deviation, m.
@@ -143,7 +144,7 @@ def pool_of(
     (14,), which stay fixed in space.
     """
     m = survivors.shape[0]
-    order = np.argsort(ratings, kind="mergesort")
+    order = least_of(ratings, count)
     pool = np.empty((m + 2 * count, N_STATE))
     pool[:m] = survivors
     old, new, hip = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)

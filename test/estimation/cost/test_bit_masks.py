@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import kernel
-from cardbox_tracker.estimation.cost.bit_masks import (
-    Words,
-    fill_planes,
-    new_masks,
-    new_planes,
-    sum_masks,
-)
+from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
+from cardbox_tracker.estimation.cost.bit_planes import Planes, fill_planes, new_planes
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats, Intrinsics, intrinsics_of
 from cardbox_tracker.estimation.cost.rasterisation import draw, new_workspace
 from cardbox_tracker.vision.camera import Camera
@@ -26,9 +20,13 @@ PATCHES = 6
 
 @kernel
 def sum_of(
-    corners_m: Floats, camera: tuple[float, ...], planes: Words, size: tuple[int, int]
+    corners_m: Floats,
+    camera: tuple[float, ...],
+    size: tuple[int, int],
+    planes: Planes,
+    covered: Planes,
 ) -> tuple[int, int]:
-    """Sum of (1 - 2 f) and area under the patches (6, 4, 3) in an image of rows and width."""
+    """Sum of (1 - 2 f) and area under the patches (6, 4, 3), which are removed in ``covered``."""
     rows, width = size
     work, masks = new_workspace(PATCHES, planes.shape[2]), new_masks(PATCHES, planes)
     for p in range(PATCHES):
@@ -36,26 +34,9 @@ def sum_of(
             for j in range(3):
                 work.corners[j, c * PATCHES + p] = corners_m[p, c, j]
     has_cuts = draw(work, Intrinsics(*camera), rows, width)
-    return sum_masks(work, has_cuts, width, planes, masks)
-
-
-def row_sums_of(foreground: NDArray[np.bool_], counts: NDArray[np.bool_]) -> NDArray[np.int16]:
-    """The running sums by their definition, where pixels that do not count change nothing."""
-    sums = np.zeros((foreground.shape[0], foreground.shape[1] + 1), np.int16)
-    sums[:, 1:] = np.cumsum(np.where(counts, 1 - 2 * foreground.astype(int), 0), axis=1)
-    return sums
-
-
-def test_planes_by_hand() -> None:
-    """A word has 31 pixels, the lowest bit is the left one, and pixels that do not count are 0."""
-    foreground, counts = np.zeros((2, 40), bool), np.ones((2, 40), bool)
-    foreground[0, [0, 2, 30, 31]] = True
-    counts[1, 33:] = False
-    planes = new_planes(40, 2)
-    fill_planes(row_sums_of(foreground, counts), planes)
-    assert planes.shape == (2, 2, 16)
-    assert planes[0, :, :2].tolist() == [[2**31 - 1, 2**31 - 1], [2**9 - 1, 0b11]]
-    assert planes[1, :, :2].tolist() == [[2**30 + 0b101, 0], [1, 0]]
+    found = sum_masks(work, has_cuts, width, planes, masks)
+    cover_masks(masks, planes, covered)
+    return found
 
 
 @pytest.mark.parametrize(("width", "rows"), [(1, 1), (31, 16), (32, 17), (93, 40)])
@@ -73,12 +54,22 @@ def test_union_is_that_of_the_drawn_patches(
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])[None, :, :, None]
     corners_m = middles + (signs * half_m).sum(axis=2)
     foreground, counts = rng.random((2, rows, width)) < 0.7
-    planes = new_planes(width, rows)
-    fill_planes(row_sums_of(foreground & counts, counts), planes)
+    silhouette = foreground.astype(np.uint8)
+    planes, of_counts, rest = (new_planes(width, rows) for _ in range(3))
+    for image, made in ((silhouette, planes), (counts.astype(np.uint8), of_counts)):
+        fill_planes(image, np.zeros((1, 0), np.uint64), made)
+    planes &= of_counts[1]
 
     drawn = np.zeros((rows, width), np.uint8)
     for patch_m in corners_m:
         fill_convex(drawn, snap(camera.project(clip_near(patch_m))))
     covered = drawn > 0
     expected = np.where(counts, 1 - 2 * foreground.astype(int), 0)[covered].sum(), covered.sum()
-    assert sum_of(corners_m, intrinsics_of(camera), planes, (rows, width)) == expected
+    size = rows, width
+    assert sum_of(corners_m, intrinsics_of(camera), size, planes, rest) == expected
+    # Under the union nothing is left, and beside it everything.
+    assert sum_of(corners_m, intrinsics_of(camera), size, rest, planes)[0] == 0
+    bits = np.unpackbits(np.ascontiguousarray(rest[:, :, :rows]).view(np.uint8), axis=2)
+    everywhere = bits.sum(axis=(1, 2)).tolist()
+    left = counts & ~covered
+    assert everywhere == [left.sum(), (left & foreground).sum()]

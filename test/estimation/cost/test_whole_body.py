@@ -118,7 +118,7 @@ def test_angles_and_directions_are_each_others_inverse(seed: int) -> None:
 
 def drawn(of: WholeBodyCost, one: np.ndarray) -> np.ndarray:
     """The model's pixels by the definition of vision/rasterisation.py."""
-    mask = np.zeros((of.rows, CAMERA.width), np.uint8)
+    mask = np.zeros((of.counted[0], CAMERA.width), np.uint8)
     for corners_m in of.corners(one):
         fill_convex(mask, snap(CAMERA.project(clip_near(corners_m))))
     return mask
@@ -137,7 +137,7 @@ def test_pixels_are_those_of_the_drawn_outlines(seed: int, distance_m: float) ->
     for one, cost_px, area_px in zip(states, costs_px, areas_px, strict=True):
         model = drawn(of, one)
         assert area_px == np.count_nonzero(model)
-        assert cost_px == np.count_nonzero(model ^ silhouette[: of.rows])
+        assert cost_px == np.count_nonzero(model ^ silhouette[: of.counted[0]])
 
 
 def test_a_trunk_looks_as_wide_from_the_side_as_it_is_deep() -> None:
@@ -171,7 +171,7 @@ def test_parts_beside_each_other_add_up_to_the_whole() -> None:
     share = px[0] / of.silhouette_px
     assert trunk == pytest.approx(share + torso)
     beside = of.silhouette_px + kernels.cover(
-        one, (True, False, False), of.body, of._seen, of._beside_trunk
+        one, (True, False, False), of.body, of.counted, of._seen, of._beside_trunk
     )
     both = left - left_prior + right - right_prior - beside / of.silhouette_px
     assert both == pytest.approx(share)
@@ -269,10 +269,10 @@ def test_rows_below_the_hips_count_but_not_the_legs() -> None:
     of.see(person, state())
     hip_row = int(np.ceil(0.4 * 165 / 2.0 + 59.5))
     rows = int(np.ceil((0.4 + 0.35) * 165 / 2.0 + 59.5))
-    assert of.rows == min(rows, 120)
+    assert of.counted[0] == min(rows, 120)
     half = 0.75 * BODY.size("waist_width") * 165 / 2.0
     legs = int(79.5 + half) - int(79.5 - half)
-    assert of.silhouette_px == 160 * of.rows - legs * (of.rows - hip_row)
+    assert of.silhouette_px == 160 * of.counted[0] - legs * (of.counted[0] - hip_row)
 
 
 class Squares(Silence):

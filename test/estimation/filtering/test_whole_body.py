@@ -110,6 +110,7 @@ def arms_for(
         arm,
         (16, 0.2, *kinds, bank, ARM_LIMITS),
         of.uncovered(arm),
+        of.counted,
         of.body,
         (rng.standard_normal((40, 4)), rng.random((40, 3))),
     )
