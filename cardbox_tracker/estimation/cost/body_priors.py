@@ -32,6 +32,7 @@ from cardbox_tracker.estimation.cost.kinematics import (
     side_of,
 )
 from cardbox_tracker.estimation.cost.pose_prior import nats_of
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 
 # Values of ``rules`` (15,); ``WholeBodyCostConfig`` describes them.
 (
@@ -162,3 +163,22 @@ def priors(state: Floats, body: BodyTuple, prior: PriorTuple) -> tuple[float, fl
         pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
         found[k] = arm_prior(arm, side, of.parts, given, logs)
     return torso_prior(state, given), found[0], found[1]
+
+
+def rules_of(config: WholeBodyCostConfig) -> Floats:
+    """Return the values of ``rules``, (15,), from the settings."""
+    rules = np.empty(N_RULES)
+    rules[WEIGHT] = config.weight
+    rules[ROLL_UNIT] = np.radians(config.roll_deg)
+    rules[PITCH_REST] = np.radians(config.pitch_rest_deg)
+    rules[FORWARD_UNIT] = np.radians(config.pitch_forward_deg)
+    rules[BACK_UNIT] = np.radians(config.pitch_back_deg)
+    rules[YAW_UNIT] = np.radians(config.yaw_deg)
+    rules[ANGLE_CAP] = config.angle_cap
+    rules[X_STEP], rules[Z_STEP] = config.x_step_m, config.z_step_m
+    rules[STEP_CAP] = config.step_cap
+    rules[X_HOME], rules[Z_HOME] = config.x_home_m, config.z_home_m
+    rules[HOME_CAP] = config.home_cap
+    rules[PENETRATION] = config.penetration
+    rules[UNKNOWN_DENSITY] = np.exp(-config.unknown_nats)
+    return rules

@@ -21,9 +21,8 @@ from cardbox_tracker.body.posture import NEAREST_M, TORSO_X
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.terms import Frame, Silence, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.cost.whole_body import Bodies, WholeBodyCost, iou_of
+from cardbox_tracker.estimation.cost.whole_body import Bodies, Ratings, WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.vision.camera import Camera
 
 # Distance for which the units of the priors of ``torso_x`` were chosen, m.
@@ -153,7 +152,7 @@ class MultiViewCost:
         ratings, joints_m = self.costs[0].arms(arms, arm)
         for number in self._others:
             ratings += self.costs[number].arms(arms, arm)[0]
-        ratings /= len(self.seeing)
+        self._divide(ratings)
         return ratings, joints_m
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
@@ -161,17 +160,21 @@ class MultiViewCost:
         joints = self.costs[0].joints(arms, arm)
         return self._sum(lambda cost, _: cost.arms_by_points(arms, joints, arm))
 
-    def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
+    def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
         """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""
-        ratings, points = self.costs[0].pairs(states)
+        found = self.costs[0].pairs(states, into)
         for number in self._others:
-            ratings += self.costs[number].pairs(self.to_views[number](states))[0]
-        ratings /= len(self.seeing)
-        return ratings, points
+            more = self.costs[number].pairs(self.to_views[number](states))
+            np.add(found.ratings, more.ratings, out=found.ratings)
+        self._divide(found.ratings)
+        return found
 
-    def bodies(self, states: FloatArray) -> Bodies:
-        """Rate whole states (N, 14), with the pixels of all cameras, and points of the first."""
-        ratings, costs_px, areas_px, points = self.costs[0].bodies(states)
+    def bodies(self, states: FloatArray, into: Ratings | None = None) -> Bodies:
+        """Rate whole states (N, 14), with the pixels of all cameras, and points of the first.
+
+        Ratings and points are written to ``into`` if it is given.
+        """
+        ratings, costs_px, areas_px, points = self.costs[0].bodies(states, into)
         if 0 not in self.seeing:
             costs_px, areas_px = np.zeros((2, len(states)))
         for number in self._others:
@@ -179,7 +182,7 @@ class MultiViewCost:
             ratings += more.ratings
             costs_px += more.costs_px
             areas_px += more.areas_px
-        ratings /= len(self.seeing)
+        self._divide(ratings)
         return Bodies(ratings, costs_px, areas_px, points)
 
     def point_costs(self, states: FloatArray) -> FloatArray:
@@ -204,9 +207,14 @@ class MultiViewCost:
         """Return the keypoints (6, 3) of a state (14,), metres in the first optical frame."""
         return self.costs[0].keypoints(state)
 
+    def _divide(self, ratings: FloatArray) -> None:
+        """Divide the sum over the cameras by their number."""
+        if len(self.seeing) > 1:
+            ratings /= len(self.seeing)
+
     def _sum(self, rate: Callable[[WholeBodyCost, ToView], FloatArray]) -> FloatArray:
         ratings = rate(self.costs[0], self.to_views[0])
         for number in self._others:
             ratings += rate(self.costs[number], self.to_views[number])
-        ratings /= len(self.seeing)
+        self._divide(ratings)
         return ratings

@@ -42,7 +42,7 @@ from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.cost.whole_body_kernels import Points, PointsTuple
+from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
@@ -66,6 +66,14 @@ class Bodies(NamedTuple):
     costs_px: FloatArray
     areas_px: FloatArray
     points: Points
+
+
+class Ratings(NamedTuple):
+    """Ratings (N,) and the fields of :class:`~.whole_body_kernels.Points` of N states."""
+
+    ratings: FloatArray
+    joints_m: FloatArray
+    keypoints_m: FloatArray
 
 
 class WholeBodyCost:
@@ -97,7 +105,7 @@ class WholeBodyCost:
         self.limits = state_limits(body.placement.distance_m)
         self.pitch_rad = camera.pitch_rad
         self.is_measured = body.source == MEASURED
-        self._rules = _rules(config)
+        self._rules = priors.rules_of(config)
         self._waist_m = float(body.size("waist_width"))
         self._gaussians = np.ascontiguousarray(load_gmm().T)
         self._beside_arm: int | None = None
@@ -233,18 +241,20 @@ class WholeBodyCost:
             ratings += self._scale * costs(SIDES[arm], arms)
         return ratings
 
-    def pairs(self, states: FloatArray) -> tuple[FloatArray, Points]:
+    def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
         """Rate whole states (N, 14), N > 0, with the trunk of :meth:`fix_torso`, as ``bodies``."""
-        ratings, points = np.empty(len(states)), _new_points(len(states))
+        ratings, joints_m, keypoints_m = into or _new_ratings(len(states))
+        points = joints_m, keypoints_m
         kernels.rate_pairs(states, self.body, *self._by_arms, ratings, points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
-        return ratings, Points(*points)
+        return Ratings(ratings, *points)
 
-    def bodies(self, states: FloatArray) -> Bodies:
-        """Rate whole states (N, 14)."""
-        ratings, costs_px, areas_px = np.empty((3, len(states)))
-        points, pixels = _new_points(len(states)), (costs_px, areas_px)
+    def bodies(self, states: FloatArray, into: Ratings | None = None) -> Bodies:
+        """Rate whole states (N, 14); ratings and points are written to ``into`` if it is given."""
+        ratings, joints_m, keypoints_m = into or _new_ratings(len(states))
+        costs_px, areas_px = pixels = np.empty(len(states)), np.empty(len(states))
+        points = joints_m, keypoints_m
         kernels.rate_bodies(states, self.body, *self._by_body, ratings, pixels, points)
         for term in self.terms:
             ratings += self._scale * term.postures(states)
@@ -278,31 +288,12 @@ class WholeBodyCost:
         return corners_m
 
 
-def _new_points(count: int) -> PointsTuple:
-    """Allocate the fields of :class:`~.whole_body_kernels.Points` for ``count`` states."""
-    return np.empty((count, 6, 3)), np.empty((count, 6, 3))
+def _new_ratings(count: int) -> Ratings:
+    """Allocate the ratings of ``count`` states."""
+    return Ratings(np.empty(count), np.empty((count, 6, 3)), np.empty((count, 6, 3)))
 
 
 def iou_of(silhouette_px: float, model_px: float, differing_px: float) -> float:
     """Return the intersection over union of silhouette and model from their numbers of pixels."""
     twice_either = float(silhouette_px + model_px + differing_px)
     return 2.0 * float(silhouette_px + model_px) / twice_either - 1.0 if twice_either else 0.0
-
-
-def _rules(config: WholeBodyCostConfig) -> FloatArray:
-    """Return the values of ``rules``, (15,), see :mod:`.body_priors`."""
-    rules = np.empty(priors.N_RULES)
-    rules[priors.WEIGHT] = config.weight
-    rules[priors.ROLL_UNIT] = np.radians(config.roll_deg)
-    rules[priors.PITCH_REST] = np.radians(config.pitch_rest_deg)
-    rules[priors.FORWARD_UNIT] = np.radians(config.pitch_forward_deg)
-    rules[priors.BACK_UNIT] = np.radians(config.pitch_back_deg)
-    rules[priors.YAW_UNIT] = np.radians(config.yaw_deg)
-    rules[priors.ANGLE_CAP] = config.angle_cap
-    rules[priors.X_STEP], rules[priors.Z_STEP] = config.x_step_m, config.z_step_m
-    rules[priors.STEP_CAP] = config.step_cap
-    rules[priors.X_HOME], rules[priors.Z_HOME] = config.x_home_m, config.z_home_m
-    rules[priors.HOME_CAP] = config.home_cap
-    rules[priors.PENETRATION] = config.penetration
-    rules[priors.UNKNOWN_DENSITY] = np.exp(-config.unknown_nats)
-    return rules

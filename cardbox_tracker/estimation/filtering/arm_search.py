@@ -69,19 +69,18 @@ class ArmSearch:
         seeing: Sequence[int] = cost.seeing
         count, rated = len(seeing), len(normals) // candidates
         ends = [candidates * (rated * part // count) for part in range(count + 1)]
-        arms = np.concatenate(
-            [
-                propose_arms(
-                    cost.to_views[number](pool),
-                    arm,
-                    self._config,
-                    cost.costs[number],
-                    (normals[begin:end], uniforms[begin:end]),
-                    count,
-                )
-                for number, begin, end in zip(seeing, ends, ends[1:], strict=False)
-            ]
-        )
+        proposed = [
+            propose_arms(
+                cost.to_views[number](pool),
+                arm,
+                self._config,
+                cost.costs[number],
+                (normals[begin:end], uniforms[begin:end]),
+                count,
+            )
+            for number, begin, end in zip(seeing, ends, ends[1:], strict=False)
+        ]
+        arms = proposed[0] if count == 1 else np.concatenate(proposed)
         return self.promising(arms, arm)
 
     def promising(self, arms: FloatArray, arm: int) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
-from cardbox_tracker.estimation.cost.whole_body_kernels import Points
+from cardbox_tracker.estimation.cost.whole_body import Ratings
 from cardbox_tracker.estimation.filtering import state_choice
 
 _SHAPES = (N_STATE,), (), (6, 3), (6, 3)
@@ -38,20 +38,20 @@ class RatedStates:
 
     def add(self, states: FloatArray) -> None:
         """Rate and add states (N, 14)."""
-        rated = self._cost.bodies(states)
-        self._add(states, rated.ratings, rated.points)
+        self._cost.bodies(states, self._place(states))
 
     def add_pairs(self, states: FloatArray) -> None:
         """Rate and add states (N, 14), N > 0, with the trunk that the cost has fixed."""
-        self._add(states, *self._cost.pairs(states))
+        self._cost.pairs(states, self._place(states))
 
-    def _add(self, states: FloatArray, ratings: FloatArray, points: Points) -> None:
+    def _place(self, states: FloatArray) -> Ratings:
+        """Add states (N, 14) and return the memory of their ratings."""
         begin, count = len(self.states), len(self.states) + len(states)
         while count > len(self._storage[0]):
             self._storage = [np.concatenate([stored, stored]) for stored in self._storage]
-        for stored, more in zip(self._storage, (states, ratings, *points), strict=True):
-            stored[begin:count] = more
         self._use(count)
+        self.states[begin:] = states
+        return Ratings(self.ratings[begin:], self.joints_m[begin:], self.keypoints_m[begin:])
 
     def best(self, count: int) -> FloatArray:
         """Return the best ``count`` states, (count, 14), best first; all if there are fewer."""
