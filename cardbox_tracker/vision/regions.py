@@ -144,14 +144,18 @@ def _root(parents: Any, run: Any) -> Any:
 @_inline
 def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
     """Return the first column of row ``v`` from ``u`` on that is not of ``colour``."""
-    width = image.shape[1]
-    word = np.uint64(colour) * _EIGHT
-    while u < width and image[v, u] == colour:
-        u += 1
-        if u % 8 == 0:
-            while u // 8 < words.shape[1] and words[v, u // 8] == word:
-                u += 8
-    return u
+    # With unsigned indices, numba compiles no code for negative ones.
+    row, column, width = np.uint64(v), np.uint64(u), np.uint64(image.shape[1])
+    word, one, three = np.uint64(colour) * _EIGHT, np.uint64(1), np.uint64(3)
+    last = np.uint64(words.shape[1])
+    while column < width and image[row, column] == colour:
+        column += one
+        if column & np.uint64(7) == np.uint64(0):
+            w = column >> three
+            while w < last and words[row, w] == word:
+                w += one
+            column = w << three if last > np.uint64(0) else column
+    return np.int64(column)
 
 
 @njit(cache=True, nogil=True)

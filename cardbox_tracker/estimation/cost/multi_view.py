@@ -93,7 +93,7 @@ class MultiViewCost:
                 cost.terms = ()
                 continue
             # The pixels that count; those of the legs of a further camera's silhouette do not.
-            frame = replace(frames[number], foreground_px=cost.silhouette_px)
+            frame = frames[number].with_foreground(cost.silhouette_px)
             observed = (term.observe(frame) for term in counting)
             cost.terms = tuple(one for one in observed if not isinstance(one, Silence))
 

@@ -229,3 +229,35 @@ def solve_equations(
         for j in range(N_STATE):
             trial = state[j] + SHARES[number] * right[j]
             costs[number] += ((trial - begin[j]) / stddev[j]) ** 2
+
+
+@kernel
+def step(state: Floats, change: Floats, costs: Floats) -> None:
+    """Add the share of ``change`` (14,) with the least of ``costs``, one for each of ``SHARES``."""
+    best = 0
+    for number in range(1, len(SHARES)):
+        if costs[number] < costs[best]:
+            best = number
+    for j in range(N_STATE):
+        state[j] += SHARES[best] * change[j]
+
+
+@kernel
+def smoothed(
+    state: Floats, fitted: Floats, correction: Floats, kept: float, low: Floats, high: Floats
+) -> Floats:
+    """Return ``state`` (14,) with the smoothed correction, within the limits ``low``, ``high``.
+
+    ``correction`` (14,) becomes ``kept`` of itself, and ``fitted`` - ``state`` for the rest.
+    """
+    moved = np.empty(N_STATE)
+    for j in range(N_STATE):
+        correction[j] = kept * correction[j] + (1.0 - kept) * (fitted[j] - state[j])
+        value = state[j] + correction[j]
+        # A value that is not a number stays one.
+        if value < low[j]:
+            value = low[j]
+        elif value > high[j]:
+            value = high[j]
+        moved[j] = value
+    return moved

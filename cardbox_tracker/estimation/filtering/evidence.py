@@ -33,8 +33,8 @@ def evidence_in(
     mean, stddev = result
     differing_px, area_px = drawn_px
     pixels = loss.Pixels(cost.silhouette_px, cost.frontal_px_at(mean), differing_px, area_px)
-    best = states[int(np.argmin(ratings))]
+    best = int(np.argmin(ratings))
     # The coefficients belong to ratings without points.
-    rating = float(ratings.min() - cost.point_costs(best[None])[0])
+    rating = float(ratings[best] - cost.point_costs(states[best : best + 1])[0])
     arm_m = sum(spreads_m) / len(spreads_m)
     return loss.evidence_of(pixels, rating, arm_m, stddev, mean, age)

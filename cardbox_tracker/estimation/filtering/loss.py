@@ -86,6 +86,7 @@ COEFFICIENTS: Mapping[str, float] = MappingProxyType(
     }
 )
 """Coefficients of the logistic regression by feature, in the order of :func:`features_of_loss`."""
+_COEFFICIENTS = tuple(COEFFICIENTS.values())
 _AREA_LIMITS = (0.1, 3.0)
 _PRIOR_LIMITS = (-0.2, 0.3)
 _FRESH_FRAMES = 15.0
@@ -151,27 +152,32 @@ def freshness(evidence: Evidence) -> float:
 
 def features_of_loss(evidence: Evidence) -> dict[str, float]:
     """Return the features of the logistic regression by name, in the order of the coefficients."""
+    return dict(zip(COEFFICIENTS, _values_of(evidence), strict=True))
+
+
+def _values_of(evidence: Evidence) -> tuple[float, ...]:
+    """Return the features in the order of the coefficients."""
     area = log_area(evidence)
-    return {
-        "residual": evidence.residual,
-        "left_over": evidence.left_over,
-        "outside": evidence.outside,
-        "log_area": area,
-        "log_area_size": abs(area),
-        "prior": min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1]),
-        "arm_m": evidence.arm_m,
-        "torso_x_stddev": float(evidence.stddev[TORSO_X]),
-        "yaw_size": abs(float(evidence.mean[YAW])),
-        "pitch_size": abs(float(evidence.mean[PITCH])),
-        "freshness": freshness(evidence),
-    }
+    return (
+        evidence.residual,
+        evidence.left_over,
+        evidence.outside,
+        area,
+        abs(area),
+        min(max(evidence.prior, _PRIOR_LIMITS[0]), _PRIOR_LIMITS[1]),
+        evidence.arm_m,
+        float(evidence.stddev[TORSO_X]),
+        abs(float(evidence.mean[YAW])),
+        abs(float(evidence.mean[PITCH])),
+        freshness(evidence),
+    )
 
 
 def chance_of_loss(evidence: Evidence) -> float:
     """Return the probability that the keypoints are wrong by more than 30 cm on average."""
     logit = INTERCEPT
-    for name, value in features_of_loss(evidence).items():
-        logit += COEFFICIENTS[name] * value
+    for coefficient, value in zip(_COEFFICIENTS, _values_of(evidence), strict=True):
+        logit += coefficient * value
     return 1.0 / (1.0 + exp(-logit))
 
 

@@ -27,7 +27,9 @@ from cardbox_tracker.estimation.cost.outline_fit_kernels import (
     SHARES,
     add_equations,
     costs_along,
+    smoothed,
     solve_equations,
+    step,
 )
 from cardbox_tracker.estimation.cost.outline_points import POINTS
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette
@@ -129,12 +131,11 @@ class OutlineFit:
         """
         if self._steps == 0 or frames[0].depth_m is not None:
             return state.copy()
-        correction = self.fitted(frames, state, self._steps) - state
-        before = correction if self._correction is None else self._correction
-        self._correction = _KEPT * before + (1.0 - _KEPT) * correction
-        clipped: FloatArray = np.minimum(
-            np.maximum(state + self._correction, self._low), self._high
-        )
+        fitted = self.fitted(frames, state, self._steps)
+        if self._correction is None:
+            self._correction = fitted - state
+        limits = self._low, self._high
+        clipped: FloatArray = smoothed(state, fitted, self._correction, _KEPT, *limits)
         return clipped
 
     def different(self, frames: Sequence[Frame], rated: RatedStates) -> FloatArray:
@@ -165,7 +166,7 @@ class OutlineFit:
             solve_equations(fitted, state, _STDDEV, matrix, change, costs)
             for lens in self._looking:
                 lens.add_costs(fitted, change, costs)
-            fitted += SHARES[int(np.argmin(costs))] * change
+            step(fitted, change, costs)
         return fitted
 
 
