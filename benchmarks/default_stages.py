@@ -23,7 +23,7 @@ WHOLE = "the whole frame"
 # No part contains another one, so that the rest is the difference to the whole.
 _PARTS: dict[str, tuple[Any, str]] = {
     "region of the person": (Tracker, "_frames_of"),
-    "running sums, presence": (WholeBodyFilter, "look"),
+    "silhouette as bits, presence": (WholeBodyFilter, "look"),
     "place of the person": (WholeBodyFilter, "_observe"),
     "search of torsos": (WholeBodyFilter, "_torsos"),
     "search of both arms": (ArmSearch, "__call__"),

@@ -157,8 +157,12 @@ class MultiViewCost:
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
         """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors."""
-        joints = self.costs[0].joints(arms, arm)
-        return self._sum(lambda cost, _: cost.arms_by_points(arms, joints, arm))
+        first, joints = self.costs[0], self.costs[0].joints(arms, arm)
+        ratings = first.arms_by_points(arms, joints, arm)
+        for number in self._others:
+            ratings += self.costs[number].arms_by_points(arms, joints, arm)
+        self._divide(ratings)
+        return ratings
 
     def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
         """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""

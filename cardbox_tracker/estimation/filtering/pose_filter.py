@@ -68,12 +68,13 @@ class Fit:
     @property
     def is_finite(self) -> bool:
         """Whether all values are finite."""
-        values = (self.posture, self.posture_stddev, self.keypoints_m, self.iou)
-        # A sum of squares is only finite if all summands are.
-        return all(
-            value is None or isfinite(np.vdot(value, value))
-            for value in (*values, self.offset_m, self.offset_stddev_m, self.keypoint_chances)
-        )
+        values = self.posture, self.posture_stddev, self.keypoints_m.ravel()
+        others = self.offset_m, self.offset_stddev_m, self.keypoint_chances
+        # A sum is only finite if all summands are; for few numbers, Python adds them fastest.
+        total = self.iou
+        for value in (*values, *others):
+            total += 0.0 if value is None else sum(value.tolist())
+        return isfinite(total)
 
 
 class PoseFilter(Protocol):

@@ -32,9 +32,9 @@ class RatedStates:
         self._use(0)
 
     def _use(self, count: int) -> None:
-        self.states, self.ratings, self.joints_m, self.keypoints_m = (
-            stored[:count] for stored in self._storage
-        )
+        states, ratings, joints_m, keypoints_m = self._storage
+        self.states, self.ratings = states[:count], ratings[:count]
+        self.joints_m, self.keypoints_m = joints_m[:count], keypoints_m[:count]
 
     def add(self, states: FloatArray) -> None:
         """Rate and add states (N, 14)."""

@@ -1,11 +1,14 @@
-"""Several terms as one: costs add up, whatever is asked."""
+"""Several terms as one: costs add up, whatever is asked; frames with other foreground."""
 
 from __future__ import annotations
+
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.estimation.cost.terms import ArmCosts, SumOfTerms, TorsoCosts
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, SumOfTerms, TorsoCosts
 
 Array = NDArray[np.float64]
 
@@ -55,3 +58,20 @@ def test_particles_are_not_written_to() -> None:
     total.postures(POSTURES)
     total.torsos_beside(None)(POSTURES[:, :4])
     np.testing.assert_array_equal(POSTURES, before)
+
+
+def test_a_frame_with_other_foreground_is_the_same_but_for_that() -> None:
+    image = np.zeros((4, 6), np.uint8)
+    points = ImagePoints(np.zeros((len(POINT_NAMES), 2)), np.ones(len(POINT_NAMES)))
+    depth_m = np.ones((4, 6), np.float32)
+    frame = Frame(image, 3, 7, image + 1, np.zeros(14), depth_m, 0.04, 123, points)
+    other = frame.with_foreground(5)
+    assert other.foreground_px == 5
+    for name in (field.name for field in fields(Frame) if field.name != "foreground_px"):
+        assert getattr(other, name) is getattr(frame, name)
+        assert getattr(frame, name) is not field_default(name)
+
+
+def field_default(name: str) -> object:
+    """The default of a field of frames, which would hide that it is left out."""
+    return next(field.default for field in fields(Frame) if field.name == name)
