@@ -91,34 +91,39 @@ def _place(work: Workspace, has_cuts: bool, width: int, masks: Masks) -> None:
 
 
 @kernel
-def _add(sides: Whole, k: _Index, extent: Counts, words: Counts, drawn: Drawn) -> None:
-    """Add patch ``k`` with its ``extent`` (2,) and its columns of ``words`` (2,)."""
-    first, count = np.int32(extent[0]), np.uint32(extent[1] - extent[0])
-    begin, end = extent[0] // ROWS, _padded(extent[1]) // ROWS
-    for w in range(_index(words[0]), _index(words[1])):
-        column = np.int32(PIXELS) * np.int32(w)
-        for group in range(_index(begin), _index(end)):
-            # A constant number of rows is vectorized without a remainder.
-            for i in range(ROWS):
-                v = group * _index(ROWS) + _index(i)
-                one = left_of(sides[k, 0, v], column)
-                other = left_of(sides[k, 1, v], column)
-                # The sides are in any order, and those of other rows are undefined.
-                is_inside = np.uint32(np.int32(v) - first) < count
-                added = np.uint32(one ^ other) if is_inside else np.uint32(0)
-                drawn[w, v] = np.uint32(drawn[w, v] | added)
+def _add(sides: Whole, extent: Counts, words_of: Counts, drawn: Drawn) -> None:
+    """Add all patches with their ``extent`` (K, 2) and columns of words (K, 2)."""
+    for k in range(_index(extent.shape[0])):
+        first, count = np.int32(extent[k, 0]), np.uint32(extent[k, 1] - extent[k, 0])
+        begin, end = extent[k, 0] // ROWS, _padded(extent[k, 1]) // ROWS
+        for w in range(_index(words_of[k, 0]), _index(words_of[k, 1])):
+            column = np.int32(PIXELS) * np.int32(w)
+            for group in range(_index(begin), _index(end)):
+                # A constant number of rows is vectorized without a remainder.
+                for i in range(ROWS):
+                    v = group * _index(ROWS) + _index(i)
+                    one = left_of(sides[k, 0, v], column)
+                    other = left_of(sides[k, 1, v], column)
+                    # The sides are in any order, and those of other rows are undefined.
+                    is_inside = np.uint32(np.int32(v) - first) < count
+                    added = np.uint32(one ^ other) if is_inside else np.uint32(0)
+                    drawn[w, v] = np.uint32(drawn[w, v] | added)
 
 
 @kernel
-def _count(drawn: Drawn, w: _Index, rows: Counts, planes: Planes) -> tuple[int, int]:
-    """Return drawn pixels and their sum of (1 - 2 f), in ``rows`` (2,) of a column of words."""
-    area, counted, seen = np.int32(0), np.int32(0), np.int32(0)
-    for v in range(_index(rows[0]), _index(rows[1])):
-        word = drawn[w, v]
-        area = np.int32(area + count_bits(word))
-        counted = np.int32(counted + count_bits(np.uint32(word & planes[COUNTED, w, v])))
-        seen = np.int32(seen + count_bits(np.uint32(word & planes[FOREGROUND, w, v])))
-    return int(area), int(counted) - 2 * int(seen)
+def _count(drawn: Drawn, rows_of: Counts, planes: Planes) -> tuple[int, int]:
+    """Return drawn pixels and their sum of (1 - 2 f)."""
+    pixels = gain = 0
+    for w in range(_index(drawn.shape[0])):
+        area, counted, seen = np.int32(0), np.int32(0), np.int32(0)
+        for v in range(_index(rows_of[w, 0]), _index(rows_of[w, 1])):
+            word = drawn[w, v]
+            area = np.int32(area + count_bits(word))
+            counted = np.int32(counted + count_bits(np.uint32(word & planes[COUNTED, w, v])))
+            seen = np.int32(seen + count_bits(np.uint32(word & planes[FOREGROUND, w, v])))
+        pixels += int(area)
+        gain += int(counted) - 2 * int(seen)
+    return pixels, gain
 
 
 @inlined_kernel
@@ -135,16 +140,8 @@ def sum_masks(
         masks: scratch arrays for as many patches.
     """
     _place(work, has_cuts, width, masks)
-    drawn, words_of, rows_of = masks.drawn, masks.words_of, masks.rows_of
-    for k in range(_index(work.extent.shape[0])):
-        if words_of[k, 0] < words_of[k, 1]:
-            _add(work.sides, k, work.extent[k], words_of[k], drawn)
-    gain = area = 0
-    for w in range(_index(drawn.shape[0])):
-        if rows_of[w, 0] < rows_of[w, 1]:
-            pixels, change = _count(drawn, w, rows_of[w], planes)
-            area += pixels
-            gain += change
+    _add(work.sides, work.extent, masks.words_of, masks.drawn)
+    area, gain = _count(masks.drawn, masks.rows_of, planes)
     return gain, area
 
 
