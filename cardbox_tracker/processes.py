@@ -41,7 +41,7 @@ def results_of(
         jobs: number of processes; with 1, the calls are done in this process.
 
     Raises:
-        CardboxError: the iterator finds that a process ended unexpectedly.
+        CardboxError: a process ended unexpectedly; at the beginning, or from the iterator.
     """
     from joblib import Parallel, delayed, parallel_config
 
@@ -58,7 +58,8 @@ def results_of(
             pre_dispatch="2*n_jobs",
             max_nbytes=None,
         )
-        with interrupts.withheld():
+        # A process may already end while others still get their calls.
+        with interrupts.withheld(), _told():
             results = parallel(delayed(function)(argument) for argument in arguments)
             time.sleep(_TAKEN_UP_S)
     try:
@@ -71,8 +72,15 @@ def results_of(
 
 
 def _checked(results: Iterator[R]) -> Iterator[R]:
-    try:
+    with _told():
         yield from results
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """Context in which the unexpected end of a process is told in words."""
+    try:
+        yield
     except BrokenExecutor:
         raise CardboxError(
             "a process ended unexpectedly, perhaps because the memory was full; give a smaller "

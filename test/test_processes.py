@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -38,6 +39,25 @@ def test_a_killed_process_is_told() -> None:
     with (
         pytest.raises(CardboxError, match=r"ended unexpectedly.*--jobs"),
         results_of(os._exit, [1, 1], 2) as found,
+    ):
+        list(found)
+    with results_of(math.factorial, [3, 3], 2) as found:
+        assert list(found) == [6, 6]
+
+
+class Late(list[int]):
+    """Arguments of which the last ones come when the first calls have ended."""
+
+    def __iter__(self) -> Iterator[int]:
+        yield from self[:2]
+        time.sleep(1.0)
+        yield from self[2:]
+
+
+def test_a_process_that_is_killed_while_others_get_their_calls_is_told() -> None:
+    with (
+        pytest.raises(CardboxError, match=r"ended unexpectedly.*--jobs"),
+        results_of(os._exit, Late([1, 1, 1, 1]), 2) as found,
     ):
         list(found)
     with results_of(math.factorial, [3, 3], 2) as found:
