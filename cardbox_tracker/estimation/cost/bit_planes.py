@@ -3,7 +3,7 @@
 A word has 31 pixels of one row, so that a shift by the number of pixels before a column is always
 below 32; its lowest bit is the left pixel. The words of one column of words are consecutive in
 memory, so that loops over rows can be vectorized; their rows are padded to a multiple of 16 for the
-same reason. Both planes need a sixth of the memory of the silhouette's bytes.
+same reason. Both planes need a quarter of the memory of the silhouette.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes
         pixels = below(np.int32(PIXELS if column < _index(last) else width - PIXELS * last))
         for v in range(_index(rows)):
             planes[COUNTED, column, v] = pixels
-    # Eight pixels of a row per byte; a word is a part of five bytes.
+    # Eight pixels of a row in each number; a word is a part of five numbers.
     eights = np.zeros((width + 7) // 8 + 5, np.uint64)
     total = 0
     for v in range(_index(rows)):
@@ -110,10 +110,10 @@ def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes
                 eights[u >> _index(3)] |= bit
         for w in range(_index(last + 1)):
             first = w * _index(PIXELS)
-            byte = first >> _index(3)
-            five = eights[byte] | eights[byte + _index(1)] << _index(8)
-            five |= eights[byte + _index(2)] << _index(16) | eights[byte + _index(3)] << _index(24)
-            five |= eights[byte + _index(4)] << _index(32)
+            at = first >> _index(3)
+            five = eights[at] | eights[at + _index(1)] << _index(8)
+            five |= eights[at + _index(2)] << _index(16) | eights[at + _index(3)] << _index(24)
+            five |= eights[at + _index(4)] << _index(32)
             planes[FOREGROUND, w, v] = (five >> (first & _index(7))) & _index(2**PIXELS - 1)
     for column in range(_index(last + 1)):
         for v in range(_index(rows)):

@@ -157,21 +157,16 @@ class MultiViewCost:
 
     def arms_by_points(self, arms: FloatArray, arm: int) -> FloatArray:
         """Return approximate ratings (N,) of arms (N, 4), 0 left or 1 right, without priors."""
-        first, joints = self.costs[0], self.costs[0].joints(arms, arm)
-        ratings = first.arms_by_points(arms, joints, arm)
-        for number in self._others:
-            ratings += self.costs[number].arms_by_points(arms, joints, arm)
-        self._divide(ratings)
-        return ratings
+        joints = self.costs[0].joints(arms, arm)
+        return self._sum(lambda cost, _: cost.arms_by_points(arms, joints, arm))
 
     def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
         """Rate whole states (N, 14), N > 0, with the fixed torso; as :meth:`bodies`, but faster."""
-        found = self.costs[0].pairs(states, into)
+        ratings, *points = self.costs[0].pairs(states, into)
         for number in self._others:
-            more = self.costs[number].pairs(self.to_views[number](states))
-            np.add(found.ratings, more.ratings, out=found.ratings)
-        self._divide(found.ratings)
-        return found
+            ratings += self.costs[number].pairs(self.to_views[number](states)).ratings
+        self._divide(ratings)
+        return Ratings(ratings, *points)
 
     def bodies(self, states: FloatArray, into: Ratings | None = None) -> Bodies:
         """Rate whole states (N, 14), with the pixels of all cameras, and points of the first.
