@@ -12,6 +12,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from cardbox_tracker import interrupts
 from cardbox_tracker.commands.recording_options import options_of
 from cardbox_tracker.commands.tracking import ResultFiles, check_person, track_inputs
 from cardbox_tracker.errors import CardboxError
@@ -208,10 +209,12 @@ def _track_all(
             results_of(track_job, prepared, count) as outcomes,
         ):
             for job, row, lines in outcomes:
-                if row.status == TRACKED:
-                    _publish(job, output)
-                rows[job.name], remarks[job.name] = row, lines
-                write_rows(output / SUMMARY, rows.values())
+                # Results without their row would be tracked again.
+                with interrupts.withheld():
+                    if row.status == TRACKED:
+                        _publish(job, output)
+                    rows[job.name], remarks[job.name] = row, lines
+                    write_rows(output / SUMMARY, rows.values())
         show(1.0)
     return remarks
 

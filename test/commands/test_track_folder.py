@@ -236,6 +236,21 @@ def test_an_interrupted_run_leaves_nothing_half_done(
     assert track() == sorted({"a", "b", "c"} - set(done))
 
 
+def test_a_published_result_has_its_row_after_ctrl_c(
+    track: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish = track_folder._publish
+
+    def interrupted(*given: Any) -> None:
+        publish(*given)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(track_folder, "_publish", interrupted)
+    (first,) = track(code=130)
+    assert sorted(results(tmp_path / "out")) == [SUMMARY, f"{first}.csv"]
+    assert list(rows(tmp_path / "out")) == [first]
+
+
 def test_what_is_refused(track: Callable, tmp_path: Path, files: Path, cardbox: Callable) -> None:
     films = tmp_path / "films"
     (tmp_path / "other").mkdir()
@@ -279,7 +294,7 @@ def test_ctrl_c_ends_all_processes_without_a_traceback(files: Path, tmp_path: Pa
         command + given, stderr=subprocess.PIPE, start_new_session=True, text=True
     ) as process:
         # The first result shows that others are being tracked.
-        while not list(out.glob("*.csv"))[1:]:
+        while not list(out.glob("[0-9].csv")):
             assert process.poll() is None
             time.sleep(0.02)
         # A terminal sends it to all processes.
