@@ -107,7 +107,9 @@ def test_a_raised_arm_takes_its_patches_along() -> None:
 def test_every_patch_stays_plane_and_keeps_its_edges(posture: np.ndarray) -> None:
     patches = cardbox_patches(BODY, posture)
     sides = patches[:, 1:] - patches[:, :1]
-    np.testing.assert_allclose(np.linalg.det(sides), 0, atol=1e-12)
+    # numpy's determinant divides by zero where an angle is nearly the least number.
+    volumes = np.sum(np.cross(sides[:, 0], sides[:, 1]) * sides[:, 2], axis=-1)
+    np.testing.assert_allclose(volumes, 0, atol=1e-12)
     np.testing.assert_allclose(edges_m(patches), edges_m(cardbox_patches(BODY, REST)), atol=1e-12)
 
 
