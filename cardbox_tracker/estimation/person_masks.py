@@ -6,15 +6,23 @@ The masks are drawn on a grid of square cells, about 80 in a row of the image.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
+from cardbox_tracker.estimation.person_points import (
+    HEAD_CENTRE,
+    HIP,
+    LEFT,
+    NECK,
+    RIGHT,
+    PersonPoints,
+)
 from cardbox_tracker.vision.camera import Camera
 
 Mask = NDArray[np.uint8]
@@ -28,13 +36,8 @@ _CLOTHES_M = 0.02
 _BAND_M = 0.1
 # Distance from the fist to the fingertips, plus the error of keypoints.
 _BEYOND_HAND_M = 0.25
-# Length of the fingers in forearm lengths.
-_FINGERS = 0.15
-_NEAREST_M = 0.2
 # Limit of the dilation in cells.
 _WIDEST = 40
-# Indices of the points of a posture; an arm has three points.
-_HIP, _NECK, _HEAD, _LEFT, _RIGHT = 0, 1, 2, 3, 6
 # Gap and width of the background ring around head and shoulders.
 _GAP_M, _RING_M = 0.05, 0.2
 
@@ -45,17 +48,21 @@ class PersonMasks:
 
     Attributes:
         core: the body in the last posture.
-        band: all cells within 10 cm of the body.
         near: cells that the person can occupy in the next frame.
         reach: cells that the arms can reach.
         hip: column and row of mid-hip, cells.
+        cells_per_m: scale at the hips.
     """
 
     core: Mask
-    band: Mask
     near: Mask
     reach: Mask
     hip: tuple[float, float]
+    cells_per_m: float
+
+    def band(self) -> Mask:
+        """Return all cells (h, w) within 10 cm of the body, 0 or 1."""
+        return grown(self.core, self.cells_per_m * _BAND_M)
 
 
 class PersonDrawer:
@@ -83,6 +90,7 @@ class PersonDrawer:
             cy=(camera.cy + 0.5) / cell - 0.5,
         )
         self.cells_per_m = self._camera.fx / body.placement.distance_m
+        self._places = PersonPoints(body, self._camera)
         self.front = body.reference_state()
 
     def masks(self, posture: FloatArray, near_m: float) -> PersonMasks:
@@ -98,21 +106,21 @@ class PersonDrawer:
         self._draw_torso(core, points, _CLOTHES_M)
         size = self._body.size
         thick_m = size("upper_arm_width") + 2 * _CLOTHES_M
-        for first in (_LEFT, _RIGHT):
+        for first in (LEFT, RIGHT):
             for start in (first, first + 1):
                 nearest = max(points[start][2], points[start + 1][2])
                 _line(core, points[start], points[start + 1], nearest * thick_m)
-        scale = points[_HIP][2]
-        band, near = (_dilated(core, scale * grow_m) for grow_m in (_BAND_M, near_m))
+        scale = points[HIP][2]
+        near = grown(core, scale * near_m)
         reach = near.copy()
         length_m = size("upper_arm_length") + size("forearm_length") + _BEYOND_HAND_M
-        for first in (_LEFT, _RIGHT):
+        for first in (LEFT, RIGHT):
             depth_m = self._camera.fx / points[first][2]
             radius_m = min(length_m, 0.9 * depth_m)
             # The silhouette of a sphere is wider than a disc of its radius.
             radius_m *= depth_m / float(np.sqrt(depth_m**2 - radius_m**2))
             _disc(reach, points[first], radius_m * points[first][2])
-        return PersonMasks(core, band, near, reach, points[_HIP][:2])
+        return PersonMasks(core, near, reach, points[HIP][:2], scale)
 
     def head_and_shoulders(self) -> tuple[list[NDArray[np.float32]], tuple[int, int]]:
         """Return a head kernel, a trunk kernel, and column and row of the hips in them.
@@ -127,7 +135,7 @@ class PersonDrawer:
         for mask, grow_m in ((gap, _GAP_M), (ring, _RING_M)):
             self._draw_head(mask, points, grow_m)
             self._draw_torso(mask, points, grow_m)
-        hip, shoulder = points[_HIP], points[_LEFT]
+        hip, shoulder = points[HIP], points[LEFT]
         rows = np.arange(self.shape[0])
         trunk[rows > hip[1]] = 0
         around = (ring > 0) & (gap == 0) & (rows < shoulder[1])[:, None]
@@ -145,33 +153,18 @@ class PersonDrawer:
 
     def _points(self, posture: FloatArray) -> list[Point]:
         """Return hip, neck, head, then shoulder, elbow and fingertips of each arm."""
-        place, camera = self._body.placement, self._camera
-        x_m, z_m = posture[PLACE].tolist() or (0.0, 0.0)
-        moved = self._body.with_values(
-            distance_m=max(place.distance_m - x_m, _NEAREST_M),
-            hip_height_m=place.hip_height_m + z_m,
-        )
-        frames = forward_kinematics(moved, posture[POSTURE])
-        points_m = [frames.hip, frames.neck, frames.head]
-        for arm in (frames.left, frames.right):
-            tips = arm.hand + _FINGERS * (arm.hand - arm.elbow)
-            points_m += [arm.shoulder, arm.elbow, tips]
-        optical_m = camera.reference_to_optical(np.array(points_m))
-        scales = camera.fx / np.maximum(optical_m[:, 2], _NEAREST_M)
-        columns = scales * optical_m[:, 0] + camera.cx
-        rows = camera.fy / camera.fx * scales * optical_m[:, 1] + camera.cy
-        table: list[list[float]] = np.stack([columns, rows, scales], axis=1).tolist()
-        return [(column, row, scale) for column, row, scale in table]
+        points: list[list[float]] = self._places.of(posture).tolist()
+        return [(column, row, scale) for column, row, scale in points]
 
     def _draw_head(self, mask: Mask, points: list[Point], grow_m: float) -> None:
         """Draw head and neck, widened by ``grow_m``."""
-        size, neck, head = self._body.size, points[_NECK], points[_HEAD]
+        size, neck, head = self._body.size, points[NECK], points[HEAD_CENTRE]
         _line(mask, neck, head, 2 * head[2] * (0.3 * size("head_width") + grow_m))
         _disc(mask, head, head[2] * (0.5 * size("head_height") + grow_m))
 
     def _draw_torso(self, mask: Mask, points: list[Point], grow_m: float) -> None:
         """Draw the torso and the region below the hips, widened by ``grow_m``."""
-        size, hip, neck = self._body.size, points[_HIP], points[_NECK]
+        size, hip, neck = self._body.size, points[HIP], points[NECK]
         half_m = 0.5 * max(size("torso_top_width"), size("torso_bottom_width"))
         wide = 2 * hip[2] * (half_m + grow_m)
         floor = (hip[0], self.shape[0] + wide, hip[2])
@@ -179,20 +172,62 @@ class PersonDrawer:
         _line(mask, middle, hip, wide)
         _line(mask, hip, floor, wide)
         arm = 2 * hip[2] * (0.5 * size("upper_arm_width") + grow_m)
-        _line(mask, points[_LEFT], points[_RIGHT], arm)
-        for shoulder in (points[_LEFT], points[_RIGHT]):
+        _line(mask, points[LEFT], points[RIGHT], arm)
+        for shoulder in (points[LEFT], points[RIGHT]):
             _line(mask, shoulder, hip, 2 * hip[2] * (0.5 * half_m + grow_m))
 
 
-def _dilated(mask: Mask, cells: float) -> Mask:
-    wide = 2 * max(0, min(round(cells), _WIDEST)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
-    return np.asarray(cv2.dilate(mask, kernel), np.uint8)
+def grown(mask: Mask, cells: float) -> Mask:
+    """Return a mask (h, w), 0 or 1, dilated by a disc whose radius is ``cells``, at most 40."""
+    radius = max(0, min(round(cells), _WIDEST))
+    found: Mask = np.zeros_like(mask)
+    nearest = np.empty_like(mask)
+    _dilate(mask, _reaches_of(radius), nearest, found)
+    return found
+
+
+@cache
+def _reaches_of(radius: int) -> NDArray[np.uint8]:
+    """Return how far a disc of 2 ``radius`` + 1 rows reaches to either side, in cells."""
+    wide = 2 * radius + 1
+    disc = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide)))
+    reaches: NDArray[np.uint8] = (np.count_nonzero(disc, axis=1) // 2).astype(np.uint8)
+    return reaches
+
+
+@kernel
+def _dilate(mask: Mask, reaches: NDArray[np.uint8], nearest: Mask, found: Mask) -> None:
+    """Add the dilation of ``mask`` (h, w) to ``found``; ``nearest`` (h, w) is scratch memory.
+
+    ``nearest`` becomes the distance of each cell to the nearest one of its row that is 1.
+    """
+    height, width = mask.shape
+    radius = len(reaches) // 2
+    far = np.uint8(255)
+    first, last = height, -1
+    for v in range(height):
+        away, is_empty = far, True
+        for u in range(width):
+            away = np.uint8(0) if mask[v, u] else away + np.uint8(away < far)
+            nearest[v, u] = away
+            is_empty &= mask[v, u] == 0
+        if is_empty:
+            continue
+        first, last = min(first, v), v
+        for u in range(width - 2, -1, -1):
+            nearest[v, u] = min(nearest[v, u], nearest[v, u + 1] + np.uint8(1))
+    for v in range(first, last + 1):
+        if nearest[v, 0] == far:
+            continue
+        for i in range(max(radius - v, 0), min(radius + height - v, len(reaches))):
+            reach, row = reaches[i], v + i - radius
+            for u in range(width):
+                found[row, u] |= np.uint8(nearest[v, u] <= reach)
 
 
 def _whole(place: Point) -> tuple[int, int]:
-    column, row = (round(min(max(value, -1000.0), 1000.0)) for value in place[:2])
-    return column, row
+    column, row, _ = place
+    return round(min(max(column, -1000.0), 1000.0)), round(min(max(row, -1000.0), 1000.0))
 
 
 def _line(mask: Mask, start: Point, end: Point, wide: float) -> None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import njit
-from cardbox_tracker.estimation.person_masks import Mask, PersonDrawer, PersonMasks
+from cardbox_tracker.estimation.person_masks import Mask, PersonDrawer, PersonMasks, grown
 from cardbox_tracker.estimation.still_things import CHANGED, SAME, THING, StillThings
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
@@ -51,9 +51,6 @@ _PER_METRE = 0.1
 # Area of a hand with forearm, m². A region of this size can belong to the person while the rest
 # of the arm is not visible.
 _HAND_M2 = 0.04
-# Bits of a cell's code.
-_CORE, _NEAR, _BEFORE, _OTHER, _STILL = 1, 2, 4, 8, 16
-_BITS = 5
 _BORDER = cv2.BORDER_REPLICATE
 
 
@@ -70,11 +67,11 @@ class PersonRegion:
         self._cell_px = cell = self._drawer.cell_px
         self._hand_px = _HAND_M2 * (cell * per_m) ** 2
         self._step = max(1.0, _STEP_M * per_m)
-        wide = 2 * max(1, round(_NEAR_M * per_m)) + 1
-        self._around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+        self._around = max(1.0, _NEAR_M * per_m)
         self._large_px = _LARGE * cell**2 * np.count_nonzero(self._start.core)
         # Cells of the person and of other objects in the previous frame.
-        self._person: Mask = np.zeros(self._drawer.shape, np.uint8)
+        self._none: Mask = np.zeros(self._drawer.shape, np.uint8)
+        self._person = self._none
         self._other: Mask | None = None
         self._things = StillThings()
 
@@ -139,14 +136,13 @@ class PersonRegion:
             fit: score of head and shoulders; None if they were not searched.
             same: pixels (H, W) of objects at rest; None without an image.
         """
-        before = np.asarray(cv2.dilate(self._person, self._around), np.uint8) & masks.reach
-        other = np.zeros_like(before) if self._other is None else self._other
-        near = masks.near & (1 - other)
-        codes = _CORE * masks.core + _NEAR * near + _BEFORE * before + _OTHER * other
-        if same is not None:
-            codes = codes + _STILL * _cells(same.view(np.uint8), self._cell_px)
-        areas_px = np.zeros((_BITS, len(regions.areas_px)))
-        _overlaps(*regions[:4], codes.astype(np.uint8), self._cell_px, areas_px)
+        before = grown(self._person, self._around) & masks.reach
+        none = self._none
+        other = none if self._other is None else self._other
+        still = none if same is None else _cells(same.view(np.uint8), self._cell_px)
+        kinds = masks.core, masks.near, before, other, still
+        areas_px = np.zeros((len(kinds), len(regions.areas_px)))
+        _overlaps(*regions[:4], *kinds, self._cell_px, areas_px)
         core_px, near_px, before_px, other_px, still_px = areas_px
         half_px, free_px = _SHARE * regions.areas_px, regions.areas_px - other_px
         # In a region that merged with another object, only the other pixels count.
@@ -178,7 +174,7 @@ class PersonRegion:
         if not full and np.count_nonzero(beyond) >= _FEWEST_CELLS:
             other |= beyond
         if other.any():
-            mine = self._pixels(masks.band, selected.shape) > 0
+            mine = self._pixels(masks.band(), selected.shape) > 0
             if image is not None:
                 compared = self._things.compare(image)
                 mine |= (compared == CHANGED) & (self._pixels(masks.reach, selected.shape) > 0)
@@ -222,7 +218,8 @@ def warm_up() -> None:
     """Compile all functions before the first live image."""
     silhouette = np.full((2, 8), 255, np.uint8)
     regions = find_regions(silhouette)
-    _overlaps(*regions[:4], np.zeros((2, 8), np.uint8), 1, np.zeros((_BITS, 1)))
+    cells = np.zeros((2, 8), np.uint8)
+    _overlaps(*regions[:4], cells, cells, cells, cells, cells, 1, np.zeros((5, 1)))
     _paint(*regions[:4], np.ones(1, np.bool_), silhouette)
     things = StillThings()
     things.learn(silhouette, silhouette)
@@ -245,16 +242,32 @@ def _distance(mask: Mask) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _overlaps(
-    rows: Any, starts: Any, ends: Any, labels: Any, codes: Any, cell_px: Any, areas_px: Any
+    rows: Any,
+    starts: Any,
+    ends: Any,
+    labels: Any,
+    core: Any,
+    near: Any,
+    before: Any,
+    other: Any,
+    still: Any,
+    cell_px: Any,
+    areas_px: Any,
 ) -> None:
-    """Count the pixels of each region whose cell code has each bit, (5, m)."""
+    """Count the pixels of each region in the cells of five masks (h, w), (5, m).
+
+    Cells of ``other`` are not ``near``.
+    """
     for run in range(len(rows)):
-        label = labels[run]
-        row = codes[rows[run] // cell_px]
-        for u in range(starts[run], ends[run]):
-            code = row[u // cell_px]
-            for bit in range(_BITS):
-                areas_px[bit, label] += (code >> bit) & 1
+        label, v = labels[run], rows[run] // cell_px
+        begin, end = starts[run], ends[run]
+        for u in range(begin // cell_px, (end - 1) // cell_px + 1):
+            count_px = min(end, (u + 1) * cell_px) - max(begin, u * cell_px)
+            areas_px[0, label] += count_px * core[v, u]
+            areas_px[1, label] += count_px * (near[v, u] & ~other[v, u])
+            areas_px[2, label] += count_px * before[v, u]
+            areas_px[3, label] += count_px * other[v, u]
+            areas_px[4, label] += count_px * still[v, u]
 
 
 @njit(cache=True, nogil=True)
