@@ -108,9 +108,8 @@ def test_another_camera_sees_the_same_points(roll_rad: float, rng: np.random.Gen
 def test_lines_of_sight_meet_at_the_hips() -> None:
     state = state_of(0.3, 0.2)
     there = VIEW.states(state)
-    place, ahead = VIEW.line_of_sight(
-        float(there[0] / (VIEW.body.placement.distance_m - there[12]))
-    )
+    bearing = float(there[0] / (VIEW.body.placement.distance_m - there[12]))
+    place, ahead = (np.array(one) for one in VIEW.line_of_sight(bearing))
     hips = np.array([state[12] - BODY.placement.distance_m, state[0]])
     across = (hips - place) - ahead * ((hips - place) @ ahead)
     np.testing.assert_allclose(across, 0.0, atol=1e-9)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import asin, atan2, cos, sin
+from math import asin, atan2, cos, hypot, sin
 
 import cv2
 import numpy as np
@@ -26,6 +26,8 @@ from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
 ImageArray = NDArray[np.uint8]
+LevelPoint = tuple[float, float]
+"""Coordinates x and y of a point or a direction in a level frame, metres."""
 
 _NO_FRACTIONS = np.empty(0, np.uint16)
 # An image with less roll is not turned: the error at the border is a fifth of a pixel at 320 px.
@@ -175,16 +177,17 @@ class View:
         )
         return axes
 
-    def line_of_sight(self, bearing: float) -> tuple[FloatArray, FloatArray]:
-        """Return the camera's place and the level direction (x, y) of a line of sight, each (2,).
+    def line_of_sight(self, bearing: float) -> tuple[LevelPoint, LevelPoint]:
+        """Return the camera's place and the unit direction of a line of sight.
 
         Both are in the first camera's level frame, metres. ``bearing`` is the lateral coordinate
         divided by the depth.
         """
-        level = _about_vertical(self.yaw_rad)
-        place = -level.T @ self.offset_m
-        direction = level.T @ np.array([-1.0, bearing, 0.0])
-        return place[:2], direction[:2] / np.linalg.norm(direction[:2])
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        x_m, y_m, _ = self.offset_m.tolist()
+        length = hypot(1.0, bearing)
+        ahead = (-c - s * bearing) / length, (c * bearing - s) / length
+        return (s * y_m - c * x_m, -s * x_m - c * y_m), ahead
 
 
 @kernel

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import hypot
 from typing import NamedTuple
-
-import numpy as np
 
 from cardbox_tracker.body.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.terms import Frame
-from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.cost.view import LevelPoint, View
 from cardbox_tracker.estimation.filtering.walking import Walk
 
 # Deviation of the intersection, m: median columns of two cameras show different body points.
@@ -80,34 +79,42 @@ class Locator:
             step_m = self._walk.see(frames[0].silhouette, bearings[0], ahead_m)
         if not self._crosses:
             return Location(bearings[0], step_m)
-        there = np.array([float(before[TORSO_X]) - self._distance_m, float(before[TORSO_Y])])
+        there = float(before[TORSO_X]) - self._distance_m, float(before[TORSO_Y])
         x, y = crossing_of([self._line(*one) for one in bearings.items()], there)
-        x_m = float(np.clip(x + self._distance_m, *self._cost.limits[TORSO_X]))
+        lowest_m, highest_m = self._cost.limits[TORSO_X].tolist()
+        x_m = min(max(x + self._distance_m, lowest_m), highest_m)
         stddev_m = None if list(seeing) == [0] else _CROSSING_M
         return Location(y / max(-x, 1e-3), step_m, x_m, stddev_m)
 
-    def _line(self, number: int, bearing: float) -> tuple[FloatArray, FloatArray]:
+    def _line(self, number: int, bearing: float) -> tuple[LevelPoint, LevelPoint]:
         if number:
             return self._views[number - 1].line_of_sight(bearing)
-        return np.zeros(2), np.array([-1.0, bearing]) / np.hypot(1.0, bearing)
+        length = hypot(1.0, bearing)
+        return (0.0, 0.0), (-1.0 / length, bearing / length)
 
 
 def crossing_of(
-    lines: Iterable[tuple[FloatArray, FloatArray]], before: FloatArray
+    lines: Iterable[tuple[LevelPoint, LevelPoint]], before: LevelPoint
 ) -> tuple[float, float]:
     """Return the intersection (x, y) of lines; of a single line, the point nearest to ``before``.
 
     The point minimizes the sum of the squared distances from all lines, plus a small multiple of
-    the squared distance from ``before``.
+    the squared distance from ``before``. With unit directions a, it solves
+
+        (w I + sum of (I - a a^T)) x = w before + sum of (I - a a^T) place
 
     Args:
-        lines: point (2,) and unit direction (2,) of each line, metres in the first level frame.
-        before: previous place of the person, (2,), metres.
+        lines: point and unit direction of each line, metres in the first level frame.
+        before: previous place of the person, metres.
     """
-    normal, right = _LEAST_ANGLE**2 * np.eye(2), _LEAST_ANGLE**2 * before
-    for place, ahead in lines:
-        across = np.eye(2) - np.outer(ahead, ahead)
-        normal = normal + across
-        right = right + across @ place
-    x, y = np.linalg.solve(normal, right).tolist()
-    return x, y
+    # Without numpy, whose calls for such small matrices take ten times as long.
+    weight = _LEAST_ANGLE**2
+    xx, xy, yy = weight, 0.0, weight
+    right_x, right_y = weight * before[0], weight * before[1]
+    for (x, y), (ahead_x, ahead_y) in lines:
+        of_xx, of_xy, of_yy = 1.0 - ahead_x**2, -ahead_x * ahead_y, 1.0 - ahead_y**2
+        xx, xy, yy = xx + of_xx, xy + of_xy, yy + of_yy
+        right_x += of_xx * x + of_xy * y
+        right_y += of_xy * x + of_yy * y
+    determinant = xx * yy - xy**2
+    return (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant
