@@ -261,13 +261,16 @@ def _overlaps(
     for run in range(len(rows)):
         label, v = labels[run], rows[run] // cell_px
         begin, end = starts[run], ends[run]
+        in_core, in_near, in_before, in_other, in_still = 0, 0, 0, 0, 0
         for u in range(begin // cell_px, (end - 1) // cell_px + 1):
             count_px = min(end, (u + 1) * cell_px) - max(begin, u * cell_px)
-            areas_px[0, label] += count_px * core[v, u]
-            areas_px[1, label] += count_px * (near[v, u] & ~other[v, u])
-            areas_px[2, label] += count_px * before[v, u]
-            areas_px[3, label] += count_px * other[v, u]
-            areas_px[4, label] += count_px * still[v, u]
+            in_core += count_px * core[v, u]
+            in_near += count_px * (near[v, u] & ~other[v, u])
+            in_before += count_px * before[v, u]
+            in_other += count_px * other[v, u]
+            in_still += count_px * still[v, u]
+        for kind, count_px in enumerate((in_core, in_near, in_before, in_other, in_still)):
+            areas_px[kind, label] += count_px
 
 
 @njit(cache=True, nogil=True)

@@ -85,6 +85,9 @@ def _saturating(square: float, cap: float) -> float:
 def torso_prior(state: Floats, given: Prior) -> float:
     """Return the prior of the torso of a state (14,)."""
     anchor, rules = given.anchor, given.rules
+    # The priors count for the first camera only.
+    if rules[WEIGHT] == 0.0:
+        return 0.0
     cap = rules[ANGLE_CAP]
     pitch = state[PITCH] - rules[PITCH_REST]
     pitch /= rules[BACK_UNIT] if pitch < 0.0 else rules[FORWARD_UNIT]
@@ -144,6 +147,8 @@ def arm_prior(arm: PosedArm, side: float, parts: Floats, given: Prior, logs: Flo
     ``logs`` is scratch with one value for each Gaussian, (K,).
     """
     rules = given.rules
+    if rules[WEIGHT] == 0.0:
+        return 0.0
     for c in range(6):
         arm.outward[c] = arm.directions[c] * (side if c == 1 or c == 4 else 1.0)
     rated = nats_of(arm.outward, given.gaussians, rules[UNKNOWN_DENSITY], logs)
