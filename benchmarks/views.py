@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import time
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scene import BenchmarkScene
 from benchmarks.tools import WARM_UP
-from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.posture import N_JOINTS, TORSO_X, TORSO_Z
 from cardbox_tracker.estimation.config import default_preset
-from cardbox_tracker.estimation.cost.view import OtherCamera, View
+from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.simulation.cameras import SyntheticCamera, synthetic_cameras
 from cardbox_tracker.simulation.motions import WAVE_S, wave
-from cardbox_tracker.vision.extrinsics import Extrinsics
-from cardbox_tracker.vision.rasterisation import render
-
-_ASIDE_RAD = 0.9
+from cardbox_tracker.simulation.renderer import Renderer, Scene
 
 
 def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:
@@ -35,7 +30,7 @@ def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:
     for _ in range(repetitions):
         trackers = [
             Tracker(scene.body, scene.camera, default_preset(), others=others)
-            for others in ((), (other,))
+            for others in ((), (OtherCamera(other.camera, other.extrinsics),))
         ]
         for i, (first, second) in enumerate(zip(scene.silhouettes, silhouettes, strict=True)):
             seen = [Observation(first), Observation(second)]
@@ -48,21 +43,13 @@ def measure_two_views(scene: BenchmarkScene, repetitions: int = 3) -> float:
     return float(np.median(two_ms / one_ms))
 
 
-def beside(scene: BenchmarkScene) -> OtherCamera:
-    """Return a camera like the first one, turned around the person."""
-    turn = cv2.Rodrigues(np.array([0.0, _ASIDE_RAD, 0.0]))[0].astype(np.float64)
-    person_m = np.array([0.0, 0.0, scene.body.placement.distance_m])
-    return OtherCamera(scene.camera, Extrinsics(turn, person_m - turn @ person_m))
+def beside(scene: BenchmarkScene) -> SyntheticCamera:
+    """Return a camera like the first one, at the same distance from the person."""
+    return synthetic_cameras(scene.body, scene.camera, 2)[1]
 
 
-def seen_by(scene: BenchmarkScene, other: OtherCamera) -> list[NDArray[np.uint8]]:
+def seen_by(scene: BenchmarkScene, other: SyntheticCamera) -> list[NDArray[np.uint8]]:
     """Return the silhouettes (H, W) of the scene in the image of ``other``."""
-    view = View.of(scene.body, scene.camera, other)
-    states = [np.append(wave(i / 15.0 % WAVE_S), [0.0, 0.0]) for i in range(len(scene.images))]
-    return [_drawn(view, view.states(state)) for state in states]
-
-
-def _drawn(view: View, state: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the silhouette (H, W) of a state (14,) of the view's person in its image."""
-    patches = cardbox_patches(view.body, state[:N_JOINTS])
-    return render(patches + np.array([state[TORSO_X], 0.0, state[TORSO_Z]]), view.camera)
+    renderer = Renderer(other.camera, Scene(), np.random.default_rng(0))
+    postures = (wave(i / 15.0 % WAVE_S) for i in range(len(scene.images)))
+    return [renderer.silhouette(*other.seen(scene.body, posture)) for posture in postures]
