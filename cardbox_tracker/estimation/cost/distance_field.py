@@ -42,10 +42,14 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
     height, width = mask.shape
     sides = np.empty(distances.shape, np.uint8)
     for v in range(height):
+        # Assignments to slices take longer than loops.
         row, padded = mask[v], sides[v]
-        padded[:FAR] = row[0]
-        padded[FAR : FAR + width] = row
-        padded[FAR + width :] = row[width - 1]
+        for u in range(FAR):
+            padded[_index(u)] = row[0]
+        for u in range(width):
+            padded[_index(u + FAR)] = row[_index(u)]
+        for u in range(FAR + width, padded.shape[0]):
+            padded[_index(u)] = row[_index(width - 1)]
     columns = np.empty(distances.shape, np.uint8)
     _along_columns(sides, columns)
     _along_rows(sides, columns, distances)
