@@ -70,8 +70,21 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[F], F]:
 kernel = njit(cache=True, nogil=True, error_model="numpy")
 """Decorator that compiles a function, which runs without the interpreter's lock."""
 
-inlined_kernel = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-"""Decorator that compiles a function, which is inlined into the kernels that call it."""
+borrowing_kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+"""Decorator that compiles a function which counts no references to the arrays that it is given.
+
+Counting takes longer than a few additions, so the loops of kernels call such functions. They
+allocate and return no arrays, also not in tuples: their callers would release them.
+"""
+
+inlined_kernel = njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)
+"""Decorator as :data:`borrowing_kernel`; the function is inlined into its callers."""
+
+inlined_allocation = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+"""Decorator that compiles and inlines a function which allocates or returns arrays."""
+
+copied_kernel = njit(nogil=True, error_model="numpy", inline="always")
+"""Decorator that copies a short function into any caller, where it may return views of arrays."""
 
 
 @cached

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import parts_of_bodies
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import inlined_kernel
+from cardbox_tracker.compiling import copied_kernel
 from cardbox_tracker.vision.camera import Camera
 
 Floats = NDArray[np.float64]
@@ -91,14 +91,14 @@ Drawn = tuple[bool, bool, bool]
 """Whether trunk, left arm and right arm are drawn, in this order."""
 
 
-@inlined_kernel
+@copied_kernel
 def cardbox_of(fields: CardboxTuple) -> Cardbox:
     """Return a cardbox model with its fields named."""
     parts, shoulder, place, camera = fields
     return Cardbox(parts, shoulder, Place(*place), Intrinsics(*camera))
 
 
-@inlined_kernel
+@copied_kernel
 def body_of(fields: BodyTuple) -> Body:
     """Return a body with its fields named."""
     parts, drawn, girdle, place, camera = fields

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import Counts, Floats, Intrinsics, Whole
 from cardbox_tracker.vision.rasterisation import (
     CROSSING_BITS,
@@ -73,7 +73,7 @@ class Workspace(NamedTuple):
     """(3,): middle of the hips, and shoulder or elbow, in the optical frame, metres."""
 
 
-@inlined_kernel
+@inlined_allocation
 def new_workspace(patches: int, rows: int) -> Workspace:
     """Return the workspace for a number of patches and rows; ``shape`` is zero."""
     return Workspace(
@@ -183,7 +183,7 @@ def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int)
         sides[k, side, base + _index(i)] = min(max(u, np.int32(0)), limit)
 
 
-@kernel
+@borrowing_kernel
 def _draw_cut(work: Workspace, p: int, camera: Intrinsics, rows: int, width: int) -> None:
     """Write sides and extent of patch ``p`` after clipping at the near plane.
 
@@ -213,7 +213,10 @@ def _draw_cut(work: Workspace, p: int, camera: Intrinsics, rows: int, width: int
     if n < 3:
         return
     ys = outline[1, :n]
-    top, bottom = int(_row(ys.min(), rows)), int(_row(ys.max(), rows))
+    highest, lowest = ys[0], ys[0]
+    for i in range(1, n):
+        highest, lowest = min(highest, ys[i]), max(lowest, ys[i])
+    top, bottom = int(_row(highest, rows)), int(_row(lowest, rows))
     extent[p, 0] = top
     extent[p, 1] = bottom
     for v in range(top, bottom):

@@ -15,8 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
+from cardbox_tracker.compiling import (
+    borrowing_kernel,
+    inlined_allocation,
+    inlined_kernel,
+    kernel,
+)
+from cardbox_tracker.estimation.cost.bit_masks import Masks, cover_masks, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
@@ -26,8 +31,15 @@ from cardbox_tracker.estimation.cost.body_outline import (
     place_trunk,
 )
 from cardbox_tracker.estimation.cost.body_priors import Prior, PriorTuple, arm_prior, torso_prior
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Drawn, Floats, body_of
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    Body,
+    BodyTuple,
+    Drawn,
+    Floats,
+    body_of,
+)
 from cardbox_tracker.estimation.cost.kinematics import (
+    PosedArm,
     angles_in,
     new_arm,
     pose_arm,
@@ -35,7 +47,7 @@ from cardbox_tracker.estimation.cost.kinematics import (
     state_pose,
     turn_arm,
 )
-from cardbox_tracker.estimation.cost.rasterisation import draw, new_workspace
+from cardbox_tracker.estimation.cost.rasterisation import Workspace, draw, new_workspace
 
 
 class Observed(NamedTuple):
@@ -80,19 +92,77 @@ def _copy(points: Floats, written: Floats) -> None:
             written[i, j] = points[i, j]
 
 
+class Scratch(NamedTuple):
+    """Scratch arrays of the ratings.
+
+    Attributes:
+        work: for the drawn patches.
+        arm: for one arm.
+        masks: for the union of the patches.
+        logs: one value for each Gaussian of the prior, (K,).
+    """
+
+    work: Workspace
+    arm: PosedArm
+    masks: Masks
+    logs: Floats
+
+
+@inlined_allocation
+def _new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
+    """Return the scratch arrays for a number of patches."""
+    return Scratch(
+        new_workspace(patches, seen.planes.shape[2]),
+        new_arm(),
+        new_masks(patches, seen.planes),
+        np.empty(given.gaussians.shape[1]),
+    )
+
+
+@inlined_kernel
+def _place_arms(
+    states: Floats,
+    i: int,
+    p: int,
+    rated: float,
+    of: Body,
+    given: Prior,
+    scratch: Scratch,
+    points: Points,
+) -> float:
+    """Write both arms of a state, their patches from ``p`` on; return ``rated`` + their priors."""
+    work, arm = scratch.work, scratch.arm
+    for k in range(2):
+        angles, side = angles_in(states[i], k), side_of(k)
+        pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
+        turn_arm(arm, work.torso, work.hip)
+        place_arm(arm, p + ARM_PATCHES * k, of.drawn, work.corners)
+        _copy(arm.points, points.joints_m[i, 3 * k : 3 * k + 3])
+        _copy(arm.joints, points.keypoints_m[i, 3 * k : 3 * k + 3])
+        rated += arm_prior(arm, side, of.parts, given, scratch.logs)
+    return rated
+
+
 @kernel
 def rate_trunks(
     states: Floats, body: BodyTuple, observed: ObservedTuple, prior: PriorTuple, ratings: Floats
 ) -> None:
     """Write ratings (N,) of the trunks of states (N, 14)."""
-    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    work = new_workspace(TRUNK_PATCHES, seen.planes.shape[2])
-    masks = new_masks(TRUNK_PATCHES, seen.planes)
+    seen, given = Observed(*observed), Prior(*prior)
+    scratch = _new_scratch(TRUNK_PATCHES, seen, given)
+    _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
+
+
+@borrowing_kernel
+def _rate_trunks(
+    states: Floats, of: Body, seen: Observed, given: Prior, scratch: Scratch, ratings: Floats
+) -> None:
+    work = scratch.work
     for i in range(states.shape[0]):
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
         ratings[i] = (seen.base_px + gain) * seen.scale + torso_prior(states[i], given)
 
 
@@ -112,10 +182,24 @@ def rate_arms(
     ``observed`` is the silhouette with that trunk drawn; ``side`` is 1 for left, -1 for right.
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
-    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    work, arm = new_workspace(ARM_PATCHES, seen.planes.shape[2]), new_arm()
-    masks = new_masks(ARM_PATCHES, seen.planes)
-    logs = np.empty(given.gaussians.shape[1])
+    seen, given = Observed(*observed), Prior(*prior)
+    scratch = _new_scratch(ARM_PATCHES, seen, given)
+    _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
+
+
+@borrowing_kernel
+def _rate_arms(
+    arms: Floats,
+    side: float,
+    torso: Floats,
+    of: Body,
+    seen: Observed,
+    given: Prior,
+    scratch: Scratch,
+    ratings: Floats,
+    joints_m: Floats,
+) -> None:
+    work, arm = scratch.work, scratch.arm
     state_pose(torso, of.place, of.camera, work.torso, work.hip)
     for i in range(arms.shape[0]):
         pose_arm(arms[i], side, of.parts, of.girdle, arm.points, arm.directions)
@@ -123,8 +207,8 @@ def rate_arms(
         place_arm(arm, 0, of.drawn, work.corners)
         _copy(arm.points, joints_m[i])
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
-        rated = arm_prior(arm, side, of.parts, given, logs)
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
+        rated = arm_prior(arm, side, of.parts, given, scratch.logs)
         ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
@@ -149,26 +233,31 @@ def rate_bodies(
         pixels: written: pixels in which model and silhouette differ, and of the model, (N,) each.
         points: fields of :class:`Points`, written.
     """
-    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    work, arm = new_workspace(BODY_PATCHES, seen.planes.shape[2]), new_arm()
-    masks = new_masks(BODY_PATCHES, seen.planes)
-    logs = np.empty(given.gaussians.shape[1])
+    seen, given = Observed(*observed), Prior(*prior)
+    scratch = _new_scratch(BODY_PATCHES, seen, given)
+    _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
+
+
+@borrowing_kernel
+def _rate_bodies(
+    states: Floats,
+    of: Body,
+    seen: Observed,
+    given: Prior,
+    scratch: Scratch,
+    ratings: Floats,
+    pixels: tuple[Floats, Floats],
+    points: Points,
+) -> None:
+    work = scratch.work
     costs_px, areas_px = pixels
-    joints_m, keypoints_m = points
     for i in range(states.shape[0]):
         state_pose(states[i], of.place, of.camera, work.torso, work.hip)
         place_trunk(work, of.drawn)
         rated = torso_prior(states[i], given)
-        for k in range(2):
-            angles, side = angles_in(states[i], k), side_of(k)
-            pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
-            turn_arm(arm, work.torso, work.hip)
-            place_arm(arm, TRUNK_PATCHES + ARM_PATCHES * k, of.drawn, work.corners)
-            _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
-            _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
-            rated += arm_prior(arm, side, of.parts, given, logs)
+        rated = _place_arms(states, i, TRUNK_PATCHES, rated, of, given, scratch, points)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain, area = sum_masks(work, has_cuts, seen.width, seen.planes, masks)
+        gain, area = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)
         costs_px[i] = seen.base_px + gain
         areas_px[i] = area
         ratings[i] = costs_px[i] * seen.scale + rated
@@ -188,25 +277,28 @@ def rate_pairs(
     ``observed`` is the silhouette with that trunk drawn, so only the arms are. The other arguments
     are those of :func:`rate_bodies`.
     """
-    of, seen, given = body_of(body), Observed(*observed), Prior(*prior)
-    work, arm = new_workspace(2 * ARM_PATCHES, seen.planes.shape[2]), new_arm()
-    masks = new_masks(2 * ARM_PATCHES, seen.planes)
-    logs = np.empty(given.gaussians.shape[1])
+    seen, given = Observed(*observed), Prior(*prior)
+    scratch = _new_scratch(2 * ARM_PATCHES, seen, given)
+    _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
+
+
+@borrowing_kernel
+def _rate_pairs(
+    states: Floats,
+    of: Body,
+    seen: Observed,
+    given: Prior,
+    scratch: Scratch,
+    ratings: Floats,
+    points: Points,
+) -> None:
+    work = scratch.work
     state_pose(states[0], of.place, of.camera, work.torso, work.hip)
     of_torso = torso_prior(states[0], given)
-    joints_m, keypoints_m = points
     for i in range(states.shape[0]):
-        rated = of_torso
-        for k in range(2):
-            angles, side = angles_in(states[i], k), side_of(k)
-            pose_arm(angles, side, of.parts, of.girdle, arm.points, arm.directions)
-            turn_arm(arm, work.torso, work.hip)
-            place_arm(arm, ARM_PATCHES * k, of.drawn, work.corners)
-            _copy(arm.points, joints_m[i, 3 * k : 3 * k + 3])
-            _copy(arm.joints, keypoints_m[i, 3 * k : 3 * k + 3])
-            rated += arm_prior(arm, side, of.parts, given, logs)
+        rated = _place_arms(states, i, 0, of_torso, of, given, scratch, points)
         has_cuts = draw(work, of.camera, seen.rows, seen.width)
-        gain = sum_masks(work, has_cuts, seen.width, seen.planes, masks)[0]
+        gain = sum_masks(work, has_cuts, seen.width, seen.planes, scratch.masks)[0]
         ratings[i] = (seen.base_px + gain) * seen.scale + rated
 
 
