@@ -187,7 +187,7 @@ def costs_along(
         costs: one for each of ``SHARES``; changed.
     """
     seen, of = Seen(*camera), body_of(body)
-    edges, points = outline
+    field, (edges, points) = seen.field, outline
     work, arm = new_scratch()
     trial, there = np.empty(N_STATE), np.empty(N_STATE)
     corners_px = np.empty((BODY_PATCHES, 4, 3))
@@ -200,7 +200,7 @@ def costs_along(
         total = 0.0
         for i in range(len(points)):
             x, y, _ = point_on_edge(corners_px, edges[i, 0], edges[i, 1], points[i, 0])
-            square = distance_at(seen.field, x, y) ** 2
+            square = distance_at(field, x, y) ** 2
             total += points[i, 1] * square / (1.0 + square * _PER_HALF)
         costs[number] += INFORMATION * total
 

@@ -127,11 +127,11 @@ def mean_and_spread(
 
     The weights of the states (N, 14) are exp(-(rating - best) / ``spread``).
     """
-    order = least_of(ratings, count)
+    order = np.argsort(ratings, kind="mergesort")
     best = ratings[order[0]]
     mean, squares = np.zeros(N_STATE), np.zeros(N_STATE)
     total = 0.0
-    for i in range(order.shape[0]):
+    for i in range(min(count, order.shape[0])):
         weight = exp((best - ratings[order[i]]) / spread)
         total += weight
         for d in range(N_STATE):
