@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.compiling import kernel
-from cardbox_tracker.vision.array_checks import check_array
+from cardbox_tracker.vision.array_checks import ANY, check_array
 from cardbox_tracker.vision.chroma_kernels import (
     DARKEST,
     NEUTRAL,
@@ -86,11 +86,14 @@ class ChromaScore:
             before: the previous score, whose estimate of the white balance is kept.
 
         Raises:
-            ValueError: mean and standard deviation differ in shape.
+            ValueError: mean or standard deviation is not of the shape (3, h, w), they differ in
+                shape, or they have no pixels.
         """
-        for name, planes in model._asdict().items():
-            check_array(name, planes, (3, *np.shape(model.mean)[1:]), np.float32)
         mean = model.mean
+        check_array("mean", mean, (3, ANY, ANY), np.float32)
+        check_array("stddev", model.stddev, mean.shape, np.float32)
+        if not mean.size:
+            raise ValueError(f"mean has the shape {mean.shape}; expected pixels")
         limits = np.maximum(threshold * model.stddev[1:], min_contrast)
         # Averaging mixes a bright place into its neighbours.
         highest = cv2.dilate(bgr_of(mean).max(axis=0), np.ones(_SMOOTHING, np.uint8))

@@ -207,3 +207,10 @@ def test_the_white_balance_of_an_image_of_one_square_is_that_of_its_colour() -> 
     shares = np.zeros((2, 1), np.float32)
     collect_shares(colors, background, 1, shares)
     np.testing.assert_allclose(shares[:, 0], [0.2, -0.1], rtol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(3, 0), (3, 1), (2, 4, 4), (3, 0, 4), (3, 4, 0)])
+def test_a_scene_without_pixels_is_refused(shape: tuple[int, ...]) -> None:
+    nothing = np.zeros(shape, np.float32)
+    with pytest.raises(ValueError, match=r"expected (pixels|\(3, any, any\))"):
+        ChromaScore(ChromaModel(nothing, nothing), 3.0, 2.0, 0.5)

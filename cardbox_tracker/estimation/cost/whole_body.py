@@ -40,9 +40,9 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
 )
 from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
+from cardbox_tracker.estimation.cost.rating_arguments import ObservedTuple, Points
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.cost.whole_body_kernels import Points
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
@@ -69,7 +69,7 @@ class Bodies(NamedTuple):
 
 
 class Ratings(NamedTuple):
-    """Ratings (N,) and the fields of :class:`~.whole_body_kernels.Points` of N states."""
+    """Ratings (N,) and the fields of :class:`~.rating_arguments.Points` of N states."""
 
     ratings: FloatArray
     joints_m: FloatArray
@@ -142,7 +142,7 @@ class WholeBodyCost:
         self._scale = 1.0 / max(self.silhouette_px, 1)
         self._by_body = self._by(self._seen, self.silhouette_px)
 
-    def _by(self, planes: Planes, base_px: int) -> tuple[kernels.ObservedTuple, priors.PriorTuple]:
+    def _by(self, planes: Planes, base_px: int) -> tuple[ObservedTuple, priors.PriorTuple]:
         """Return the arguments of the kernels that rate by pixels of ``planes`` and priors."""
         return (planes, *self.counted, base_px, self._scale), self._prior
 

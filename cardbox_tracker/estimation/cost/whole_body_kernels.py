@@ -11,17 +11,8 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
-from cardbox_tracker.compiling import (
-    borrowing_kernel,
-    inlined_allocation,
-    inlined_kernel,
-    kernel,
-)
-from cardbox_tracker.estimation.cost.bit_masks import Masks, cover_masks, new_masks, sum_masks
+from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_outline import (
     ARM_PATCHES,
@@ -39,7 +30,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     body_of,
 )
 from cardbox_tracker.estimation.cost.kinematics import (
-    PosedArm,
     angles_in,
     new_arm,
     pose_arm,
@@ -47,41 +37,15 @@ from cardbox_tracker.estimation.cost.kinematics import (
     state_pose,
     turn_arm,
 )
-from cardbox_tracker.estimation.cost.rasterisation import Workspace, draw, new_workspace
-
-
-class Observed(NamedTuple):
-    """A silhouette, or the part of it outside of parts that are already drawn.
-
-    Attributes:
-        planes: pixels that count, and foreground, (2, words, rows); see :mod:`.bit_planes`.
-        rows: number of rows that count, from the top.
-        width: width of the image, px.
-        base_px: cost without further parts, px.
-        scale: 1 / (pixels of the silhouette).
-    """
-
-    planes: Planes
-    rows: int
-    width: int
-    base_px: int
-    scale: float
-
-
-class Points(NamedTuple):
-    """Shoulder, elbow and hand of the left, then of the right arm of N states.
-
-    Attributes:
-        joints_m: in the torso's frame, (N, 6, 3), metres.
-        keypoints_m: in the optical frame, (N, 6, 3), metres.
-    """
-
-    joints_m: Floats
-    keypoints_m: Floats
-
-
-ObservedTuple = tuple[Planes, int, int, int, float]
-PointsTuple = tuple[Floats, Floats]
+from cardbox_tracker.estimation.cost.rasterisation import draw, new_workspace
+from cardbox_tracker.estimation.cost.rating_arguments import (
+    Observed,
+    ObservedTuple,
+    Points,
+    PointsTuple,
+    Scratch,
+    new_scratch,
+)
 
 
 @inlined_kernel
@@ -90,33 +54,6 @@ def _copy(points: Floats, written: Floats) -> None:
     for i in range(3):
         for j in range(3):
             written[i, j] = points[i, j]
-
-
-class Scratch(NamedTuple):
-    """Scratch arrays of the ratings.
-
-    Attributes:
-        work: for the drawn patches.
-        arm: for one arm.
-        masks: for the union of the patches.
-        logs: one value for each Gaussian of the prior, (K,).
-    """
-
-    work: Workspace
-    arm: PosedArm
-    masks: Masks
-    logs: Floats
-
-
-@inlined_allocation
-def _new_scratch(patches: int, seen: Observed, given: Prior) -> Scratch:
-    """Return the scratch arrays for a number of patches."""
-    return Scratch(
-        new_workspace(patches, seen.planes.shape[2]),
-        new_arm(),
-        new_masks(patches, seen.planes),
-        np.empty(given.gaussians.shape[1]),
-    )
 
 
 @inlined_kernel
@@ -149,7 +86,7 @@ def rate_trunks(
 ) -> None:
     """Write ratings (N,) of the trunks of states (N, 14)."""
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = _new_scratch(TRUNK_PATCHES, seen, given)
+    scratch = new_scratch(TRUNK_PATCHES, seen, given)
     _rate_trunks(states, body_of(body), seen, given, scratch, ratings)
 
 
@@ -183,7 +120,7 @@ def rate_arms(
     Shoulder, elbow and hand in the torso's frame are written to ``joints_m`` (N, 3, 3).
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = _new_scratch(ARM_PATCHES, seen, given)
+    scratch = new_scratch(ARM_PATCHES, seen, given)
     _rate_arms(arms, side, torso, body_of(body), seen, given, scratch, ratings, joints_m)
 
 
@@ -234,7 +171,7 @@ def rate_bodies(
         points: fields of :class:`Points`, written.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = _new_scratch(BODY_PATCHES, seen, given)
+    scratch = new_scratch(BODY_PATCHES, seen, given)
     _rate_bodies(states, body_of(body), seen, given, scratch, ratings, pixels, Points(*points))
 
 
@@ -278,7 +215,7 @@ def rate_pairs(
     are those of :func:`rate_bodies`.
     """
     seen, given = Observed(*observed), Prior(*prior)
-    scratch = _new_scratch(2 * ARM_PATCHES, seen, given)
+    scratch = new_scratch(2 * ARM_PATCHES, seen, given)
     _rate_pairs(states, body_of(body), seen, given, scratch, ratings, Points(*points))
 
 
