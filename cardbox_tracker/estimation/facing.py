@@ -19,10 +19,9 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import PITCH, YAW
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.inner_cue import chest_levels
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView
-from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette
+from cardbox_tracker.estimation.cost.inner_cue_arms import zones_of
+from cardbox_tracker.estimation.cost.terms import Frame, Image, Posed, Silhouette
 from cardbox_tracker.estimation.filtering.point_doubt import shows_person
-from cardbox_tracker.vision.camera import Camera
 
 # Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse; fewest of
 # its pixels that count.
@@ -52,11 +51,10 @@ class Facing:
         shows_back: whether there is hair where the face was.
     """
 
-    def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for a body, whose appearance may be missing, before a working camera."""
+    def __init__(self, body: BodyModel) -> None:
+        """Prepare for a person, whose appearance may be missing."""
         appearance = body.appearance
         self._appearance = None if appearance is None or appearance.is_grey else appearance
-        self._view = ArmView.of(body, camera, np.zeros(2), lifts_shoulders=True)
         if self._appearance is not None:
             histograms = self._appearance.histograms
             self._is_hair = np.log(histograms[HAND] / histograms[HEAD]) < _HAIR_NATS
@@ -70,21 +68,22 @@ class Facing:
         if self._appearance is not None:
             self._brightness = self._appearance.brightness
 
-    def see(self, frame: Frame, state: FloatArray) -> None:
+    def see(self, frame: Frame, posed: Posed) -> None:
         """Compare the head in an image with the learned colours.
 
         Args:
             frame: the image with its silhouette. One in grey, or none, shows nothing; certain
                 points of a detector tell the back better.
-            state: the person's state (14,) in it, rad and metres.
+            posed: the person in it, one state.
         """
+        state = posed.states[0]
         if shows_person(frame.points):
             self.shows_back, self._now = False, None
             return
         if self._appearance is None or frame.image is None or frame.image.ndim != 3:
             return
         self._elapsed_s += frame.interval_s
-        zones = self._view.zones(state)
+        zones = zones_of(posed)
         if state[PITCH] > _LEAN_RAD or _is_low(zones, frame.silhouette):
             self.shows_back, self._now = False, None
             return

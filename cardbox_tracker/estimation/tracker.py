@@ -10,12 +10,13 @@ from types import MappingProxyType
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Silhouette
+from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.estimate import (
     LOST,
@@ -112,11 +113,11 @@ class Tracker:
         self._head = HeadTracker(self.body, self.camera)
         # The outlines of several cameras determine the direction; the paper has no such doubt.
         is_alone = self.config.has_several_views and not self._others
-        self._facing = Facing(self.body, self.camera) if is_alone else None
+        self._facing = Facing(self.body) if is_alone else None
         self._poor_frames = 0
         self._last_ns: int | None = None
         self._particles: Particles | None = None
-        # State of the previous frame for the terms: d1..d12, and torso_x, torso_z if estimated.
+        # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
         # IoU of the last result before its correction.
         self._seen_iou = 0.0
@@ -231,7 +232,7 @@ class Tracker:
             self._use(fitted, CompiledSilhouette(fitted, self.camera))
             again = self._silhouette.frame(silhouette)
             counted = again.rows, again.foreground_px
-            frames[0] = replace(frames[0], rows=counted[0], foreground_px=counted[1], posture=None)
+            frames[0] = frames[0].changed(rows=counted[0], foreground_px=counted[1], before=None)
         estimate = self._follow(frames)
         iou = None if estimate.iou is None else self._seen_iou
         self._fitting.after(estimate.state != NO_PERSON, iou)
@@ -268,7 +269,8 @@ class Tracker:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
             return Estimate(LOST)
-        self._before, self._seen_iou = fit.seen, fit.seen_iou
+        self._before, self._seen_iou = np.zeros(N_STATE), fit.seen_iou
+        self._before[: len(fit.seen)] = fit.seen
         self._poor_frames = self._poor_frames + 1 if fit.is_poor else 0
         if self._poor_frames >= self.config.lost_frames:
             if self.config.relocalize:
@@ -295,7 +297,8 @@ class Tracker:
     def _is_doubtful(self, frame: Frame) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
         if self._facing is not None and self._before is not None:
-            self._facing.see(frame, self._before)
+            posable = self.config.posable(self.body, self.camera)
+            self._facing.see(frame, Posed(posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted
 

@@ -73,7 +73,7 @@ class FrameSet(NamedTuple):
             )
             for frame in self.frames
         ]
-        seen[0] = replace(seen[0], depth_m=self.depth_m, stamp_ns=self.stamp_ns)
+        seen[0] = seen[0].having(depth_m=self.depth_m, stamp_ns=self.stamp_ns)
         return seen
 
 

@@ -19,7 +19,7 @@ and for a person with unknown colours.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -36,21 +36,22 @@ from cardbox_tracker.body.appearance import (
     steps_of_levels,
 )
 from cardbox_tracker.body.model import MEASURED, BodyModel
-from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.inner_cue_arms import N_TORSO, ArmView, torsos_of
+from cardbox_tracker.estimation.cost.inner_cue_arms import (
+    ArmGains,
+    arms_in_image,
+    forearm_of,
+    zones_of,
+)
 from cardbox_tracker.estimation.cost.inner_cue_kernels import ratio_maps
 from cardbox_tracker.estimation.cost.inner_cue_sleeves import Sleeves
 from cardbox_tracker.estimation.cost.terms import (
-    ARMS,
-    ArmCosts,
     Frame,
     Image,
-    Silence,
+    Posed,
     Silhouette,
     Term,
     TermObservation,
-    TorsoCosts,
 )
 from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
@@ -63,8 +64,6 @@ _ALIKE = 0.05
 _DARKEST, _BRIGHTEST = 0.6, 1.6
 # Step between pixels of the torso; fewest rows and columns, and fewest pixels in the outline.
 _STRIDE, _LEAST_SIDE_PX, _LEAST_PX = 3, 6, 20
-
-_OTHER = {"left": "right", "right": "left"}
 
 
 @dataclass(frozen=True)
@@ -83,18 +82,10 @@ class InnerCue(Settings):
         "constant",
         limits=(0.0, 1.0),
     )
-    lifts_shoulders: bool = setting(
-        True,
-        "the shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as "
-        "in the filter hierarchical",
-    )
 
-    def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term, which is zero for a body without an appearance."""
-        return Silence() if body.appearance is None else InnerCueTerm(self, body, camera)
-
-
-_SILENCE = Silence()
+    def build(self, person: BodyModel, camera: Camera) -> Term | None:
+        """Return the term; None for a person without an appearance."""
+        return None if person.appearance is None else InnerCueTerm(self, person, camera)
 
 
 class InnerCueTerm:
@@ -111,53 +102,41 @@ class InnerCueTerm:
         self.config = config
         self._appearance = body.appearance
         self._brightness = body.appearance.brightness.copy()
-        self._arms = ArmView.of(
-            body, camera, np.array([config.hand, config.forearm]), config.lifts_shoulders
-        )
-        self._sleeves: Sleeves | None = None
+        # Areas at the place of the body model, so that a nearer state has no advantage.
+        self._px_per_m = float(camera.fx) / body.placement.distance_m
+        self._forearm_m = forearm_of(body)
         self._ratios = ratios_of(body.appearance.histograms)
-        self._warm_up(camera)
+        self._weights = np.array([config.hand, config.forearm])
+        self._sleeves: Sleeves | None = None
         if body.source != MEASURED:
-            self._sleeves = Sleeves(body.appearance.histograms, self._arms)
+            self._sleeves = Sleeves(body, self._px_per_m)
             self._use(self._sleeves)
 
     def _use(self, sleeves: Sleeves) -> None:
         """Rate arms as their sleeves probably are."""
         self._ratios = ratios_of(sleeves.histograms)
-        weights = np.array([self.config.hand * sleeves.hand_weight, self.config.forearm])
-        self._arms = replace(self._arms, weights=weights)
+        self._weights = np.array([self.config.hand * sleeves.hand_weight, self.config.forearm])
 
-    def _warm_up(self, camera: Camera) -> None:
-        """Run every kernel once, so that no live image waits for the compiler."""
-        shape = (camera.height, camera.width)
-        image = np.zeros(shape if self._appearance.is_grey else (*shape, 3), np.uint8)
-        observation = self.observe(
-            Frame(np.full(shape, 255, np.uint8), 1, 1, image, np.zeros(N_STATE))
-        )
-        observation.arms_beside(np.zeros(4))("left", np.zeros((1, 4)))
-        self._brightness = self._appearance.brightness.copy()
-
-    def observe(self, frame: Frame) -> TermObservation:
-        """Return the term's observation, which is zero without an image or a last posture."""
-        if frame.posture is None:
+    def observe(self, frame: Frame) -> TermObservation | None:
+        """Return the term's observation; None without an image or a last posture."""
+        before = frame.before
+        if before is None:
             # Tracking starts again, possibly in another light.
             self._brightness = self._appearance.brightness.copy()
-            return _SILENCE
+            return None
         image = None if frame.image is None else self._comparable(frame.image)
         if image is None:
-            return _SILENCE
-        zones = self._arms.zones(frame.posture)
+            return None
+        zones = zones_of(before)
         self._follow_light(image, frame.silhouette, zones)
         u0, v0, width, height = cv2.boundingRect(frame.silhouette)
         maps = self._maps(image, frame.silhouette, zones, (u0, v0, width, height))
-        if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), frame.posture):
+        if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), before):
             self._use(self._sleeves)
-        before = frame.posture[None]
-        others = {
-            side: self._arms.project(torsos_of(before), before[:, joints], side)[0]
-            for side, joints in ARMS.items()
-        }
-        return InnerCueObservation(self._arms, maps, (u0, v0), others)
+        return InnerCueObservation(
+            ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m),
+            tuple(arms_in_image(before, arm)[0] for arm in (0, 1)),
+        )
 
     def _comparable(self, image: Image) -> Image | None:
         """Return the image (H, W, channels) with the learned channels; None if it lacks colours."""
@@ -209,7 +188,7 @@ def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> Flo
     Args:
         image: (H, W, channels).
         silhouette: (H, W), 0 or 255.
-        zones: (6,), see :meth:`~.inner_cue_arms.ArmView.zones`.
+        zones: (6,), see :func:`~.inner_cue_arms.zones_of`.
     """
     u, v, half_width, half_height, hips, _ = zones.tolist()
     top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
@@ -234,43 +213,26 @@ def ratios_of(histograms: FloatArray) -> NDArray[np.float32]:
 
 
 @dataclass(frozen=True, eq=False)
-class InnerCueObservation:
-    """The cue of one frame; see :class:`~cardbox_tracker.estimation.cost.terms.TermObservation`.
+class InnerCueObservation(TermObservation):
+    """The cue of one frame.
 
     Attributes:
-        view: the person before the camera.
-        maps: ratios of hand and forearm, (2, h, w), nats.
-        corner: column and row of the image where the maps begin.
-        others: elbow and hand of each arm in the previous frame, (1, 2, 3).
+        gains: gains of arms in this frame.
+        before: elbow and hand of each arm in the previous frame, (1, 2, 3).
     """
 
-    view: ArmView
-    maps: NDArray[np.float32]
-    corner: tuple[int, int]
-    others: dict[str, FloatArray]
+    gains: ArmGains
+    before: tuple[FloatArray, ...]
 
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """Return zero costs, because the outline determines the torso."""
-        return _SILENCE.postures
+    def rate(self, posed: Posed) -> FloatArray:
+        """Rate the arms that count; the outline determines the trunk.
 
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Rate arms by the image at their place; the other arm has its last place."""
-        torsos = np.zeros((1, N_TORSO))
-        torsos[0, : len(torso)] = torso
-
-        def costs(side: str, arms: FloatArray) -> FloatArray:
-            points, hidden = self.view.project(torsos, arms, side)
-            other = self.others[_OTHER[side]]
-            return -self.view.gains(points, hidden, other, self.maps, self.corner)
-
+        While one arm is rated, the other one has its last place.
+        """
+        costs = np.zeros(len(posed))
+        seen = [arms_in_image(posed, arm) if posed.parts[1 + arm] else None for arm in (0, 1)]
+        for arm, here in enumerate(seen):
+            if here is not None:
+                other = seen[1 - arm]
+                costs -= self.gains(*here, self.before[1 - arm] if other is None else other[0])
         return costs
-
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """Rate both arms."""
-        torsos = torsos_of(postures)
-        seen = {s: self.view.project(torsos, postures[:, joints], s) for s, joints in ARMS.items()}
-        left, right = (
-            self.view.gains(*seen[side], seen[_OTHER[side]][0], self.maps, self.corner)
-            for side in ARMS
-        )
-        return -(left + right)

@@ -1,4 +1,4 @@
-"""Image coordinates of one person's arms, and the gains of the inner cue."""
+"""Arms of posed bodies in the image, and the gains of the inner cue."""
 
 from __future__ import annotations
 
@@ -9,121 +9,69 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import PLACE_NAMES, POSTURE, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import inner_cue_kernels as kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.estimation.cost.terms import Posed
 
-_SIDE_SIGN = {"left": 1.0, "right": -1.0}
 
-N_TORSO = TORSO.stop + len(PLACE_NAMES)
-"""Number of values of a torso: d1..d4, ``torso_x`` and ``torso_z``."""
+def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the left arm, 0, or the right arm, 1, of N states in the image.
+
+    Returns:
+        Column, row and pixels per metre of elbow and hand, (N, 2, 3); whether the hand is hidden
+        behind the trunk, (N,).
+    """
+    points, hidden = np.empty((len(posed), 2, 3)), np.empty(len(posed), np.bool_)
+    kernels.project_arms(posed.states, arm, posed.body, points, hidden)
+    return points, hidden
+
+
+def forearm_of(person: BodyModel) -> tuple[float, float]:
+    """Return length, including the fist, and width of a person's forearm, m."""
+    forearm = body_parts(person.sizes).forearm
+    return forearm.height_m, forearm.top_width_m
+
+
+def zones_of(posed: Posed) -> FloatArray:
+    """Return the places of head and torso of the first state in the image, (6,), px.
+
+    The values are the head's centre (u, v), the half axes of an ellipse around it, the row of the
+    hips, and the row of the torso's top.
+    """
+    zones = np.empty(6)
+    kernels.torso_zones(posed.states[0], posed.body, zones)
+    return zones
 
 
 @dataclass(frozen=True, eq=False)
-class ArmView:
-    """One person before one camera: the arguments that are constant over frames.
+class ArmGains:
+    """The gains of arms in one image.
 
     Attributes:
-        person: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Person`.
-        forearm: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Forearm`.
+        maps: log-likelihood ratios of hand and forearm, (2, h, w), nats.
+        corner: column and row of the image where the maps begin.
         weights: weight of a nat of hand and forearm, px of the outline, (2,).
+        px_per_m: scale at the expected place of the person.
+        forearm_m: length, including the fist, and width of the forearm.
     """
 
-    person: kernels.PersonTuple
-    forearm: kernels.ForearmTuple
+    maps: NDArray[np.float32]
+    corner: tuple[int, int]
     weights: FloatArray
+    px_per_m: float
+    forearm_m: tuple[float, float]
 
-    @classmethod
-    def of(
-        cls, body: BodyModel, camera: Camera, weights: FloatArray, lifts_shoulders: bool
-    ) -> ArmView:
-        """Return the view of ``body`` before a working camera that includes the pitch.
-
-        With ``lifts_shoulders``, the shoulders rise with the arms as in the whole-body filter by
-        default.
-        """
-        px_per_m = float(camera.fx) / body.placement.distance_m
-        lengths = _lengths(body, lifts_shoulders)
-        person = tuple(lengths), place_of(body), intrinsics_of(camera)
-        return cls(person, (lengths.forearm, lengths.forearm_width, px_per_m), weights)
-
-    def project(
-        self, torsos: FloatArray, arms: FloatArray, side: str
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return elbow and hand (N, 2, 3) in the image, and whether the hand is hidden (N,)."""
-        points, hidden = np.empty((len(arms), 2, 3)), np.empty(len(arms), np.bool_)
-        kernels.project_arms(
-            torsos,
-            np.ascontiguousarray(arms, dtype=np.float64),
-            _SIDE_SIGN[side],
-            self.person,
-            points,
-            hidden,
-        )
-        return points, hidden
-
-    def gains(
-        self,
-        points: FloatArray,
-        hidden: NDArray[np.bool_],
-        others: FloatArray,
-        maps: NDArray[np.float32],
-        corner: tuple[int, int],
+    def __call__(
+        self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
     ) -> FloatArray:
-        """Return the gains (N,), px, of arms at ``points`` (N, 2, 3).
+        """Return the gains (N,), px, of arms.
 
         Args:
-            points: see :meth:`project`.
-            hidden: (N,), see :meth:`project`.
+            points: see :func:`arms_in_image`.
+            hidden: see :func:`arms_in_image`.
             others: points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
-            maps: ratios of hand and forearm, (2, h, w), nats.
-            corner: column and row of the image where the maps begin.
         """
         gains = np.empty(len(points))
-        seen = maps, *corner
-        kernels.arm_gains(points, hidden, others, seen, self.forearm, self.weights, gains)
+        seen, forearm = (self.maps, *self.corner), (*self.forearm_m, self.px_per_m)
+        kernels.arm_gains(points, hidden, others, seen, forearm, self.weights, gains)
         return gains
-
-    def zones(self, posture: FloatArray) -> FloatArray:
-        """Return the places of head and torso of a posture (12,) or (14,) in the image, (6,), px.
-
-        The values are the head's centre (u, v), the half axes of an ellipse around it, the row of
-        the hips, and the row of the torso's top.
-        """
-        zones = np.empty(6)
-        kernels.torso_zones(torsos_of(posture[None])[0], self.person, zones)
-        return zones
-
-
-def torsos_of(postures: FloatArray) -> FloatArray:
-    """Return the torsos (N, 6) of postures (N, 12), or states (N, 14)."""
-    torsos = np.zeros((len(postures), N_TORSO))
-    places = postures[:, POSTURE.stop :]
-    torsos[:, TORSO] = postures[:, TORSO]
-    torsos[:, TORSO.stop : TORSO.stop + places.shape[1]] = places
-    return torsos
-
-
-def _lengths(body: BodyModel, lifts_shoulders: bool) -> kernels.Lengths:
-    girdle = WholeBodyCostConfig()
-    parts = body_parts(body.sizes)
-    return kernels.Lengths(
-        parts.shoulder_aside_m,
-        parts.shoulder_height_m,
-        parts.upper_arm.height_m,
-        parts.forearm.height_m,
-        parts.forearm.top_width_m,
-        parts.torso.top_m,
-        parts.torso.top_width_m,
-        parts.head.middle_m,
-        parts.head.forward_m,
-        parts.head.top_width_m,
-        parts.head.height_m,
-        parts.waist.height_m,
-        girdle.clavicle * body.size("shoulder_breadth"),
-        girdle.lift_gain if lifts_shoulders else 0.0,
-        float(np.radians(girdle.lift_from_deg)),
-    )

@@ -11,15 +11,14 @@ at its end. A hand weighs less, the more probably forearms are bare.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.appearance import FOREARM, HAND, TORSO
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
-from cardbox_tracker.estimation.cost.terms import ARMS
+from cardbox_tracker.estimation.cost.inner_cue_arms import ArmGains, arms_in_image, forearm_of
+from cardbox_tracker.estimation.cost.terms import Posed
 
 # Weight of a nat over the area of a forearm; neighbouring pixels and successive images are alike.
 _WEIGHT = 0.1
@@ -42,12 +41,19 @@ class Sleeves:
         log_odds: logarithm of the odds of bare forearms against sleeves.
     """
 
-    def __init__(self, histograms: FloatArray, view: ArmView) -> None:
-        """Prepare for a person with ``histograms`` (5, bins) before one camera."""
-        self._histograms = histograms.copy()
-        length_m, width_m, px_per_m = view.forearm
-        forearm_px = length_m * width_m * px_per_m**2
-        self._view = replace(view, weights=np.array([0.0, _WEIGHT / forearm_px]))
+    def __init__(self, person: BodyModel, px_per_m: float) -> None:
+        """Prepare for a person with an appearance; the scale is that of the expected place.
+
+        Raises:
+            ValueError: the person has no appearance.
+        """
+        if person.appearance is None:
+            raise ValueError("sleeves need a person with an appearance")
+        self._histograms = person.appearance.histograms.copy()
+        self._forearm_m = forearm_of(person)
+        self._px_per_m = px_per_m
+        forearm_px = self._forearm_m[0] * self._forearm_m[1] * px_per_m**2
+        self._weights = np.array([0.0, _WEIGHT / forearm_px])
         self.log_odds, self._told = _FIRST, 0.0
 
     @property
@@ -69,23 +75,23 @@ class Sleeves:
         histograms[FOREARM] = self._told * skin + (1.0 - self._told) * shirt
         return histograms
 
-    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], state: FloatArray) -> bool:
+    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> bool:
         """Learn from one image.
 
         Args:
             skin: log-likelihood ratios of the hand against the part behind, (h, w), nats; 0 where
                 both are alike.
             corner: column and row of the image where ``skin`` begins.
-            state: posture (12,) or state (14,) of the person.
+            posed: the person, one state.
 
         Returns:
             Whether ``histograms`` have changed.
         """
         inclined = np.where(skin != 0.0, skin + np.float32(_TOWARDS_BARE), np.float32(0.0))
-        maps, torso = np.stack([inclined, inclined]), torsos_of(state[None])
-        for side, joints in ARMS.items():
-            points, hidden = self._view.project(torso, state[None, joints], side)
-            seen = self._view.gains(points, hidden, points, maps, corner)
-            self.log_odds += float(seen[0])
+        maps = np.stack([inclined, inclined])
+        gains = ArmGains(maps, corner, self._weights, self._px_per_m, self._forearm_m)
+        for arm in (0, 1):
+            points, hidden = arms_in_image(posed, arm)
+            self.log_odds += float(gains(points, hidden, points)[0])
         self.log_odds = float(np.clip(self.log_odds, -_MOST, _MOST))
         return abs(self.bare - self._told) > _STEP

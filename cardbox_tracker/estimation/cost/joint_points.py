@@ -21,11 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
-from cardbox_tracker.body.posture import N_STATE, TORSO, TORSO_X
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.estimation.cost import joint_points_kernels as kernels
-from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.joint_points_kernels import (
     EARS,
     ELBOW,
@@ -39,17 +38,14 @@ from cardbox_tracker.estimation.cost.joint_points_kernels import (
     WRIST,
     EvidenceTuple,
 )
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
-    ArmCosts,
     Frame,
-    Silence,
+    Posed,
+    Residuals,
     Term,
     TermObservation,
-    TorsoCosts,
 )
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
 
@@ -73,7 +69,6 @@ _EXCHANGED, _EXCHANGED_M = 0.3, 0.1
 _BACK_S = 0.5
 
 _SIDES = tuple(ARMS)
-_SILENCE = Silence()
 
 
 @dataclass(frozen=True)
@@ -86,41 +81,40 @@ class JointPoints(Settings):
         limits=(0.0, 1.0),
     )
 
-    def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term for a measured person and a working camera."""
-        return JointPointsTerm(self, body, camera)
+    def build(self, person: BodyModel, camera: Camera) -> Term:
+        """Return the term for a person before a working camera."""
+        return JointPointsTerm(self, person, camera)
 
 
 class JointPointsTerm:
-    """The term for one body before one camera, which includes the pitch."""
+    """The term for one person before one camera, which includes the pitch."""
 
-    def __init__(self, config: JointPoints, body: BodyModel, camera: Camera) -> None:
-        """Prepare, and compile the kernels if necessary."""
+    def __init__(self, config: JointPoints, person: BodyModel, camera: Camera) -> None:
+        """Prepare for one person and one camera."""
         self.config, self._camera = config, camera
-        self._uses_bones = body.source != MEASURED
-        self.body = body_tuple(body, camera, WholeBodyCostConfig())
+        self._uses_bones = person.source != MEASURED
         self._elsewhere = 0
         # Time since left and right were first exchanged, s; None if they are not.
         self._exchanged_s: float | None = None
         self._newest_points: ImagePoints | None = None
         self._age_s = 0.0
 
-    def observe(self, frame: Frame) -> TermObservation:
-        """Return the term's observation, which is zero without points that can be used."""
-        points, before = self._newest(frame), frame.posture
+    def observe(self, frame: Frame) -> TermObservation | None:
+        """Return the term's observation; None without points that can be used."""
+        points = self._newest(frame)
         if points is None:
-            return _SILENCE
+            return None
         weight = self.config.weight * max(frame.foreground_px, 1)
         evidence = self._evidence(points, self._age_s)
         back = self._exchanged_s is not None and self._exchanged_s >= _BACK_S
-        return JointPointsObservation(self.body, evidence, weight, before, shows_back=back)
+        return JointPointsObservation(evidence, weight, shows_back=back)
 
     def _newest(self, frame: Frame) -> ImagePoints | None:
         """Return the newest points of this person, which may be of an earlier frame, if any."""
         self._age_s += frame.interval_s
         if self._exchanged_s is not None:
             self._exchanged_s += frame.interval_s
-        before, points = frame.posture, frame.points
+        before, points = frame.before, frame.points
         if before is None:
             self._newest_points, self._elsewhere, self._exchanged_s = None, 0, None
         if points is not None and not points.is_empty:
@@ -128,15 +122,14 @@ class JointPointsTerm:
             if points.stamp_ns is not None and frame.stamp_ns is not None:
                 age_s = abs(frame.stamp_ns - points.stamp_ns) / 1e9
             if age_s <= _OLDEST_S and before is not None:
-                points = self._checked(points, _whole(before[None])[0])
+                points = self._checked(points, before)
             if age_s <= _OLDEST_S and points is not None:
                 self._newest_points, self._age_s = points, age_s
         return self._newest_points if self._age_s <= _OLDEST_S else None
 
-    def _checked(self, points: ImagePoints, before: FloatArray) -> ImagePoints | None:
+    def _checked(self, points: ImagePoints, before: Posed) -> ImagePoints | None:
         """Return the points, left and right exchanged if necessary; None if not this person's."""
-        pixels = np.empty((N_POINTS, 3))
-        kernels.project(before, self.body, pixels)
+        pixels = projected(before)
         found = points_of(points)
         exchanged = points.exchanged()
         away_m, other_m = (self._distances(one, pixels) for one in (found, points_of(exchanged)))
@@ -178,52 +171,42 @@ class JointPointsTerm:
 
 
 @dataclass(frozen=True, eq=False)
-class JointPointsObservation:
+class JointPointsObservation(TermObservation):
     """The points of one frame.
 
     Attributes:
-        body: fields of :class:`~.kernel_arguments.Body`.
-        evidence: fields of :class:`~.joint_points_kernels.Evidence`.
+        seen: fields of :class:`~.joint_points_kernels.Evidence`.
         weight_px: cost of a squared residual of 1, px.
-        before: state of the previous frame; None at the start of tracking.
         shows_back: whether left and right have been exchanged for long: the person's back is seen.
     """
 
-    body: BodyTuple
-    evidence: EvidenceTuple
+    seen: EvidenceTuple
     weight_px: float
-    before: FloatArray | None
     shows_back: bool = False
 
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """See :class:`~.terms.TermObservation`."""
-        lifted = arms if arms is not None else self.before
-        of = np.zeros(N_STATE) if lifted is None else _whole(lifted[None])[0]
-
-        def rate(torsos: FloatArray) -> FloatArray:
-            costs = np.empty(len(torsos))
-            kernels.rate_torsos(_with_torsos(torsos), of, self.body, self.evidence, costs)
-            return self.weight_px * costs
-
-        return rate
-
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """See :class:`~.terms.TermObservation`."""
-        state = _with_torsos(torso[None])[0]
-
-        def rate(side: str, arms: FloatArray) -> FloatArray:
-            costs, arm = np.empty(len(arms)), _SIDES.index(side)
-            angles = np.ascontiguousarray(arms, np.float64)
-            kernels.rate_arms(angles, arm, state, self.body, self.evidence, costs)
-            return self.weight_px * costs
-
-        return rate
-
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """See :class:`~.terms.TermObservation`."""
-        costs = np.empty(len(postures))
-        kernels.rate_bodies(_whole(postures), self.body, self.evidence, costs)
+    def rate(self, posed: Posed) -> FloatArray:
+        """Rate hips, ears and shoulders of trunks, and all joints of arms."""
+        costs = np.empty(len(posed))
+        kernels.rate(posed.states, posed.arms_of, posed.parts, posed.body, self.seen, costs)
         return self.weight_px * costs
+
+    def residuals(self, posed: Posed) -> Residuals:
+        """Return the residuals of points and bones in units of their deviations."""
+        count = len(posed)
+        found = Residuals(
+            np.empty((count, kernels.N_RESIDUALS)),
+            np.empty((count, kernels.N_RESIDUALS, N_STATE)),
+            np.empty(count),
+        )
+        kernels.residuals(posed.states, posed.body, self.seen, tuple(found))
+        return found
+
+
+def projected(posed: Posed) -> FloatArray:
+    """Return column, row (px) and depth (m) of the ten joints of the first state, (10, 3)."""
+    pixels = np.empty((N_POINTS, 3))
+    kernels.project(posed.states[0], posed.body, pixels)
+    return pixels
 
 
 def level_sight(camera: Camera, column_px: float) -> FloatArray:
@@ -292,19 +275,3 @@ def _depth(bone: FloatArray) -> float:
     """Return the component of a vector (3,) along z as a fraction of its length."""
     length = float(np.linalg.norm(bone))
     return float(bone[2]) / length if length > 0.0 else float("nan")
-
-
-def _with_torsos(torsos: FloatArray) -> FloatArray:
-    """Return states (N, 14) with torsos (N, 4), or (N, 6) with the place; the arms hang."""
-    states = np.zeros((len(torsos), N_STATE))
-    states[:, TORSO] = torsos[:, TORSO]
-    if torsos.shape[1] > TORSO.stop:
-        states[:, TORSO_X:] = torsos[:, TORSO.stop :]
-    return states
-
-
-def _whole(postures: FloatArray) -> FloatArray:
-    """Return states (N, 14) of postures (N, 12) or (N, 14)."""
-    states = np.zeros((len(postures), N_STATE))
-    states[:, : postures.shape[1]] = postures
-    return states

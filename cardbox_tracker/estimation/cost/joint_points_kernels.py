@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import (
     BOTTOM,
@@ -23,6 +24,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     HEIGHT,
     Body,
     BodyTuple,
+    Drawn,
     Floats,
     Intrinsics,
     body_of,
@@ -36,15 +38,26 @@ from cardbox_tracker.estimation.cost.kinematics import (
     state_pose,
     turn_arm,
 )
+from cardbox_tracker.estimation.cost.outline_motions import (
+    TWIST,
+    moves,
+    write_twists,
+    write_velocity,
+)
 
 # Joints with a point: four of each arm, the middle of the hips, and the middle of the ears.
 SHOULDER, ELBOW, WRIST, KNUCKLES = 0, 1, 2, 3
 POINTS_OF_ARM, HIPS, EARS, N_POINTS = 4, 8, 9, 10
 # Bones: upper arm and forearm of each arm, and the line from the right to the left shoulder.
 SHOULDERS, N_BONES = 4, 5
+N_RESIDUALS = 2 * N_POINTS + N_BONES
+# The rigid segment to which each point belongs; the arm's elevation raises its shoulder.
+_SEGMENT = (1, 1, 2, 2, 3, 3, 4, 4, 0, 0)
 
 MOST = 16.0
-"""Limit of a squared residual."""
+"""Limit of a squared residual in a rating."""
+PULL = 4.0 * MOST
+"""The same in a fit: a point that is too far away to count in the cost still pulls."""
 WRIST_SHARE = 0.73
 """Place of the wrist between elbow and knuckles: forearm and half of the hand have 0.146 and 0.054
 of the stature (Drillis & Contini 1966)."""
@@ -69,6 +82,8 @@ class Evidence(NamedTuple):
 
 
 EvidenceTuple = tuple[Floats, Floats, Floats, Floats]
+Found = tuple[Floats, Floats, Floats]
+"""Values, Jacobian and costs of :class:`~.terms.Residuals`."""
 
 
 @inlined_kernel
@@ -103,20 +118,20 @@ def _place_arm(
 
 
 @inlined_kernel
-def place_body(
+def _place_body(
     state: Floats,
-    arms: Floats,
+    arms_of: Floats,
     of: Body,
     scratch: tuple[Floats, Floats],
     posed: PosedArm,
     points: Floats,
 ) -> None:
-    """Write all points (10, 3) of the torso of ``state`` with the arms of ``arms``, each (14,)."""
+    """Write all points (10, 3) of the torso of ``state`` with the arms of ``arms_of``, (14,)."""
     rotation, hip = scratch
     state_pose(state, of.place, of.camera, rotation, hip)
     _place_trunk(rotation, hip, of, points)
     for arm in range(2):
-        _place_arm(angles_in(arms, arm), arm, rotation, hip, of, posed, points)
+        _place_arm(angles_in(arms_of, arm), arm, rotation, hip, of, posed, points)
 
 
 @inlined_kernel
@@ -142,14 +157,20 @@ def _along(begin: int, end: int, points: Floats, away: Floats) -> float:
 
 
 @inlined_kernel
+def bone_ends(bone: int) -> tuple[int, int]:
+    """Return the points at which a bone begins and ends."""
+    if bone == SHOULDERS:
+        return POINTS_OF_ARM + SHOULDER, SHOULDER
+    first, is_forearm = POINTS_OF_ARM * (bone // 2), bone % 2 == 1
+    begin, end = (ELBOW, KNUCKLES) if is_forearm else (SHOULDER, ELBOW)
+    return first + begin, first + end
+
+
+@inlined_kernel
 def bone_residual(bone: int, points: Floats, seen: Evidence) -> float:
     """Return the residual of a bone, in units of its deviation."""
-    if bone == SHOULDERS:
-        along = _along(POINTS_OF_ARM + SHOULDER, SHOULDER, points, seen.away)
-    else:
-        first, is_forearm = POINTS_OF_ARM * (bone // 2), bone % 2 == 1
-        end = first + (KNUCKLES if is_forearm else ELBOW)
-        along = _along(first + (ELBOW if is_forearm else SHOULDER), end, points, seen.away)
+    begin, end = bone_ends(bone)
+    along = _along(begin, end, points, seen.away)
     residual: float = (along - seen.bones[bone, 0]) / seen.bones[bone, 2]
     return residual
 
@@ -158,6 +179,12 @@ def bone_residual(bone: int, points: Floats, seen: Evidence) -> float:
 def _limited(score: float, square: float) -> float:
     """Return the cost of a squared residual."""
     return score * MOST * (1.0 - exp(-square / MOST)) if score > 0.0 else 0.0
+
+
+@inlined_kernel
+def _pulled(score: float, square: float) -> float:
+    """Return the cost of a squared residual in a fit, where farther points still pull."""
+    return score * PULL * (1.0 - exp(-square / PULL)) if score > 0.0 else 0.0
 
 
 @inlined_kernel
@@ -190,46 +217,90 @@ def _cost_of_trunk(points: Floats, camera: Intrinsics, seen: Evidence) -> float:
 
 
 @kernel
-def rate_bodies(states: Floats, body: BodyTuple, evidence: EvidenceTuple, costs: Floats) -> None:
-    """Write the costs (N,) of states (N, 14)."""
-    of, seen = body_of(body), Evidence(*evidence)
-    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
-    for i in range(states.shape[0]):
-        place_body(states[i], states[i], of, scratch, posed, points)
-        costs[i] = _cost_of_trunk(points, of.camera, seen)
-        for arm in range(2):
-            costs[i] += _cost_of_arm(arm, points, of.camera, seen)
-
-
-@kernel
-def rate_torsos(
-    states: Floats, arms_of: Floats, body: BodyTuple, evidence: EvidenceTuple, costs: Floats
+def rate(
+    states: Floats,
+    arms_of: Floats,
+    parts: Drawn,
+    body: BodyTuple,
+    evidence: EvidenceTuple,
+    costs: Floats,
 ) -> None:
-    """Write the costs (N,) of the torsos of states (N, 14), of hips, ears and shoulders.
+    """Write the costs (N,) of the parts of states (N, 14) that count.
 
-    The shoulders are lifted as by the arms of the state ``arms_of`` (14,).
+    Trunks without arms count with their shoulders, which the arms of ``arms_of``, (N, 14) or
+    (1, 14), raise.
     """
     of, seen = body_of(body), Evidence(*evidence)
     scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
     for i in range(states.shape[0]):
-        place_body(states[i], arms_of, of, scratch, posed, points)
-        costs[i] = _cost_of_trunk(points, of.camera, seen)
+        lifting = arms_of[i if arms_of.shape[0] > 1 else 0]
+        _place_body(states[i], lifting, of, scratch, posed, points)
+        costs[i] = _cost_of_trunk(points, of.camera, seen) if parts[0] else 0.0
         for arm in range(2):
-            costs[i] += _cost_of_point(POINTS_OF_ARM * arm + SHOULDER, points, of.camera, seen)
+            if parts[1 + arm]:
+                costs[i] += _cost_of_arm(arm, points, of.camera, seen)
+            elif parts[0]:
+                costs[i] += _cost_of_point(POINTS_OF_ARM * arm + SHOULDER, points, of.camera, seen)
 
 
 @kernel
-def rate_arms(
-    arms: Floats, arm: int, torso: Floats, body: BodyTuple, evidence: EvidenceTuple, costs: Floats
-) -> None:
-    """Write the costs (N,) of arms (N, 4), 0 left or 1 right, beside the torso of a state (14,)."""
+def residuals(states: Floats, body: BodyTuple, evidence: EvidenceTuple, found: Found) -> None:
+    """Write residuals, their Jacobian and the costs of states (N, 14); see ``Residuals``.
+
+    A point X of a rigid segment moves by v + w x X with the twist (v, w) of each value of the state
+    that moves the segment (:mod:`.outline_motions`).
+    """
     of, seen = body_of(body), Evidence(*evidence)
-    rotation, hip = np.empty((3, 3)), np.empty(3)
-    posed, points = new_arm(), np.empty((N_POINTS, 3))
-    state_pose(torso, of.place, of.camera, rotation, hip)
-    for i in range(arms.shape[0]):
-        _place_arm(arms[i], arm, rotation, hip, of, posed, points)
-        costs[i] = _cost_of_arm(arm, points, of.camera, seen)
+    values, jacobian, costs = found
+    scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
+    twists, moved = np.empty((N_STATE, TWIST)), np.zeros((N_POINTS, 3, N_STATE))
+    for n in range(states.shape[0]):
+        state = states[n]
+        _place_body(state, state, of, scratch, posed, points)
+        write_twists(state, body, twists)
+        for i in range(N_POINTS):
+            for d in range(N_STATE):
+                if moves(d, _SEGMENT[i]):
+                    write_velocity(twists[d], points[i], moved[i, :, d])
+        costs[n] = 0.0
+        for i in range(N_POINTS):
+            u, v = residual(i, points, of.camera, seen) if seen.points[i, 2] > 0.0 else (0.0, 0.0)
+            root = sqrt(seen.points[i, 2] * exp(-(u * u + v * v) / PULL))
+            costs[n] += _pulled(seen.points[i, 2], u * u + v * v)
+            values[n, 2 * i], values[n, 2 * i + 1] = root * u, root * v
+            z = max(points[i, 2], _NEAREST_M)
+            metric = seen.deviations[i, 0] * of.camera.fx / z
+            variance = metric * metric + seen.deviations[i, 1] ** 2
+            scale = root / sqrt(variance)
+            # A nearer joint may also be farther away in the image.
+            shrinks = metric * metric / (variance * z)
+            x, y = points[i, 0] / z, points[i, 1] / z
+            for d in range(N_STATE):
+                dx, dy, dz = moved[i, 0, d], moved[i, 1, d], moved[i, 2, d]
+                across, down = of.camera.fx * (dx - x * dz) / z, of.camera.fy * (dy - y * dz) / z
+                jacobian[n, 2 * i, d] = scale * across + root * u * shrinks * dz
+                jacobian[n, 2 * i + 1, d] = scale * down + root * v * shrinks * dz
+        for bone in range(N_BONES):
+            row = 2 * N_POINTS + bone
+            score = seen.bones[bone, 1]
+            value = bone_residual(bone, points, seen) if score > 0.0 else 0.0
+            root = sqrt(max(score, 0.0) * exp(-(value * value) / PULL))
+            costs[n] += _pulled(score, value * value)
+            values[n, row] = root * value
+            begin, end = bone_ends(bone)
+            length, along = 1e-18, 0.0
+            for c in range(3):
+                part = points[end, c] - points[begin, c]
+                length += part * part
+                along += part * seen.away[c]
+            length = sqrt(length)
+            along /= length
+            for d in range(N_STATE):
+                change = 0.0
+                for c in range(3):
+                    towards = seen.away[c] - along * (points[end, c] - points[begin, c]) / length
+                    change += towards * (moved[end, c, d] - moved[begin, c, d])
+                jacobian[n, row, d] = root * change / (length * seen.bones[bone, 2])
 
 
 @kernel
@@ -237,7 +308,7 @@ def project(state: Floats, body: BodyTuple, pixels: Floats) -> None:
     """Write column, row and depth of all points of a state (14,) to ``pixels`` (10, 3)."""
     of = body_of(body)
     scratch, posed, points = (np.empty((3, 3)), np.empty(3)), new_arm(), np.empty((N_POINTS, 3))
-    place_body(state, state, of, scratch, posed, points)
+    _place_body(state, state, of, scratch, posed, points)
     for i in range(N_POINTS):
         z = max(points[i, 2], _NEAREST_M)
         pixels[i, 0] = of.camera.fx * points[i, 0] / z + of.camera.cx

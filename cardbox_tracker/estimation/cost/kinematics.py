@@ -24,6 +24,7 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     UPPER_ARM,
     UPWARDS,
     BodyTuple,
+    Drawn,
     Floats,
     Intrinsics,
     Place,
@@ -251,3 +252,28 @@ def keypoints(state: Floats, body: BodyTuple, points: Floats) -> None:
         for i in range(3):
             for j in range(3):
                 points[3 * k + i, j] = arm.joints[i, j]
+
+
+@kernel
+def keypoints_of_states(
+    states: Floats, arms_of: Floats, parts: Drawn, body: BodyTuple, points: Floats
+) -> None:
+    """Write the joints of N states, (N, 6, 3), metres in the optical frame; see ``Posed``.
+
+    Joints of arms that do not count are nan; the shoulders of trunks that count are as the arms of
+    ``arms_of``, (N, 14) or (1, 14), raise them.
+    """
+    of = body_of(body)
+    rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()
+    for n in range(states.shape[0]):
+        state_pose(states[n], of.place, of.camera, rotation, hip)
+        for k in range(2):
+            counts = parts[1 + k]
+            lifting = states[n] if counts else arms_of[n if arms_of.shape[0] > 1 else 0]
+            angles = angles_in(lifting, k)
+            pose_arm(angles, side_of(k), of.parts, of.girdle, arm.points, arm.directions)
+            turn_arm(arm, rotation, hip)
+            for i in range(3):
+                is_known = counts or (i == 0 and parts[0])
+                for j in range(3):
+                    points[n, 3 * k + i, j] = arm.joints[i, j] if is_known else np.nan

@@ -19,7 +19,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import NEAREST_M, TORSO_X
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import Frame, Silence, Silhouette, Term
+from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import Bodies, Ratings, WholeBodyCost, iou_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -93,9 +93,9 @@ class MultiViewCost:
                 cost.terms = ()
                 continue
             # The pixels that count; those of the legs of a further camera's silhouette do not.
-            frame = frames[number].with_foreground(cost.silhouette_px)
+            frame = frames[number].changed(foreground_px=cost.silhouette_px)
             observed = (term.observe(frame) for term in counting)
-            cost.terms = tuple(one for one in observed if not isinstance(one, Silence))
+            cost.terms = tuple(one for one in observed if one is not None)
 
     @property
     def silhouette_px(self) -> int:
@@ -183,12 +183,6 @@ class MultiViewCost:
             areas_px += more.areas_px
         self._divide(ratings)
         return Bodies(ratings, costs_px, areas_px, points)
-
-    def point_costs(self, states: FloatArray) -> FloatArray:
-        """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
-        if not any(self.costs[number].terms for number in {0, *self.seeing}):
-            return np.zeros(len(states))
-        return self._sum(lambda cost, to_view: cost.point_costs(to_view(states)))
 
     def ious(self, state: FloatArray, seeing: Sequence[int]) -> list[float | None]:
         """Return the IoU of a state (14,) and the silhouette of each camera.

@@ -67,6 +67,21 @@ def segment_of(patch: int) -> int:
 
 
 @inlined_kernel
+def moves(value: int, segment: int) -> bool:
+    """Return whether a value of a state moves a segment."""
+    nearest = _MOVED[value]
+    return nearest == segment or nearest == 0 or (nearest % 2 == 1 and segment == nearest + 1)
+
+
+@inlined_kernel
+def write_velocity(twist: Floats, point: Floats, velocity: Floats) -> None:
+    """Write the velocity v + w x X (3,) of a point X (3,) that moves with a twist (v, w), (6,)."""
+    velocity[0] = twist[0] + twist[4] * point[2] - twist[5] * point[1]
+    velocity[1] = twist[1] + twist[5] * point[0] - twist[3] * point[2]
+    velocity[2] = twist[2] + twist[3] * point[1] - twist[4] * point[0]
+
+
+@inlined_kernel
 def _turn_about(
     axis: tuple[float, float, float], rotation: Floats, at: Floats, twist: Floats
 ) -> None:

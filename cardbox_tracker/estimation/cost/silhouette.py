@@ -19,19 +19,35 @@ import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.terms import Frame, Image, Silhouette, TermObservation
+from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Image, Silhouette, TorsoCosts
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.given_arrays import image_from, silhouette_from
 
 
-class SilhouetteObservation(TermObservation):
-    """One silhouette.
+class SilhouetteObservation(ABC):
+    """One silhouette, as the paper's hierarchical filter rates it: torsos, then arms beside one.
 
-    For torsos, the patches of torso, waist and head are drawn together with the given arms; for
-    arms, the trunk and this arm are drawn; for whole postures, all patches are drawn.
+    The first call of the first two methods computes what all particles share.
     """
 
     frame: Frame
+
+    @abstractmethod
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """Return the function that rates torsos d1..d4: torso, waist and head are drawn.
+
+        Args:
+            arms: posture (12,) whose arms are drawn at their place in the image while the torsos
+                move; None to draw no arms.
+        """
+
+    @abstractmethod
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """Return the function that rates arms beside the torso (4,): trunk and arm are drawn."""
+
+    @abstractmethod
+    def postures(self, postures: FloatArray) -> FloatArray:
+        """Return the costs (N,) of postures (N, 12) with all patches drawn, px."""
 
     @abstractmethod
     def overlap(self, posture: FloatArray) -> tuple[int, float]:
@@ -62,7 +78,8 @@ class SilhouetteTerm(ABC):
         if image is not None:
             image = image_from(image, size=size)
         upper = np.ascontiguousarray(silhouette[: self.rows])
-        return Frame(silhouette, self.rows, cv2.countNonZero(upper), image)
+        channels = {"silhouette": silhouette} | ({} if image is None else {"image": image})
+        return Frame(self.camera, channels, self.rows, cv2.countNonZero(upper))
 
     @abstractmethod
     def observe(self, frame: Frame) -> SilhouetteObservation:

@@ -1,29 +1,25 @@
-"""The cost of a posture: a sum of terms, each in pixels of the image.
+"""Frames, and the contract of a term of the cost.
 
-A tracker's cost is the silhouette's term (paper, equation (2)) and any further ones. A
-:class:`Term` is made once for a body before a camera. For each frame its :meth:`~Term.observe`
-returns a :class:`TermObservation`, the evidence of the term in this frame. An observation is
-constant, so several filters and threads may use it at the same time.
+A tracker's cost is a sum of terms, each in pixels of the image: silhouette, colours, depth, points,
+or your own (``docs/extending.md``). Data flows through four types:
 
-A hierarchical filter first rates torsos and then arms beside the torso that it has found. So an
-observation has three methods:
+    settings.build(person, camera) -> Term           once, for each camera of the tracker
+    term.observe(frame) -> TermObservation           once for each image of that camera
+    observation.rate(posed) -> px (N,)               many times, for states before that camera
+    observation.residuals(states) -> Residuals       for the refiner, if the term has any
 
-    observation.torsos_beside(arms)(torsos)         (N, 4) -> (N,)    the arms are fixed
-    observation.arms_beside(torso)(side, arms)      (N, 4) -> (N,)    the torso is fixed
-    observation.postures(postures)                  (N, 12) -> (N,)
-
-The first call of the first two methods computes the values that all particles share. The whole-body
-filter also estimates ``torso_x`` and ``torso_z``. It rates torsos without arms, and appends these
-two values to torsos, (N, 6) or (6,), and to postures, (N, 14). So a term reads d1..d4 and d1..d12
-by index and uses the last two values if they are given. A new term is one
-new file with a settings class, see ``docs/extending.md``.
+Everything that a term gets belongs to *its* camera: the frame's channels are turned upright, and
+the states of ``posed`` are in that camera's level frame. So a term neither knows nor needs the
+number of cameras. An observation never changes, so several searches may share it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +28,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.detection.image_points import ImagePoints
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Drawn
+from cardbox_tracker.estimation.cost.kinematics import keypoints_of_states
 from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
@@ -44,6 +42,11 @@ USUAL_INTERVAL_S = 1.0 / 15.0
 ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
 """Slice of each arm's joints in a posture."""
 
+WHOLE: Drawn = (True, True, True)
+TRUNK: Drawn = (True, False, False)
+ARM: tuple[Drawn, Drawn] = (False, True, False), (False, False, True)
+"""Which of trunk, left arm and right arm count; ``ARM[0]`` is the left arm, ``ARM[1]`` the right."""
+
 TorsoCosts = Callable[[FloatArray], FloatArray]
 """Takes torsos d1..d4, (N, 4), rad and metres; returns costs (N,), px."""
 
@@ -51,118 +54,155 @@ ArmCosts = Callable[[str, FloatArray], FloatArray]
 """Takes ``left`` or ``right`` and that arm's joints, (N, 4), rad; returns costs (N,), px."""
 
 
-@dataclass(frozen=True)
-class Frame:
-    """The data of one camera at one time, prepared for filter and terms.
+class Posed:
+    """States of one person before one camera, and the parts of the body that are rated.
+
+    A search first rates trunks, then arms beside one trunk, then whole bodies. Joints of parts that
+    do not count are nan, so that a term may add up what it knows.
 
     Attributes:
-        silhouette: (H, W), 0 or 255, of the camera's size; do not write to it.
-        rows: number of rows that count, from the top to the hips.
-        foreground_px: foreground pixels in those rows.
-        image: (H, W) grey or (H, W, 3) bgr of the same frame, undistorted; None without one.
-        posture: state of the previous frame, (12,) or with ``torso_x`` and ``torso_z`` (14,), rad
-            and metres; None at the start of tracking.
-        depth_m: (H, W), metres along the optical axis; unknown depths are 0 or not finite; None
-            without a depth image.
-        interval_s: time since the previous frame, s.
-        stamp_ns: time of the frame, ns; None if it is unknown.
-        points: the person's joints in the image, from a detector; None without one.
+        body: fields of :class:`~.kernel_arguments.Body`: the person placed before this camera, and
+            the camera.
+        states: d1..d12, ``torso_x`` and ``torso_z``, (N, 14), rad and metres, in the level frame of
+            this camera.
+        parts: whether trunk, left arm and right arm count.
+        lifted: state (14,) whose arms raise the shoulders of trunks that are rated without arms.
     """
 
-    silhouette: Silhouette
+    def __init__(
+        self,
+        body: BodyTuple,
+        states: FloatArray,
+        parts: Drawn = WHOLE,
+        lifted: FloatArray | None = None,
+    ) -> None:
+        """Pose a body; joints are computed when a term first asks for them."""
+        self.body, self.states, self.parts, self.lifted = body, states, parts, lifted
+
+    def __len__(self) -> int:
+        """Return the number of states."""
+        return len(self.states)
+
+    @property
+    def arms_of(self) -> FloatArray:
+        """States (N, 14) or (1, 14) whose arms raise the shoulders."""
+        return self.states if self.lifted is None else self.lifted[None]
+
+    @cached_property
+    def keypoints_m(self) -> FloatArray:
+        """Joints ordered as ``KEYPOINT_NAMES``, (N, 6, 3), metres in the camera's optical frame."""
+        points = np.empty((len(self.states), 6, 3))
+        keypoints_of_states(self.states, self.arms_of, self.parts, self.body, points)
+        return points
+
+    @cached_property
+    def keypoints_px(self) -> FloatArray:
+        """The same joints in the image, column and row, (N, 6, 2), px."""
+        fx, fy, cx, cy = self.body[4][:4]
+        ahead_m = np.maximum(self.keypoints_m[..., 2:], 1e-3)
+        pixels: FloatArray = self.keypoints_m[..., :2] / ahead_m * (fx, fy) + (cx, cy)
+        return pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The data of one camera at one time.
+
+    Attributes:
+        camera: the working camera, upright.
+        channels: data by the names of :data:`~cardbox_tracker.estimation.observation.CHANNELS`,
+            turned upright; ``frame[name]`` is None without data. There is always a silhouette,
+            (H, W), 0 or 255, of the camera's size; do not write to it.
+        rows: number of rows of the silhouette that count, from the top to the hips.
+        foreground_px: foreground pixels in those rows.
+        before: the posture of the previous frame before this camera; None at the start of tracking.
+        interval_s: time since the previous frame, s.
+        stamp_ns: time of the frame, ns; None if it is unknown.
+    """
+
+    camera: Camera
+    channels: Mapping[str, Any]
     rows: int
     foreground_px: int
-    image: Image | None = None
-    posture: FloatArray | None = None
-    depth_m: DepthImage | None = None
+    before: Posed | None = None
     interval_s: float = USUAL_INTERVAL_S
     stamp_ns: int | None = None
-    points: ImagePoints | None = None
 
-    def with_foreground(self, foreground_px: int) -> Frame:
-        """Return the frame with other foreground pixels, faster than ``dataclasses.replace``."""
-        whole = self.image, self.posture, self.depth_m, self.interval_s, self.stamp_ns, self.points
-        return Frame(self.silhouette, self.rows, foreground_px, *whole)
+    def __getitem__(self, channel: str) -> Any:
+        """Return the data of a channel; None without data."""
+        return self.channels.get(channel)
+
+    @property
+    def silhouette(self) -> Silhouette:
+        """The person's silhouette, (H, W), 0 or 255."""
+        silhouette: Silhouette = self.channels["silhouette"]
+        return silhouette
+
+    @property
+    def image(self) -> Image | None:
+        """(H, W) grey or (H, W, 3) bgr, undistorted; None without one."""
+        return self["image"]
+
+    @property
+    def depth_m(self) -> DepthImage | None:
+        """(H, W), metres along the optical axis; unknown depths are 0; None without one."""
+        return self["depth_m"]
+
+    @property
+    def points(self) -> ImagePoints | None:
+        """The person's joints in the image, from a detector; None without one."""
+        return self["points"]
+
+    def changed(self, **values: Any) -> Frame:
+        """Return the frame with other attributes."""
+        return replace(self, **values)
 
 
-class TermObservation(Protocol):
-    """The evidence of one term in one frame; all costs are in pixels, float64."""
+class Residuals(NamedTuple):
+    """Robust residuals of N states, for a Gauss-Newton step.
 
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """Return the function that rates torsos.
+    Attributes:
+        values: residuals in units of their deviations, times the root of their robust weight,
+            (N, R).
+        jacobian: derivatives of ``values`` by the values of the states, (N, R, 14), with constant
+            weights.
+        costs: robust costs, (N,), which a step should reduce.
+    """
 
-        Args:
-            arms: posture (12,) whose arms keep their place in the image while the torsos move; None
-                to rate torsos without arms.
-        """
+    values: FloatArray
+    jacobian: FloatArray
+    costs: FloatArray
 
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """Return the function that rates arms beside the torso ``torso``, (4,) or (6,)."""
 
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """Return the costs (N,) of whole postures, (N, 12) or (N, 14)."""
+class TermObservation:
+    """The evidence of one term in one frame. A term overrides what it knows."""
+
+    def rate(self, posed: Posed) -> FloatArray:
+        """Return the costs (N,) of the parts that count, px."""
+        return np.zeros(len(posed))
+
+    def residuals(self, posed: Posed) -> Residuals | None:
+        """Return residuals of whole bodies for the refiner; None without any."""
+        return None
+
+    def evidence(self, posed: Posed) -> Mapping[str, float]:
+        """Return values by name that tell whether a result, one state, may be wrong."""
+        return MappingProxyType({})
 
 
 class Term(Protocol):
-    """One summand of the cost of a posture."""
+    """One summand of the cost of a posture, for one person before one camera."""
 
-    def observe(self, frame: Frame) -> TermObservation:
-        """Return the observation of ``frame``."""
+    def observe(self, frame: Frame) -> TermObservation | None:
+        """Return the observation of ``frame``; None if the frame has nothing for this term."""
 
 
 class TermSettings(Protocol):
     """The settings of a term, an element of ``TrackerConfig.terms``."""
 
-    def build(self, body: BodyModel, camera: Camera) -> Term:
-        """Return the term for a measured person and a working camera."""
+    def build(self, person: BodyModel, camera: Camera) -> Term | None:
+        """Return the term for a person before an upright working camera.
 
-
-class Silence:
-    """A term, and its observation, with zero costs."""
-
-    def observe(self, frame: Frame) -> TermObservation:
-        """See :class:`Term`."""
-        return self
-
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """See :class:`TermObservation`."""
-        return self.postures
-
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """See :class:`TermObservation`."""
-        return lambda side, arms: self.postures(arms)
-
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """See :class:`TermObservation`."""
-        return np.zeros(len(postures))
-
-
-@dataclass(frozen=True)
-class SumOfTerms:
-    """The sum of the observations of several terms."""
-
-    parts: tuple[TermObservation, ...]
-
-    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
-        """See :class:`TermObservation`."""
-        costs = [part.torsos_beside(arms) for part in self.parts]
-        return costs[0] if len(costs) == 1 else lambda torsos: _total(c(torsos) for c in costs)
-
-    def arms_beside(self, torso: FloatArray) -> ArmCosts:
-        """See :class:`TermObservation`."""
-        costs = [part.arms_beside(torso) for part in self.parts]
-        if len(costs) == 1:
-            return costs[0]
-        return lambda side, arms: _total(c(side, arms) for c in costs)
-
-    def postures(self, postures: FloatArray) -> FloatArray:
-        """See :class:`TermObservation`."""
-        return _total(part.postures(postures) for part in self.parts)
-
-
-def _total(costs: Iterator[FloatArray]) -> FloatArray:
-    """Return the sum of arrays (N,) in their order; the first array is overwritten."""
-    total = next(costs)
-    for cost in costs:
-        total += cost
-    return total
+        None if the term can say nothing about this person. With several cameras it is called once
+        for each; ``person`` is then placed before ``camera``.
+        """

@@ -9,9 +9,9 @@ and arms are the same. So a further camera needs no other kernels.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import asin, atan2, cos, hypot, sin
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,7 +25,7 @@ from cardbox_tracker.errors import BodyModelError, CameraError
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.extrinsics import Extrinsics
 
-ImageArray = NDArray[np.uint8]
+AnyImage = NDArray[Any]
 LevelPoint = tuple[float, float]
 """Coordinates x and y of a point or a direction in a level frame, metres."""
 
@@ -134,35 +134,17 @@ class View:
         moved: FloatArray = points_m @ _about_vertical(self.yaw_rad).T + self.offset_m
         return moved
 
-    def upright(
-        self,
-        image: ImageArray,
-        is_mask: bool = False,
-        box: Sequence[int] | None = None,
-    ) -> ImageArray:
+    def upright(self, image: AnyImage, is_mask: bool = False) -> AnyImage:
         """Return an image (H, W) or (H, W, 3) of the camera turned upright.
 
-        Args:
-            image: image of the camera.
-            is_mask: whether pixels beyond the image are 0 instead of the nearest border pixel.
-            box: column, row, width and height of the needed part; the rest is 0.
+        Pixels beyond the image are 0 in a mask, or else those of the nearest border.
         """
         if self.turn is None:
             return image
         border = cv2.BORDER_CONSTANT if is_mask else cv2.BORDER_REPLICATE
-        turn = self.turn
-        if box is not None:
-            left, top, width, height = box
-            if not width:
-                return np.zeros((*turn.shape[:2], *image.shape[2:]), np.uint8)
-            turn = turn[top : top + height, left : left + width]
         # The nearest pixel suffices for colours, too, because they are averaged over 3x3 pixels.
-        turned = cv2.remap(image, turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
-        if box is None:
-            return np.asarray(turned, np.uint8)
-        whole = np.zeros((*self.turn.shape[:2], *image.shape[2:]), np.uint8)
-        whole[top : top + height, left : left + width] = turned
-        return whole
+        turned = cv2.remap(image, self.turn, _NO_FRACTIONS, cv2.INTER_NEAREST, borderMode=border)
+        return np.asarray(turned, image.dtype)
 
     def upright_px(self, px: FloatArray) -> FloatArray:
         """Return where pixels (N, 2) of the camera's image lie in the upright image."""

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import MEASURED, BodyModel
-from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
 from cardbox_tracker.body.posture import (
     TORSO_X,
     TORSO_Y,
@@ -33,23 +32,26 @@ from cardbox_tracker.estimation.cost.bit_planes import (
 )
 from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
-from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    intrinsics_of,
-    place_of,
-)
+from cardbox_tracker.estimation.cost.kernel_arguments import Drawn, intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.rating_arguments import ObservedTuple, Points
-from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
+from cardbox_tracker.estimation.cost.terms import (
+    ARM,
+    ARMS,
+    TRUNK,
+    WHOLE,
+    Posed,
+    Silhouette,
+    TermObservation,
+)
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.array_checks import check_array
 from cardbox_tracker.vision.camera import Camera
 
 SIDES = tuple(ARMS)
 _NO_WORDS = np.zeros((1, 0), np.uint64)
-_TORSO_OF_TERMS = [*range(TORSO_ANGLES.stop), TORSO_X, TORSO_Z]
-_BOTH_ARMS, _TRUNK = (False, True, True), (True, False, False)
+_BOTH_ARMS = (False, True, True)
 
 
 class Bodies(NamedTuple):
@@ -183,16 +185,13 @@ class WholeBodyCost:
         ratings = np.empty(len(states))
         seen = self._by(self._beside, self.silhouette_px + gain)
         kernels.rate_trunks(states, self.body, *seen, ratings)
-        for term in self.terms:
-            ratings += self._scale * term.torsos_beside(None)(states[:, _TORSO_OF_TERMS])
-        return ratings
+        return self._with_terms(ratings, states, TRUNK, arms_of)
 
     def fix_torso(self, torso: FloatArray) -> None:
         """Rate arms beside the trunk of the state ``torso`` (14,) from now on."""
         self._torso, self._beside_arm = torso, None
-        gain = kernels.cover(torso, _TRUNK, self.body, self.counted, self._seen, self._beside_trunk)
+        gain = kernels.cover(torso, TRUNK, self.body, self.counted, self._seen, self._beside_trunk)
         self._by_arms = self._by(self._beside_trunk, self.silhouette_px + gain)
-        self._arm_terms = [term.arms_beside(torso[_TORSO_OF_TERMS]) for term in self.terms]
 
     def uncovered(self, arm: int) -> Planes:
         """Return the planes outside of the fixed torso and the arm opposite to ``arm``."""
@@ -222,7 +221,7 @@ class WholeBodyCost:
         ratings = np.zeros(len(joints))
         seen = self.uncovered(arm), self.counted, self._scale
         add_costs_of_arms(joints, self._torso, self.body, *seen, ratings)
-        return self._with_terms(ratings, arms, arm)
+        return self._with_terms(ratings, self._with_arms(arms, arm), ARM[arm])
 
     def arms(self, arms: FloatArray, arm: int) -> tuple[FloatArray, FloatArray]:
         """Rate arms (N, 4), 0 left or 1 right, beside the fixed torso.
@@ -233,12 +232,26 @@ class WholeBodyCost:
         ratings, joints_m = np.empty(len(arms)), np.empty((len(arms), 3, 3))
         of_arms = 1.0 - 2.0 * arm, self._torso, self.body, *self._by_arms
         kernels.rate_arms(arms, *of_arms, ratings, joints_m)
-        return self._with_terms(ratings, arms, arm), joints_m
+        return self._with_terms(ratings, self._with_arms(arms, arm), ARM[arm]), joints_m
 
-    def _with_terms(self, ratings: FloatArray, arms: FloatArray, arm: int) -> FloatArray:
-        """Add the further terms of arms (N, 4) to their ``ratings`` (N,), which are returned."""
-        for costs in self._arm_terms:
-            ratings += self._scale * costs(SIDES[arm], arms)
+    def _with_arms(self, arms: FloatArray, arm: int) -> FloatArray:
+        """Return states (N, 14) of the fixed torso with arms (N, 4), 0 left or 1 right."""
+        states = np.repeat(self._torso[None], len(arms), axis=0)
+        states[:, ARMS[SIDES[arm]]] = arms
+        return states
+
+    def _with_terms(
+        self,
+        ratings: FloatArray,
+        states: FloatArray,
+        parts: Drawn = WHOLE,
+        lifted: FloatArray | None = None,
+    ) -> FloatArray:
+        """Add the further terms of states (N, 14) to their ``ratings`` (N,), which are returned."""
+        if self.terms:
+            posed = Posed(self.body, states, parts, lifted)
+            for term in self.terms:
+                ratings += self._scale * term.rate(posed)
         return ratings
 
     def pairs(self, states: FloatArray, into: Ratings | None = None) -> Ratings:
@@ -246,8 +259,7 @@ class WholeBodyCost:
         ratings, joints_m, keypoints_m = into or _new_ratings(len(states))
         points = joints_m, keypoints_m
         kernels.rate_pairs(states, self.body, *self._by_arms, ratings, points)
-        for term in self.terms:
-            ratings += self._scale * term.postures(states)
+        self._with_terms(ratings, states)
         return Ratings(ratings, *points)
 
     def bodies(self, states: FloatArray, into: Ratings | None = None) -> Bodies:
@@ -256,17 +268,8 @@ class WholeBodyCost:
         costs_px, areas_px = pixels = np.empty(len(states)), np.empty(len(states))
         points = joints_m, keypoints_m
         kernels.rate_bodies(states, self.body, *self._by_body, ratings, pixels, points)
-        for term in self.terms:
-            ratings += self._scale * term.postures(states)
+        self._with_terms(ratings, states)
         return Bodies(ratings, costs_px, areas_px, Points(*points))
-
-    def point_costs(self, states: FloatArray) -> FloatArray:
-        """Return the part of the ratings of states (N, 14) that is due to detected points, (N,)."""
-        costs = np.zeros(len(states))
-        for term in self.terms:
-            if isinstance(term, JointPointsObservation):
-                costs += self._scale * term.postures(states)
-        return costs
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""

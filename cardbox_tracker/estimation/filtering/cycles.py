@@ -11,9 +11,9 @@ from cardbox_tracker.body.posture import TORSO_Y, clip_to_limits, reference_post
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, SumOfTerms, Term
+from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
-from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter
+from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
 from cardbox_tracker.vision.rasterisation import render
 
@@ -52,6 +52,7 @@ class Cycles:
         body, camera = silhouette.body, silhouette.camera
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
         self._keypoints = CompiledKeypoints(body, camera)
+        self._posable = config.posable(body, camera)
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
@@ -85,7 +86,8 @@ class Cycles:
         """See :class:`PoseFilter`."""
         (frame,), (further,) = frames, terms
         seen = self._term.observe(frame)
-        observation = SumOfTerms((seen, *(term.observe(frame) for term in further)))
+        observed = (term.observe(frame) for term in further)
+        observation = SumOfTerms(seen, [one for one in observed if one is not None], self._posable)
         if self._started:
             for _ in range(self._config.cycles):
                 self.hierarchy.iterate(observation)

@@ -7,21 +7,88 @@ with the paper's particles a second thread saves no time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, TORSO, TORSO_Y
+from cardbox_tracker.body.posture import JOINT_LIMITS, N_JOINTS, N_STATE, POSTURE, TORSO, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.terms import ARMS, TermObservation
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Drawn
+from cardbox_tracker.estimation.cost.terms import (
+    ARM,
+    ARMS,
+    TRUNK,
+    ArmCosts,
+    Posed,
+    TermObservation,
+    TorsoCosts,
+)
 from cardbox_tracker.estimation.filtering.particle_filter import CostFunction, ParticleFilter
 
 _REFERENCE_AREA_PX = 320 * 240
 
 RunFilter = Callable[[ParticleFilter, CostFunction, slice], None]
 """Runs one step of a filter; takes the filter, the costs of its particles, and its joints."""
+
+
+class HierarchicalCost(Protocol):
+    """What the filters rate their particles with."""
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`~cardbox_tracker.estimation.cost.silhouette.SilhouetteObservation`."""
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`~cardbox_tracker.estimation.cost.silhouette.SilhouetteObservation`."""
+
+
+@dataclass(frozen=True)
+class SumOfTerms:
+    """The silhouette's cost and that of further terms.
+
+    Attributes:
+        silhouette: the paper's cost.
+        terms: observations of further terms.
+        body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body` with the
+            paper's shoulders, which the arms do not raise.
+    """
+
+    silhouette: HierarchicalCost
+    terms: Sequence[TermObservation]
+    body: BodyTuple
+
+    def torsos_beside(self, arms: FloatArray | None) -> TorsoCosts:
+        """See :class:`HierarchicalCost`."""
+        beside = self.silhouette.torsos_beside(arms)
+
+        def costs(torsos: FloatArray) -> FloatArray:
+            postures = np.zeros((len(torsos), N_JOINTS))
+            postures[:, TORSO] = torsos
+            return beside(torsos) + self._further(postures, TRUNK)
+
+        return costs if self.terms else beside
+
+    def arms_beside(self, torso: FloatArray) -> ArmCosts:
+        """See :class:`HierarchicalCost`."""
+        beside = self.silhouette.arms_beside(torso)
+
+        def costs(side: str, arms: FloatArray) -> FloatArray:
+            postures = np.zeros((len(arms), N_JOINTS))
+            postures[:, TORSO], postures[:, ARMS[side]] = torso, arms
+            return beside(side, arms) + self._further(postures, ARM[list(ARMS).index(side)])
+
+        return costs if self.terms else beside
+
+    def _further(self, postures: FloatArray, parts: Drawn) -> FloatArray:
+        states = np.zeros((len(postures), N_STATE))
+        states[:, POSTURE] = postures
+        posed, total = Posed(self.body, states, parts), np.zeros(len(postures))
+        for term in self.terms:
+            total += term.rate(posed)
+        return total
 
 
 class HierarchicalFilter:
@@ -53,7 +120,7 @@ class HierarchicalFilter:
         self._estimate = np.zeros(N_JOINTS)
 
     def initialize(
-        self, observation: TermObservation, posture: FloatArray, noise_scale: float = 1.0
+        self, observation: HierarchicalCost, posture: FloatArray, noise_scale: float = 1.0
     ) -> None:
         """Start all filters around ``posture`` (12,) on a first observation."""
         self._estimate = posture
@@ -63,7 +130,7 @@ class HierarchicalFilter:
 
         self._run(observation, run)
 
-    def iterate(self, observation: TermObservation, noise_scale: float = 1.0) -> None:
+    def iterate(self, observation: HierarchicalCost, noise_scale: float = 1.0) -> None:
         """Run one estimation cycle of all filters, with ``noise_scale`` as factor on sigma_beta."""
 
         def run(of: ParticleFilter, evaluate: CostFunction, joints: slice) -> None:
@@ -71,7 +138,7 @@ class HierarchicalFilter:
 
         self._run(observation, run)
 
-    def _run(self, observation: TermObservation, run: RunFilter) -> None:
+    def _run(self, observation: HierarchicalCost, run: RunFilter) -> None:
         """Call ``run`` for the torso's filter, then for the arms' filters beside that torso."""
         average = self._config.average
         posture = np.empty(N_JOINTS)

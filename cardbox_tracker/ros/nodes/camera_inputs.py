@@ -193,7 +193,7 @@ class CameraInputs:
             raise CameraError("; ".join(problems))
         depth_m = self._depth(received[self._count :], first)
         stamp_ns = _stamp_ns(lead.message)
-        observations[0] = replace(observations[0], depth_m=depth_m, stamp_ns=stamp_ns)
+        observations[0] = observations[0].having(depth_m=depth_m, stamp_ns=stamp_ns)
         header = lead.message.header
         if received[0] is None:
             header = Header(stamp=header.stamp, frame_id=self._poses.frame_id)
@@ -215,7 +215,8 @@ class CameraInputs:
         if received is None or seen.silhouette is None:
             return seen
         header = received.message.header
-        return replace(seen, points=self._keypoints.points(number, header, camera, seen.silhouette))
+        points = self._keypoints.points(number, header, camera, seen.silhouette)
+        return seen.having(points=points)
 
     def _depth(self, received: Sequence[Received | None], camera: Camera) -> DepthImage | None:
         if not received or received[0] is None:
