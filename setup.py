@@ -11,8 +11,6 @@ HOME = "https://github.com/cardbox-tracker/cardbox_tracker"
 
 # A ROS installation has these, so pip installs them only on request.
 ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
-# The tools that train the package's networks and coefficients need these 3 GB.
-LEARN = ["scikit-learn>=1.4,<2", "torch>=2.2,<3"]
 TEST = [
     "bvh>=0.3,<1",
     "catkin_pkg>=1.0",
@@ -25,7 +23,6 @@ TEST = [
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.5",
     "ruff>=0.6",
-    "scikit-learn>=1.4,<2",
     "types-PyYAML",
     "types-tqdm",
     "yourdfpy>=0.0.56",
@@ -138,7 +135,6 @@ setup(
         "colcon": COLCON,
         "view": VIEW,
         "retarget": RETARGET,
-        "learn": LEARN,
         "detector": DETECTOR,
         "parquet": PARQUET,
         "docs": DOCS,

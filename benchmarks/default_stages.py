@@ -15,7 +15,6 @@ from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.filtering import whole_body
 from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
-from cardbox_tracker.estimation.filtering.refinement import Refinement
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.tracker import Tracker
 
@@ -29,8 +28,6 @@ _PARTS: dict[str, tuple[Any, str]] = {
     "search of both arms": (ArmSearch, "__call__"),
     "search of all joints together": (WholeBodyFilter, "_together"),
     "fit to the outline": (OutlineFit, "__call__"),
-    "learned correction": (Refinement, "corrected"),
-    "learned deviations": (Refinement, "deviations"),
     "states of the keypoints": (whole_body, "judged"),
 }
 

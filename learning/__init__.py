@@ -1,1 +1,1 @@
-"""Training data and training of the package's learned parts; see docs/research/learning.md."""
+"""Training of the pose prior that the package contains."""

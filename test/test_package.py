@@ -294,7 +294,6 @@ def test_what_is_imported_is_declared() -> None:
         "pink": "pin-pink",
         "pinocchio": "pin",
         "rerun": "rerun-sdk",
-        "sklearn": "scikit-learn",
         "yaml": "pyyaml",
     }
     from_ros = {"rclpy", "ament_index_python", "launch", "launch_ros", *MESSAGES}

@@ -1,9 +1,8 @@
 """Report how true the keypoints' states are: ``python -m tools.keypoint_states``.
 
 The command reads sessions.json and real-people.json, which ``cardbox evaluate --sessions`` writes
-to docs/evaluation, and simulated-states.json of ``python -m learning.odds`` if it is there. It
-writes keypoint-states.md beside them, and docs/images/keypoint-states.png with a reliability
-diagram for each kind of keypoint.
+to docs/evaluation. It writes keypoint-states.md beside them, and docs/images/keypoint-states.png
+with a reliability diagram for each kind of keypoint.
 """
 
 from __future__ import annotations
@@ -26,10 +25,9 @@ _TEXT = """\
 
 A keypoint is wrong if it is off by more than 30 cm. The tracker gives each keypoint a probability
 of being wrong and, from it, a [state](../conventions.md#states). The tables compare both with the
-truth; all errors are absolute, so a wrong distance of the person counts. The networks were trained
-with none of these recordings. Made by `python -m tools.keypoint_states` from the figures of
-[sessions](sessions.md) and [real people](real-people.md), and of `python -m learning.odds` for
-simulated people.
+truth; all errors are absolute, so a wrong distance of the person counts. Made by
+`python -m tools.keypoint_states` from the figures of [sessions](sessions.md) and
+[real people](real-people.md).
 
 ![Reliability diagrams](../images/keypoint-states.png)
 
@@ -74,10 +72,6 @@ def groups_of(folder: Path) -> dict[str, list[Mapping[str, Any]]]:
                 name += ", with detector"
             runs = [run for run in entry["runs"] if run.get("keypoint_states")]
             groups.setdefault(name, []).extend(runs)
-    simulated = folder / "simulated-states.json"
-    if simulated.is_file():
-        for name, figures in read_json(simulated)["groups"].items():
-            groups[f"simulated, {name}"] = [figures]
     groups = {name: runs for name, runs in groups.items() if runs}
     if not groups:
         raise CardboxError(

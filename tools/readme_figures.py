@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -28,14 +27,7 @@ BEGIN, END = "<!-- evaluation:begin -->", "<!-- evaluation:end -->"
 SESSIONS_BEGIN, SESSIONS_END = "<!-- sessions:begin -->", "<!-- sessions:end -->"
 RESULTS = Path("docs/evaluation")
 ACCURACY, SESSIONS_REPORT, PEOPLE = "accuracy.json", "sessions.md", "real-people.json"
-LEFT_OUT = "left-out.json"
 BENCHMARKS = Path("docs/benchmarks.json")
-# People and what was left out, by the source in left-out.json.
-_LEFT_OUT = {
-    "rocketbox": ("simulated, dressed avatars, all kinds of motion", "body"),
-    "makehuman": ("simulated, MakeHuman's bodies, all kinds of motion", "body"),
-    "cmu-1": ("simulated, motion capture of five subjects", "motion"),
-}
 
 
 def readme_section(results: Mapping[str, Any], recorded: Mapping[str, Mapping[str, Any]]) -> str:
@@ -105,8 +97,8 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
             f"Mean 3D error of shoulders, elbows and hands, preset `default`, "
             f"{len(results['seeds'])} seeds. *Aligned* is the error after both skeletons are "
             "shifted to the middle of their shoulders, because MediaPipe Pose (one camera) has no "
-            "metric place. *Left out* says what of a row was not among the data that priors and "
-            "correction learned from:"
+            "metric place. *Left out* says what of a row was not among the data that the prior "
+            "learned from:"
         ),
         "",
         "| people | cameras | left out | aligned | with detector | MediaPipe | absolute "
@@ -123,28 +115,6 @@ def sessions_section(results: Mapping[str, Any], others: Sequence[Mapping[str, A
     return "\n".join(lines)
 
 
-def left_out_rows(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows as ``accuracy.json`` has them, of ``left-out.json``."""
-    rows = []
-    for source, (people, left_out) in _LEFT_OUT.items():
-        (found,) = (
-            row for row in results if (row["left_out"], row["people"]) == (source, "measured")
-        )
-        rows.append(
-            {
-                "people": f"{people} ({found['recordings']} recordings)",
-                "cameras": "one",
-                "left_out": left_out,
-                "aligned": found["aligned"][1],
-                "mediapipe": None,
-                "absolute": found["absolute"][1],
-                "without_correction": [found["aligned"][0], found["absolute"][0]],
-                "source": "[left out](docs/evaluation/left-out.md)",
-            }
-        )
-    return rows
-
-
 def current(root: Path) -> str:
     """Return the text of the README in ``root`` with current figures."""
     folder = root / RESULTS
@@ -153,7 +123,6 @@ def current(root: Path) -> str:
     more = read_json(folder / ACCURACY)
     rows = [
         *people_rows(read_json(folder / PEOPLE), more["mediapipe"]),
-        *left_out_rows(json.loads((folder / LEFT_OUT).read_text(encoding="utf-8"))),
         *more["rows"],
     ]
     sessions = sessions_section(read_json(folder / "sessions.json"), rows)
@@ -200,10 +169,6 @@ def _row(name: str, motion: Mapping[str, Any]) -> str:
 
 def _accuracy_row(row: Mapping[str, Any]) -> str:
     aligned, absolute = _range(row["aligned"]), _range(row["absolute"])
-    if "without_correction" in row:
-        without = row["without_correction"]
-        aligned += f" ({without[0]:.1f} without the correction)"
-        absolute += f" ({without[1]:.1f})"
     cells = (
         *(row["people"], row["cameras"], row["left_out"], aligned),
         *(_range(row.get("with_detector")), _range(row["mediapipe"]), absolute),

@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import ARM_ANGLES, FIRST_ANGLES, TORSO_X, TORSO_Y, TORSO_Z
+from cardbox_tracker.body.posture import ARM_ANGLES, FIRST_ANGLES
 from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.commands.arguments import at_least
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.body_priors import PENETRATION, WEIGHT, penetration, priors
-from cardbox_tracker.estimation.cost.keypoint_fit_kernels import fit_keypoints, pose_at_keypoints
 from cardbox_tracker.estimation.cost.outline_distances import STATE_STEP
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.estimate import Estimate
@@ -45,7 +44,9 @@ FAR_M = 0.20
 
 # The true state may differ from the found one by this in place and angles of the torso and arms.
 _STDDEV = np.array([0.02, 0.05, 0.05, 0.05, *[0.5] * (2 * ARM_ANGLES), 0.02, 0.02])
-_STEPS = 5
+# Gauss-Newton steps, the deviation of a joint from its wanted place, m, and the fits that begin
+# with other arms.
+_STEPS, _SPREAD_M, _STARTS = 10, 0.01, 8
 # Search near the true joints: rounds, states in a round, first noise, its decay, and the distance
 # that a joint may move, m.
 _ROUNDS, _STATES, _DECAY, _REACH_M = 6, 60, 0.7, 0.04
@@ -85,21 +86,47 @@ def terms_of(cost: WholeBodyCost, state: FloatArray) -> FloatArray:
     return np.array([pixels, by_part[0], *arms, inside.sum(), rest])
 
 
-def state_at(cost: WholeBodyCost, found: FloatArray, keypoints_m: FloatArray) -> FloatArray:
+def state_at(
+    cost: WholeBodyCost, found: FloatArray, keypoints_m: FloatArray, rng: np.random.Generator
+) -> FloatArray:
     """Return a state (14,) whose arms are as true ones and whose torso is near that of ``found``.
 
     Args:
         cost: cost of the tracked body.
         found: state of the search, (14,).
         keypoints_m: true keypoints (6, 3), metres in the optical frame.
+        rng: source of the arms from which the fits begin.
     """
     middle = cost.keypoints(found)[list(SHOULDERS)].mean(axis=0)
     wanted = keypoints_m - keypoints_m[list(SHOULDERS)].mean(axis=0) + middle
-    state = found.copy()
-    pose_at_keypoints(state, cost.body, wanted, cost.limits)
-    place = [TORSO_Y, TORSO_X, TORSO_Z]
-    state[place] = found[place]
-    fit_keypoints(state, cost.body, wanted, _STDDEV, cost.limits, STATE_STEP, _STEPS)
+    low, high = cost.limits.T
+    starts = np.repeat(found[None], _STARTS, axis=0)
+    for first in FIRST_ANGLES:
+        arm = slice(first, first + ARM_ANGLES)
+        starts[1:, arm] = rng.uniform(low[arm], high[arm], (_STARTS - 1, ARM_ANGLES))
+    fits = [_fitted(cost, start, found, wanted) for start in starts]
+    return min(fits, key=lambda state: float(np.linalg.norm(cost.keypoints(state) - wanted)))
+
+
+def _fitted(
+    cost: WholeBodyCost, state: FloatArray, found: FloatArray, wanted: FloatArray
+) -> FloatArray:
+    """Return the state (14,) after Gauss-Newton steps to keypoints (6, 3), m, near ``found``."""
+    torso = np.ones(len(state), dtype=bool)
+    torso[FIRST_ANGLES[0] : FIRST_ANGLES[0] + 2 * ARM_ANGLES] = False
+    weights = 1.0 / _STDDEV**2
+    for _ in range(_STEPS):
+        off = (wanted - cost.keypoints(state)).ravel()
+        jacobian = np.array(
+            [
+                (cost.keypoints(state + move) - cost.keypoints(state - move)).ravel() / (2 * step)
+                for step, move in zip(STATE_STEP, np.diag(STATE_STEP), strict=True)
+            ]
+        )
+        matrix = jacobian @ jacobian.T / _SPREAD_M**2 + np.diag(weights)
+        back = np.where(torso, weights * (found - state), 0.0)
+        change = np.linalg.solve(matrix, jacobian @ off / _SPREAD_M**2 + back)
+        state = np.clip(state + change, *cost.limits.T)
     return state
 
 
@@ -121,7 +148,7 @@ def compare(
     cost: WholeBodyCost, found: FloatArray, keypoints_m: FloatArray, rng: np.random.Generator
 ) -> Compared:
     """Compare the state ``found`` (14,) of the search with the one at true keypoints (6, 3)."""
-    true = best_near(cost, state_at(cost, found, keypoints_m), rng)
+    true = best_near(cost, state_at(cost, found, keypoints_m, rng), rng)
     off = beside_shoulders(np.stack([cost.keypoints(s) - keypoints_m for s in (found, true)]))
     away = np.linalg.norm(off, axis=2)
     joints = [j for j in range(len(keypoints_m)) if j not in SHOULDERS]

@@ -63,11 +63,6 @@ TURNS = slice(ROLL, YAW + 1)
 LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
 POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 
-MIRRORED = np.array([*range(4), *range(8, 12), *range(4, 8), TORSO_X, TORSO_Z])
-"""Index (14,) of each value in the state of the mirror image, where the arms change places."""
-MIRROR_SIGNS = np.array([-1.0, -1.0, 1.0, -1.0, *[1.0] * (N_STATE - 4)])
-"""Factor (14,) of each value in the mirror image: aside, roll and yaw turn over."""
-
 _TORSO_LIMITS_DEG = ((-45, 45), (-25, 90), (-60, 60))
 _ARM_LIMITS_DEG = ((-45, 180), (-60, 90), (-150, 150), (-10, 95))
 TORSO_Y_LIMIT_M = 3.0

@@ -24,7 +24,7 @@ _REPLACED = {
     "fov": ("calibration",),
     "calibration": ("fov",),
 }
-_FILE_OR_WORD = ("detector", "corrector")
+_FILE_OR_WORD = ("detector",)
 
 
 def options_of(options: argparse.Namespace, folder: Path, name: str) -> argparse.Namespace:

@@ -24,8 +24,6 @@ _OPTIONS = MappingProxyType(
         "torso.particles": "--particles",
         "arm.particles": "--particles",
         "whole_body.effort": "--effort",
-        "whole_body.corrector": "--corrector",
-        "whole_body.output_smoothing_s": "--output-smoothing-s",
     }
 )
 
@@ -35,7 +33,6 @@ def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
     from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
     from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
-    whole_body = settings_of(WholeBodyConfig)
     parser.add_argument(
         "--strategy",
         choices=STRATEGIES,
@@ -49,20 +46,14 @@ def add_tracker_settings(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="particles of each of the three filters of the preset paper; 200 by default",
     )
-    for name, kind, metavar in (
-        ("effort", float, "X"),
-        ("corrector", str, "NAME"),
-        ("output_smoothing_s", float, "S"),
-    ):
-        setting = whole_body[name]
-        allowed = f"; {setting.range_text}" if setting.range_text else ""
-        parser.add_argument(
-            f"--{name.replace('_', '-')}",
-            type=kind,
-            default=None,
-            metavar=metavar,
-            help=f"{setting.description}{allowed}; for the preset default",
-        )
+    effort = settings_of(WholeBodyConfig)["effort"]
+    parser.add_argument(
+        "--effort",
+        type=float,
+        default=None,
+        metavar="X",
+        help=f"{effort.description}; {effort.range_text}; for the preset default",
+    )
     parser.add_argument(
         "--settings",
         type=Path,

@@ -95,10 +95,10 @@ def check_person(options: argparse.Namespace) -> None:
 
 def inputs_of(options: argparse.Namespace) -> tuple[Path | None, ...]:
     """Return the files that the arguments of :func:`add_inputs` name."""
-    # These two may also be words, which name no file.
-    words = options.detector, options.corrector
     files = options.recording, options.model, options.extrinsics, options.settings
-    return *files, options.calibration, *(Path(word) for word in words if word)
+    # The detector may also be a word, which names no file.
+    detector = Path(options.detector) if options.detector else None
+    return *files, options.calibration, detector
 
 
 def track_inputs(

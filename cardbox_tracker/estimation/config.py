@@ -188,9 +188,6 @@ class TrackerConfig(Settings):
             if instead is not None:
                 where = "with the filter whole_body (preset default)"
                 raise NoEffectError(name, where, f"whole_body.{instead}")
-            is_corrected = self.whole_body.corrector != "none"
-            if last in ("output_smoothing_s", "learned_deviations") and not is_corrected:
-                raise NoEffectError(name, "without a corrector", "whole_body.corrector")
             return
         if name.startswith("whole_body"):
             instead = _OF_WHOLE_BODY.get(last, "torso.particles")

@@ -25,7 +25,7 @@ class Estimate:
             attributes are None.
         posture: d1..d12, (12,), rad and metres.
         posture_stddev: standard deviation of each joint, (12,), rad and metres: the weighted spread
-            of the particles, or the output of a learned model (``filtering/deviations.py``).
+            of the particles.
         keypoints_m: shoulder, elbow, hand of the left, then the right arm, (6, 3), metres in the
             optical frame.
         keypoint_states: state of each keypoint, (6,): ``tracked``; ``uncertain`` (it may be off by

@@ -107,8 +107,7 @@ class Fitting:
 
         Args:
             is_somebody: whether the image shows a person.
-            iou: IoU of model and silhouette before the learned correction; None if the person
-                was lost.
+            iou: IoU of model and silhouette before any correction; None if the person was lost.
         """
         self._absent = 0 if is_somebody else self._absent + 1
         if self._absent == _ABSENT_FRAMES:

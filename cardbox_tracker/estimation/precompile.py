@@ -45,7 +45,6 @@ def compile_all(
     beside = OtherCamera(camera, Extrinsics(np.eye(3), np.array([0.1, 0.0, 0.0])))
     silhouette = render(cardbox_patches(body, reference_posture("front")), camera)
     some = ImagePoints(np.full((len(POINT_NAMES), 2), 36.0), np.ones(len(POINT_NAMES)))
-    # With points, the learned correction may not run.
     found = (None, None, some, some) if points else (None, None)
     for name in presets:
         # Images with and without colour, since terms that use them are compiled for both.

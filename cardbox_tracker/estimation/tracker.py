@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import zip_longest
 from types import MappingProxyType
 
@@ -29,7 +30,12 @@ from cardbox_tracker.estimation.facing import Facing
 from cardbox_tracker.estimation.filtering.cycles import Cycles
 from cardbox_tracker.estimation.filtering.keypoint_states import doubted
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.pose_filter import MakeFilter, PoseFilter, Presence
+from cardbox_tracker.estimation.filtering.pose_filter import (
+    Corrector,
+    MakeFilter,
+    PoseFilter,
+    Presence,
+)
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter
 from cardbox_tracker.estimation.fitting import Fitting
 from cardbox_tracker.estimation.head import HeadTracker
@@ -61,6 +67,7 @@ class Tracker:
         silhouette: SilhouetteTerm | None = None,
         make_filter: MakeFilter | None = None,
         others: Sequence[OtherCamera] = (),
+        corrector: Corrector | None = None,
     ) -> None:
         """Set up for ``body``; the camera gets the pitch of the body model.
 
@@ -73,18 +80,22 @@ class Tracker:
             silhouette: implementation of the silhouette's term; compiled by default.
             make_filter: filter that replaces the one of the settings.
             others: further cameras; they need the filter ``whole_body``.
+            corrector: changes the fitted state of each frame before it becomes the result; joints
+                are kept within their limits. It needs the filter ``whole_body``.
 
         Raises:
             CameraError: the person was not measured in front of one of ``others``.
-            ValueError: there are ``others``, but the filter is not ``whole_body``.
+            ValueError: there are ``others`` or a ``corrector``, but the filter is not
+                ``whole_body``.
         """
         self.camera = camera.with_pitch(body.camera_pose.pitch_rad)
         self.config = config or TrackerConfig()
         self._rng = rng or np.random.default_rng(0)
-        self._make_filter = make_filter
+        self._make_filter, self._corrector = make_filter, corrector
         self._others = tuple(others)
-        if others and (make_filter or not self.config.has_several_views):
-            raise ValueError("several cameras need the filter whole_body: the preset default")
+        if (others or corrector) and (make_filter or not self.config.has_several_views):
+            what = "several cameras need" if others else "a corrector needs"
+            raise ValueError(f"{what} the filter whole_body: the preset default")
         self._fitting = None
         self.agreement: CameraAgreement | None = None
         if body.unknown:
@@ -106,6 +117,8 @@ class Tracker:
     def reset(self) -> None:
         """Forget the posture; the next frame is tracked from the front reference posture."""
         make_filter = self._make_filter or FILTERS[self.config.filter]
+        if self._corrector is not None:
+            make_filter = partial(WholeBodyFilter, corrector=self._corrector)
         for camera in self._cameras:
             camera.reset(self.config)
         rng = self._rng.spawn(1)[0]
@@ -119,7 +132,7 @@ class Tracker:
         self._particles: Particles | None = None
         # State (14,) of the previous frame for the terms.
         self._before: FloatArray | None = None
-        # IoU of the last result before its correction.
+        # IoU of the last result before any correction.
         self._seen_iou = 0.0
 
     def configure(self, config: TrackerConfig) -> bool:

@@ -30,9 +30,6 @@ import pytest
         (("--particles", "100"), "use --effort"),
         (("--strategy", "srs"), "use --effort"),
         (("--effort", "5"), "--effort is 5; expected 0.25 to 4"),
-        (("--output-smoothing-s", "-1"), "--output-smoothing-s is -1; expected 0 to 10"),
-        (("--corrector", "best"), "corrector is 'best'; expected learned, none, FILE.npz or"),
-        (("--corrector", "FOLDER/missing.npz"), "missing.npz: No such file"),
         (("--settings", "FOLDER/missing.yaml"), "missing.yaml: No such file or directory; give a"),
         (("--settings", "FOLDER/list.yaml"), "list.yaml: expected names and values"),
         (("--settings", "FOLDER/person.yaml"), "person.yaml: 'format' is no setting; "),
@@ -82,7 +79,6 @@ def test_mistakes_of_track(
         (("--effort=0.5",), "--effort has no effect with the filter hierarchical (preset paper)"),
         (("--effort=1",), "--effort has no effect with the filter hierarchical (preset paper)"),
         (("--effort=0.5",), "use --particles"),
-        (("--corrector=none",), "--corrector has no effect"),
     ],
 )
 def test_settings_that_do_nothing_with_the_paper_preset(
@@ -114,7 +110,7 @@ def test_a_background_or_depth_tells_the_person_from_the_scene(
     assert not (files / "out.csv").exists()
 
 
-@pytest.mark.parametrize("option", ["--detector", "--corrector", "--settings"])
+@pytest.mark.parametrize("option", ["--detector", "--settings"])
 def test_a_file_that_is_read_is_not_replaced(files: Path, option: str, cardbox: Callable) -> None:
     table = files / "text.txt"
     before = table.read_bytes()

@@ -13,7 +13,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.config import TrackerConfig, default_preset
+from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -35,12 +35,6 @@ GUESSED = MEASURED.with_values(source="proportions")
 BODIES = {"measured": MEASURED, "guessed": GUESSED}
 BEGIN_NS = 10**18
 HAND = 2
-
-
-def uncorrected(body: BodyModel) -> TrackerConfig:
-    """What was learned of people is not for the drawings of these tests."""
-    corrector = "none" if body is MEASURED else "learned"
-    return default_preset().changed({"whole_body": {"corrector": corrector}})
 
 
 def hidden(time_s: float) -> np.ndarray:
@@ -97,7 +91,7 @@ class Scene:
         **config: Any,
     ) -> tuple[np.ndarray, list[Estimate]]:
         """Return errors (count, 6), px, and estimates; the points of a frame are ``given``."""
-        tracker = Tracker(self.body, CAMERA, replace(uncorrected(self.body), **config))
+        tracker = Tracker(self.body, CAMERA, replace(default_preset(), **config))
         errors, estimates = np.full((count, 6), np.nan), []
         for number in range(count):
             posture = self.posture(number)
@@ -304,7 +298,7 @@ def test_points_of_one_camera_of_two_are_enough(
 ) -> None:
     other = beside()
     view = View.of(body, CAMERA, other)
-    tracker = Tracker(body, CAMERA, uncorrected(body), others=[other])
+    tracker = Tracker(body, CAMERA, default_preset(), others=[other])
     cost = WholeBodyCost(body, CAMERA, WholeBodyCostConfig())
     errors_m = []
     for number in range(24):
@@ -351,21 +345,6 @@ def test_without_points_the_term_changes_no_byte(body: BodyModel) -> None:
         assert (first.state, first.cost_px, first.iou) == (second.state, second.cost_px, second.iou)
         assert values(first) == values(second)
         assert first.posture is not None
-
-
-@both
-def test_points_give_the_depth_of_whom_nobody_measured(detected: Detect, body: BodyModel) -> None:
-    """For measured people the learned correction goes on; it moves the result of the search."""
-    tracker = Tracker(body, CAMERA, default_preset())
-    for number in range(4):
-        posture = wave(number / 8.0)
-        points = detected(body, CAMERA, posture)
-        estimate = tracker.track(Observation(silhouette(posture), points=points))
-        found = tracker.filter.refine.found  # type: ignore[attr-defined]
-        assert (found is not None) == (body is MEASURED)
-    assert estimate.posture is not None
-    if found is not None:
-        assert not np.allclose(found.state[:12], estimate.posture, atol=1e-3)
 
 
 @both

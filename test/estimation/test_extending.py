@@ -17,7 +17,7 @@ import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
-from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.posture import TORSO_X, reference_posture, state_limits
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.terms import ARMS, Frame, Silence
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -27,7 +27,7 @@ from cardbox_tracker.vision.rasterisation import render
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)
-FILES = {"clicked_points.py": CODE[0], "linear_corrector.py": CODE[2]}
+FILES = {"clicked_points.py": CODE[0], "seated.py": CODE[2]}
 STAMP_NS = 7_000_000_000
 FRONT = reference_posture("front")
 
@@ -117,8 +117,7 @@ def test_the_tracker_follows_clicked_points(folder: Path) -> None:
     at = {name: tuple(wanted_px[KEYPOINT_NAMES.index(name)]) for name in names}
     away_px = []
     for points in ({}, {STAMP_NS + i: at for i in range(8)}):
-        config = tracker.config.changed({"whole_body": {"corrector": "none"}})
-        config = replace(config, terms=(clicked.ClickedPoints(points),))
+        config = replace(tracker.config, terms=(clicked.ClickedPoints(points),))
         of = Tracker(tracker.body, tracker.camera, config)
         for i in range(8):
             estimate = of.track(silhouette_of(of, posture), stamp_ns=STAMP_NS + i)
@@ -128,22 +127,30 @@ def test_the_tracker_follows_clicked_points(folder: Path) -> None:
     assert away_px[1] < 5.0 < away_px[0], away_px
 
 
-def test_a_corrector_from_a_file_is_fitted_and_used(folder: Path) -> None:
-    linear = module_of("linear_corrector")
-    rng = np.random.default_rng(0)
-    body_m = np.array([0.0, 0.0, 2.5]) + keypoints_m(made_by(CODE[1]).body, FRONT)
-    found_m = body_m + 0.2 * rng.standard_normal((200, 6, 3))
-    # All results are 10 cm too near.
-    linear.fit(found_m, found_m + np.array([0.0, 0.0, 0.1]))
-    tracker = made_by(CODE[3])
-    nothing = PRESETS["default"]().changed({"whole_body": {"corrector": "none"}})
-    ahead_m = []
-    for of in (Tracker(tracker.body, tracker.camera, nothing), tracker):
-        for _ in range(8):
-            estimate = of.track(silhouette_of(of))
-        assert estimate.keypoints_m is not None
-        ahead_m.append(estimate.keypoints_m[:, 2].mean())
-    assert ahead_m[1] - ahead_m[0] == pytest.approx(0.1, abs=0.03)
+def test_a_corrector_changes_the_result_and_not_the_search(folder: Path) -> None:
+    tracker, seated = made_by(CODE[1]), module_of("seated")
+    body, camera, person = tracker.body, tracker.camera, silhouette_of(tracker)
+    farthest_m = state_limits(body.placement.distance_m)[TORSO_X, 1]
+    for corrector, wanted_m in ((seated.Seated(0.1), 0.1), (seated.Seated(99.0), farthest_m)):
+        plain = Tracker(body, camera, tracker.config)
+        corrected = Tracker(body, camera, tracker.config, corrector=corrector)
+        for _ in range(3):
+            usual, estimate = plain.track(person), corrected.track(person)
+        assert estimate.offset_m is not None and usual.offset_m is not None
+        assert estimate.offset_m[0] == pytest.approx(wanted_m)
+        assert usual.offset_m[0] != pytest.approx(wanted_m, abs=0.01)
+        assert estimate.posture is not None and usual.posture is not None
+        assert estimate.posture.tolist() == usual.posture.tolist()
+
+
+def test_a_corrector_that_cannot_be_used_is_refused(folder: Path) -> None:
+    tracker, seated = made_by(CODE[1]), module_of("seated")
+    body, camera = tracker.body, tracker.camera
+    with pytest.raises(ValueError, match=r"a corrector needs .* the preset default"):
+        Tracker(body, camera, PRESETS["paper"](), corrector=seated.Seated(0.1))
+    of = Tracker(body, camera, tracker.config, corrector=lambda frames, state: state[:12])
+    with pytest.raises(ValueError, match=r"shape \(12,\); expected \(14,\)"):
+        of.track(silhouette_of(tracker))
 
 
 def test_the_examples_pass_ruff(folder: Path) -> None:
@@ -164,7 +171,7 @@ def test_the_examples_pass_strict_mypy_beside_and_in_the_package(
     package = shutil.copytree(
         ROOT / "cardbox_tracker", tmp_path / "cardbox_tracker", ignore=ignored
     )
-    places = "cost/clicked_points.py", "filtering/linear_corrector.py"
+    places = "cost/clicked_points.py", "filtering/seated.py"
     files = [package / "estimation" / place for place in places]
     for file in files:
         file.write_text(FILES[file.name])

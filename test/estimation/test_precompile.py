@@ -23,7 +23,6 @@ from cardbox_tracker.estimation.cost import (
     inner_cue_kernels,
     joint_points_fit,
     joint_points_kernels,
-    keypoint_fit_kernels,
     kinematics,
     outline_fit_kernels,
     pose_prior,
@@ -36,13 +35,9 @@ from cardbox_tracker.estimation.cost.view import OtherCamera
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering import (
     arm_proposals,
-    correction,
     joint_moves,
     mirroring,
-    networks,
     particle_kernels,
-    result_features,
-    search_features,
     state_choice,
     torso_proposals,
 )
@@ -66,8 +61,7 @@ def compiled() -> dict[str, int]:
         *(kinematics, rasterisation, union, cardbox_kernels, inner_cue_kernels, row_sums),
         *(pose_prior, body_outline, body_priors, whole_body_kernels, arm_points),
         *(outline_fit_kernels, particle_kernels, person_region, still_things),
-        *(joint_points_fit, joint_points_kernels, keypoint_fit_kernels, mirroring),
-        *(correction, networks, result_features, search_features),
+        *(joint_points_fit, joint_points_kernels, mirroring),
         *(arm_proposals, joint_moves, state_choice, torso_proposals),
         *(contrast, regions, chroma, shadows, light, window),
     )

@@ -35,7 +35,6 @@ SHIRT, SKIN, WALL = (150, 60, 30), (110, 150, 210), (128, 128, 128)
 VALUES: dict[str, Any] = {
     "strategy": "srs",
     "filter": "whole_body",
-    "whole_body.corrector": "none",
     "whole_body.smallest_person": 1.0,
     "whole_body.lost_from": 0.05,
 }

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -193,12 +191,8 @@ def error_cm(estimate: Estimate, state: np.ndarray) -> float:
     return 100 * float(distances.mean())
 
 
-@pytest.mark.parametrize(("corrector", "least_iou"), [("none", 0.85), ("learned", 0.65)])
-def test_two_cameras_follow_and_any_of_them_may_drop_out(corrector: str, least_iou: float) -> None:
-    """People do not look as the model does, so what was learned of them fits its outline less."""
-    preset = default_preset()
-    config = replace(preset, whole_body=replace(preset.whole_body, corrector=corrector))
-    tracker = Tracker(BODY, CAMERA, config, others=[OTHER])
+def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
+    tracker = Tracker(BODY, CAMERA, default_preset(), others=[OTHER])
     errors, states = [], []
     for i in range(24):
         seeing = (0,) if 8 <= i < 12 else (1,) if 16 <= i < 20 else (0, 1)
@@ -210,7 +204,7 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out(corrector: str, least_i
         assert [n for n, iou in enumerate(ious) if iou is not None] == list(seeing)
         if len(seeing) == 1:
             assert ious[seeing[0]] == pytest.approx(estimate.iou)
-    assert min(iou for iou in ious if iou is not None) > least_iou
+    assert min(iou for iou in ious if iou is not None) > 0.85
     assert estimate.iou is not None
     assert estimate.iou > 0.8
     assert set(states[4:]) <= {TRACKING, UNCERTAIN}

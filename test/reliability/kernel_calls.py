@@ -31,10 +31,7 @@ from cardbox_tracker.estimation.cost.outline_distances import SeenOutline, compa
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
-from cardbox_tracker.estimation.filtering.correction import DATA, N_FEATURES
-from cardbox_tracker.estimation.filtering.networks import load_recurrent_network
 from cardbox_tracker.estimation.filtering.outline_fit import signed_distances
-from cardbox_tracker.estimation.filtering.packed_network import ROWS, PackedNetwork
 from cardbox_tracker.estimation.observation import Observation
 from cardbox_tracker.estimation.person_region import PersonRegion
 from cardbox_tracker.estimation.precompile import quickest
@@ -129,7 +126,6 @@ def terms() -> SimpleNamespace:
         region=PersonRegion(BODY, CAMERA),
         silhouette=CompiledSilhouette(BODY, CAMERA),
         whole=WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig()),
-        network=PackedNetwork(load_recurrent_network(DATA)),
         depth=Depth().build(BODY, CAMERA),
         inner=InnerCue().build(colored, CAMERA),
         tracker=Tracker(colored, CAMERA, quickest(PRESETS["default"]().with_depth())),
@@ -219,11 +215,6 @@ def rate_bodies(take: Take, _: Iterator[int]) -> None:
     whole.bearing()
 
 
-def answer_network(take: Take, _: Iterator[int]) -> None:
-    network = terms().network
-    network(take("f8", (ROWS, N_FEATURES)), take("f4", network.initial_hidden().shape))
-
-
 def rate_depth(take: Take, _: Iterator[int]) -> None:
     states = take("f8", (2, 14))
     terms().depth.costs(states, take("f4", SIZE))
@@ -279,7 +270,6 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "PersonRegion": select_person,
     "CompiledSilhouette": rate,
     "WholeBodyCost": rate_bodies,
-    "PackedNetwork": answer_network,
     "DepthTerm": rate_depth,
     "outlines": measure_outline,
     "InnerCueTerm": rate_colors,

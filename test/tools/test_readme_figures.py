@@ -104,19 +104,13 @@ def test_sessions_by_hand() -> None:
     results = {"seeds": [0, 1], "sessions": [session("a", 4.0, 8.0), session("b", 9.0, 6.0)]}
     other = {"people": "real", "cameras": "two", "source": "elsewhere", "mediapipe": None}
     other |= {"left_out": "body"}
-    text = sessions_section(
-        results,
-        [
-            other | {"aligned": [4.06, 6.7], "absolute": 7.3, "with_detector": 3.2},
-            other | {"aligned": 7.0, "absolute": 10.6, "without_correction": [6.7, 8.8]},
-        ],
-    )
+    real = other | {"aligned": [4.06, 6.7], "absolute": 7.3, "with_detector": 3.2}
+    text = sessions_section(results, [real])
     *rest, last = [line for line in text.splitlines() if " cm " in line]
     assert (
         "(2 recordings) | one | recording; used in development | 6.5 cm |  | 7.0 cm | 9.0" in last
     )
     assert rest[0] == "| real | two | body | 4.1 to 6.7 cm | 3.2 cm |  | 7.3 cm |  | elsewhere |"
-    assert "| 7.0 cm (6.7 without the correction) |  |  | 10.6 cm (8.8) |" in rest[1]
     words = " ".join(text.split())
     assert "on 1 of the 2 rendered recordings" in words
     assert "An image takes 2.5 ms" in words

@@ -48,7 +48,7 @@ def test_the_terms_add_up_to_the_rating() -> None:
 def test_the_state_at_the_true_joints_reaches_them_beside_a_person_elsewhere() -> None:
     rated = cost()
     truth = rated.keypoints(TRUE) + np.array([0.3, 0.0, 0.5])
-    posed = tool.state_at(rated, WRONG, truth)
+    posed = tool.state_at(rated, WRONG, truth, np.random.default_rng(0))
     off = rated.keypoints(posed) - rated.keypoints(TRUE)
     assert np.linalg.norm(off, axis=1).max() < 0.01
 

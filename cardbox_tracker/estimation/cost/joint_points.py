@@ -5,8 +5,7 @@ projected joints against the points of ``Frame.points``, and, if the detector es
 space, the directions of the bones along the line of sight. Detectors of single images take the
 camera for level, so these directions are compared along the horizontal line of sight.
 
-The directions are used for people who were not measured; for measured people the learned
-correction, which is trained on such, estimates the depth.
+The directions are used only for people who were not measured.
 
 Without new points, the last ones count for up to a second, less and less, because joints may have
 moved. Points that fit the last posture only with left and right exchanged are exchanged; if this

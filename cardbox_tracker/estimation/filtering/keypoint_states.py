@@ -1,8 +1,8 @@
 """State of each keypoint: whether it can be relied upon.
 
-A keypoint is wrong if it is off by more than 30 cm. The learned corrector gives the probability of
-this. Without it, each angle and place is taken to have a normal distribution with its standard
-deviation, and the keypoint's error to lie along one line.
+A keypoint is wrong if it is off by more than 30 cm. For the probability of this, each angle and
+place is taken to have a normal distribution with its standard deviation, and the keypoint's error
+to lie along one line.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
 from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.filtering.correction import FAR_M
 from cardbox_tracker.estimation.filtering.visibility import are_hidden
 
 BoolArray = NDArray[np.bool_]
 
+FAR_M = 0.30
+"""A keypoint that is farther off is wrong, m."""
 UNCERTAIN_FROM = 0.15
 """Probability of being wrong above which a keypoint is uncertain."""
 LOST_FROM = 0.5
@@ -43,7 +44,6 @@ def judged(
     cost: MultiViewCost,
     state: FloatArray,
     stddev: FloatArray,
-    learned: FloatArray | None,
     is_doubtful: bool,
 ) -> tuple[FloatArray, tuple[KeypointState, ...]]:
     """Return probabilities (6,) and states of the keypoints of a result.
@@ -52,13 +52,10 @@ def judged(
         cost: of all cameras.
         state: the result, (14,), rad and m.
         stddev: its standard deviations, (14,).
-        learned: the corrector's probabilities, (6,); None for those by the standard deviations.
         is_doubtful: whether the points of a detector cast doubt on the result.
     """
-    chances = learned
-    if chances is None:
-        share = SHARE_OF_POINTS if len(cost.seeing) == 1 else SHARE_OF_CAMERAS
-        chances = chances_by_spread(cost.costs[0], state, share * stddev)
+    share = SHARE_OF_POINTS if len(cost.seeing) == 1 else SHARE_OF_CAMERAS
+    chances = chances_by_spread(cost.costs[0], state, share * stddev)
     return chances, states_of(chances, are_hidden(cost, state), is_doubtful)
 
 

@@ -2,7 +2,7 @@
 
 An estimate is lost if its keypoints are wrong by more than 30 cm on average. The probability is a
 logistic regression on recorded sessions with ground truth, in which lost and other frames have the
-same total weight (``learning/loss.py``).
+same total weight (``learning/loss.py`` of commit 58f0437).
 """
 
 from __future__ import annotations

@@ -10,13 +10,6 @@ _MOST_KEPT = 0.5
 """Share of the last output that delays a ramp by one interval."""
 
 
-def kept_share(interval_s: float, time_constant_s: float) -> float:
-    """Return the share a of the last output, exp(-dt / time constant), at most a half."""
-    if time_constant_s == 0.0:
-        return 0.0
-    return min(exp(-max(interval_s, 0.0) / time_constant_s), _MOST_KEPT)
-
-
 class LowPass:
     """First-order low-pass filter (exponential smoothing) over time.
 
@@ -39,7 +32,7 @@ class LowPass:
         if self._time_constant_s == 0.0:
             return values
         if self._last is not None:
-            kept = kept_share(interval_s, self._time_constant_s)
+            kept = min(exp(-max(interval_s, 0.0) / self._time_constant_s), _MOST_KEPT)
             values = kept * self._last + (1.0 - kept) * values
         self._last = values
         return values

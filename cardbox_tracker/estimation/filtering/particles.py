@@ -20,23 +20,21 @@ class Particles:
         ratings: ratings of the states, (N,).
         mean: mean of the states, (14,), before smoothing.
         spread: difference of ratings that changes a weight by the factor e.
-        scale: deviations of the result divided by the deviations of the states, (14,).
     """
 
     states: FloatArray
     ratings: FloatArray
     mean: FloatArray
     spread: float
-    scale: FloatArray
 
     def postures(self, around: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Return equally weighted postures (count, 12), drawn from the weighted particles.
 
-        They are moved ``around`` the result (14,) and scaled to its deviations.
+        They are moved ``around`` the result (14,) and have its deviations.
         """
         weights = np.exp((self.ratings.min() - self.ratings) / self.spread)
         chosen = rng.choice(len(weights), count, p=weights / weights.sum())
-        deviations = self.scale * calibrated_deviations(self.states[chosen] - self.mean, rng)
+        deviations = calibrated_deviations(self.states[chosen] - self.mean, rng)
         postures = (around + deviations)[:, POSTURE]
         drawn: FloatArray = np.clip(postures, *TURNING_LIMITS.T)
         return drawn

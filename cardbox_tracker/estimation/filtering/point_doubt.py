@@ -3,8 +3,9 @@
 A hand or elbow far from its point is wrong, with any number of cameras. In one camera, the depth of
 a person who was not measured is estimated from the lengths of the bones. Whether a hand is wrong by
 more than 30 cm is then a logistic regression of four features, fitted to simulated people of whom
-stature and distance were stated (``learning/simulated_doubt.py``). Wrong and right images weighed
-alike, so the chance is that among as many of both. ``docs/research/points.md`` has figures.
+stature and distance were stated (``learning/simulated_doubt.py`` of commit 58f0437). Wrong and
+right images weighed alike, so the chance is that among as many of both. ``docs/research/points.md``
+has figures.
 """
 
 from __future__ import annotations

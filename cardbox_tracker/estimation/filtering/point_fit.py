@@ -36,7 +36,7 @@ _STEPS, _STEP_DEVIATION = 3, 0.25
 # Deviations (14,) of a result's values in its last fit, and steps of this fit.
 _POLISH_DEVIATION = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02])
 _POLISH_STEPS = 2
-# Frames without points after which the learned correction determines the depth again.
+# Frames without points after which the outlines determine the depth again.
 _MISSING_FRAMES = 30
 # A search that also rates points differs so much from wrong silhouettes only.
 _WRONG_IOU = 0.6
@@ -49,8 +49,8 @@ class PointFit:
 
     Attributes:
         is_given: whether there are points in this frame.
-        is_leading: whether points, instead of the learned correction, determine the depth: the
-            person was not measured, and there were points a short time ago.
+        is_leading: whether points, instead of outlines, determine the depth: the person was not
+            measured, and there were points a short time ago.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class PointFit:
         )
 
     def leads(self, iou: float) -> bool:
-        """Return whether points, instead of outline and learned correction, determine the result.
+        """Return whether points, instead of the outlines, determine the result.
 
         Args:
             iou: intersection over union of the silhouettes and the search's result. It is low if

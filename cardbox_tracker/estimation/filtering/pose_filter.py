@@ -40,7 +40,7 @@ class Fit:
         iou: intersection over union of drawn posture and silhouette.
         is_uncertain: whether the posture may be wrong.
         is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
-        seen: state that fits the image best, before the learned correction, (14,), or (12,) without
+        seen: state that fits the image best, before any correction, (14,), or (12,) without
             an offset.
         seen_iou: ``iou`` of ``seen``.
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
@@ -107,6 +107,19 @@ class PoseFilter(Protocol):
 
     def configure(self, config: TrackerConfig) -> None:
         """Use other settings; settings that restart tracking are the same."""
+
+
+class Corrector(Protocol):
+    """Changes the results of the preset ``default``, see :class:`~cardbox_tracker.Tracker`."""
+
+    def __call__(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
+        """Return the corrected state (14,).
+
+        Args:
+            frames: frames of the first camera, then of the further cameras.
+            state: the state that fits the frames: d1..d12, ``torso_x``, ``torso_z``, (14,), rad and
+                metres.
+        """
 
 
 MakeFilter = Callable[

@@ -43,13 +43,12 @@ from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.evidence import evidence_in
 from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, judged
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
+from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.point_fit import PointFit
-from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
+from cardbox_tracker.estimation.filtering.pose_filter import Corrector, Fit, Presence
 from cardbox_tracker.estimation.filtering.presence import PersonPresence
 from cardbox_tracker.estimation.filtering.rated_states import RatedStates
-from cardbox_tracker.estimation.filtering.refinement import Refinement
-from cardbox_tracker.estimation.filtering.search_features import Search
 from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
 from cardbox_tracker.estimation.filtering.visibility import is_trackable
 
@@ -62,12 +61,12 @@ _STEP_M = 0.05
 class WholeBodyFilter:
     """Tracks states (14,) of the first camera; a :class:`~.pose_filter.PoseFilter`.
 
-    A state is d1..d12, ``torso_x`` and ``torso_z``. :attr:`refine` post-processes the result. Each
-    of several cameras may show no person for a while.
+    A state is d1..d12, ``torso_x`` and ``torso_z``. Each of several cameras may show no person for
+    a while.
 
     Attributes:
         rated: rated states of the last frame.
-        refine: fits the result to the outlines, corrects it, and estimates its deviations.
+        outline: fits the result to the outlines.
         approach: expects and proposes distances of the person.
     """
 
@@ -77,9 +76,10 @@ class WholeBodyFilter:
         silhouette: SilhouetteTerm,
         rng: np.random.Generator,
         views: Sequence[View] = (),
+        corrector: Corrector | None = None,
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
-        self._views = tuple(views)
+        self._views, self._corrector = tuple(views), corrector
         self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
         self._config = c = plan.config
         self._rng, self._lost_iou = rng, config.lost_iou
@@ -92,7 +92,7 @@ class WholeBodyFilter:
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
-        """Prepare rating and refinement for the body of ``silhouette``."""
+        """Prepare rating and fits for the body of ``silhouette``."""
         self._body, camera, views = silhouette.body, silhouette.camera, self._views
         self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
         first, *others = cost.costs
@@ -100,7 +100,8 @@ class WholeBodyFilter:
         self._arm = ArmSearch(cost, self._plan.config)
         self._points = PointFit(cost, self._config.cost, views)
         self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
-        self.refine = Refinement(first, camera, self._config, list(zip(others, views, strict=True)))
+        steps, further = self._config.outline_steps, list(zip(others, views, strict=True))
+        self.outline = OutlineFit(first, camera, steps, further)
         # The height of the torso's top above the hips is about that of the shoulders.
         self._lever_m = float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])
 
@@ -114,7 +115,7 @@ class WholeBodyFilter:
         self.approach.begin(0.0)
         self._locator.forget()
         self._output: FloatArray | None = None
-        self.refine.forget()
+        self.outline.forget()
         self._arm.forget()
         self._chance: float | None = None
 
@@ -126,7 +127,7 @@ class WholeBodyFilter:
         self._is_lost = True
         # A wrong result must not be smoothed into the next one.
         self._output = None
-        self.refine.forget()
+        self.outline.forget()
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`; all other settings of this filter restart it."""
@@ -161,7 +162,7 @@ class WholeBodyFilter:
     def _observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Location:
         """Set the observations of the terms, and return the place of the person."""
         seeing, cost = self._seeing, self._cost
-        self.refine.see(seeing)
+        self.outline.seeing = tuple(seeing)
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
         cost.observe(frames, terms)
@@ -227,7 +228,7 @@ class WholeBodyFilter:
         """Move all joints of the best states together; then choose the survivors."""
         config, cost, rated = self._config, self._cost, self.rated
         if self._plan.fits_outlines:
-            rated.add(self.refine.outline.different(frames, rated))
+            rated.add(self.outline.different(frames, rated))
         if self._points.is_given:
             rated.add(self._points.bodies(rated))
         sigma = config.together_noise * self._sigma
@@ -249,56 +250,57 @@ class WholeBodyFilter:
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:
         """Return the refined mean of the best states with its confidence."""
-        config, cost, frame = self._config, self._cost, frames[0]
+        config, cost = self._config, self._cost
         rated = self.rated.states, self.rated.ratings
         mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
         before = mean if self._output is None else self._output
         self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
-        spread, total = loss.state_stddev(stddev), cost.silhouette_px
-        fitted = self.refine.outline(frames, self._output)
-        both = np.array([mean, fitted])
-        _, (mean_differs_px, differs_px), (mean_px, drawn_px), _ = cost.bodies(both)
+        deviations, total = loss.state_stddev(stddev), cost.silhouette_px
+        fitted = self.outline(frames, self._output)
+        _, (mean_differs_px,), (mean_px,), _ = cost.bodies(mean[None])
         is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
         if is_by_points and self._points.is_given:
             fitted = self._points.polished(fitted)
-            _, (differs_px,), (drawn_px,), _ = cost.bodies(fitted[None])
+        result = self._corrected(frames, fitted)
+        both = np.array([fitted, result])
+        _, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
         fit_iou = iou_of(total, drawn_px, differs_px)
         found = (mean, stddev), (mean_differs_px, mean_px), self._arm.spreads_m
         evidence = evidence_in(cost, rated, *found, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
-        found_by = *rated, self.rated.keypoints_m, config.spread, evidence, self._chance
-        seen = frame, fitted, spread, fit_iou, Search(*found_by)
-        result = fitted if is_by_points else self.refine.corrected(*seen)
-        _, (cost_px,), (area_px,), points = cost.bodies(result[None])
-        iou = iou_of(total, area_px, cost_px)
         self._result = result
         if self._plan.keeps_result:
             self._survivors[-1] = fitted  # in place of the worst one
-        keypoints_m = points.keypoints_m[0]
-        last = frame, result, spread, keypoints_m, iou
-        deviations = spread if is_by_points else self.refine.deviations(*last)
         is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
         is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
-        learned = None if is_by_points else self.refine.chances_of_error()
         is_doubtful = self._points.is_doubtful(result)
-        chances, states = judged(cost, result, deviations, learned, is_doubtful)
+        chances, states = judged(cost, result, deviations, is_doubtful)
         is_sure = is_sure and are_sure(chances[HANDS])
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
-            keypoints_m=keypoints_m,
+            keypoints_m=points.keypoints_m[1],
             cost_px=int(cost_px),
-            iou=iou,
+            iou=iou_of(total, area_px, cost_px),
             is_uncertain=not is_sure or is_doubtful,
             is_poor=is_poor and not self._points.confirm(result),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             seen=fitted,
             seen_iou=fit_iou,
-            particles=Particles(*rated, mean, config.spread, deviations / spread),
+            particles=Particles(*rated, mean, config.spread),
             keypoint_chances=chances,
             keypoint_states=states,
         )
+
+    def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
+        """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""
+        if self._corrector is None:
+            return fitted
+        corrected = np.array(self._corrector(frames, fitted.copy()), np.float64)
+        if corrected.shape != fitted.shape:
+            raise ValueError(f"the corrector returned the shape {corrected.shape}; expected (14,)")
+        return np.clip(corrected, *self._cost.limits.T)
 
     def ious(self) -> list[float | None]:
         """See :class:`~.pose_filter.PoseFilter`."""

@@ -159,23 +159,6 @@ class WholeBodyConfig(Settings):
         "Gauss-Newton steps of the fit of the result to the outlines; not used with depth images",
         limits=(0, 20),
     )
-    corrector: str = restarting(
-        "learned",
-        "corrector of the result. learned: the package's network; none: no corrector; FILE.npz: a "
-        "network of the same kind; MODULE:FUNCTION: Python code, see docs/extending.md",
-    )
-    learned_deviations: bool = restarting(
-        True,
-        "use the corrector's standard deviations of the angles, if it has any; false: use those "
-        "of the particles",
-    )
-    output_smoothing_s: float = restarting(
-        0.04,
-        "time constant of the low-pass filter on corrected results, and about their delay; 0: no "
-        "filter",
-        unit="s",
-        limits=(0.0, 10.0),
-    )
     start_passes: int = restarting(
         3, "searches in the first silhouette of a person", limits=(1, 100)
     )

@@ -57,8 +57,8 @@ def _used_in_development(names: Sequence[str]) -> list[str]:
     return [
         f"Settings of the package were chosen on {which}, which were thus used in development. "
         "Their bodies and rooms are rendered, their motions scripted or motion capture (sessions "
-        "named `cmu`, `two_webcams`). The correction learned from simulated people of another "
-        "renderer (MakeHuman's bodies among them), the prior from other clips of motion capture.",
+        "named `cmu`, `two_webcams`). The prior of the arms learned from other clips of motion "
+        "capture.",
         "",
     ]
 

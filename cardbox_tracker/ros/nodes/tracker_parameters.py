@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 from cardbox_tracker.estimation.config import PRESETS, FilterConfig, TrackerConfig
-from cardbox_tracker.estimation.filtering.corrector_loading import load_corrector
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 from cardbox_tracker.estimation.settings_file import read_settings
@@ -43,8 +42,6 @@ _PARAMETERS = MappingProxyType(
         "torso.translation_noise_m": "torso_translation_noise_m",
         "arm.rotation_noise_rad": "arm_rotation_noise_rad",
         "whole_body.effort": "effort",
-        "whole_body.corrector": "corrector",
-        "whole_body.output_smoothing_s": "output_smoothing_s",
         "relocalize": "relocalize",
         "select_person": "select_person",
         "lost_iou": "lost_iou",
@@ -108,8 +105,6 @@ class TrackerParameters(NodeParameters):
     torso_translation_noise_m: float = _of_preset(FilterConfig, "translation_noise_m", "torso: ")
     arm_rotation_noise_rad: float = _of_preset(FilterConfig, "rotation_noise_rad", "arms: ")
     effort: float = shared(WholeBodyConfig, "effort")
-    corrector: str = shared(WholeBodyConfig, "corrector", effect=AT_START)
-    output_smoothing_s: float = shared(WholeBodyConfig, "output_smoothing_s")
     settings_file: str = parameter(
         "",
         "YAML file with further settings, by the names at the end of docs/parameters.md; "
@@ -208,7 +203,6 @@ class TrackerParameters(NodeParameters):
     def check(self) -> None:
         """Raise ValueError or CardboxError if values contradict each other."""
         config = self.config()
-        load_corrector(config.whole_body.corrector)
         if (len(self.cameras) > 1 or self.depth) and not config.has_several_views:
             raise ValueError(
                 f"the preset {self.preset} uses the silhouette of one camera; set preset to "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -309,12 +308,7 @@ def test_an_empty_silhouette_is_nobody() -> None:
 
 
 def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None:
-    """The hand moves up from belly to chest; the outline stays as it is.
-
-    What was learned of people, of whom this drawing is none, is switched off.
-    """
-    preset = default_preset()
-    preset = replace(preset, whole_body=replace(preset.whole_body, corrector="none"))
+    """The hand moves up from belly to chest; the outline stays as it is."""
     body, low, high = measured(), FRONT.copy(), FRONT.copy()
     low[4:8] = np.radians((-10, 30, -40, 40))
     high[4:8] = np.radians((-10, 30, -110, 40))
@@ -323,7 +317,7 @@ def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None
     truth = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(body, high)))
     away_px = {}
     for with_image in (True, False):
-        tracker = Tracker(body, CAMERA, preset, np.random.default_rng(0))
+        tracker = Tracker(body, CAMERA, default_preset(), np.random.default_rng(0))
         for begin, end, share in way:
             image, silhouette = drawn((1 - share) * begin + share * end)
             estimate = tracker.track(silhouette, image if with_image else None)

@@ -221,7 +221,7 @@ def test_bones_are_compared_along_the_horizontal_line_of_sight(
     found = observed(points, body=GUESSED, stamp_ns=stamp_ns).postures(STATE[None])[0] / WEIGHT_PX
     assert found == pytest.approx(expected_of_bones(joints_m, points, age_s), rel=1e-6)
     assert found > 1.0
-    # The learned correction knows the depth of people who were measured.
+    # Of people who were measured, the outlines determine the depth.
     assert observed(points, stamp_ns=stamp_ns).postures(STATE[None])[0] == pytest.approx(0.0)
 
 

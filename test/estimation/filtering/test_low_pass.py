@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.estimation.filtering.low_pass import LowPass, kept_share
+from cardbox_tracker.estimation.filtering.low_pass import LowPass
 
 
 def test_a_step() -> None:
@@ -55,15 +55,6 @@ def test_a_half_is_kept_at_most() -> None:
     # exp(-0.5) would be 0.61.
     found = [low_pass(np.array([value]), 0.05)[0] for value in (0.0, 1.0, 1.0, 1.0)]
     assert found == [0.0, 0.5, 0.75, 0.875]
-
-
-@given(interval_s=st.floats(-0.1, 10.0), time_constant_s=st.floats(0.0, 10.0))
-def test_the_kept_share_is_never_more_than_a_half(
-    interval_s: float, time_constant_s: float
-) -> None:
-    share = kept_share(interval_s, time_constant_s)
-    assert 0.0 <= share <= 0.5
-    assert kept_share(interval_s + 0.01, time_constant_s) <= share
 
 
 @given(

@@ -228,9 +228,7 @@ def test_too_much_and_too_little_are_seen() -> None:
 
 def test_smoothing_is_a_share_of_the_last_result() -> None:
     """With a still particle cloud, as after a jump, each frame leaves so much of the old place."""
-    whole_body = replace(
-        default_preset().whole_body, smoothing=0.5, outline_steps=0, corrector="none"
-    )
+    whole_body = replace(default_preset().whole_body, smoothing=0.5, outline_steps=0)
     of = made(0, replace(default_preset(), whole_body=whole_body))
     first = follow(of, seen(wave(0.0)))
     second = follow(of, seen(wave(0.3)))

@@ -444,15 +444,13 @@ OTHERS: dict[str, dict[str, Any]] = {
     },
     "default": {
         "effort": 0.5,
-        "corrector": "none",
-        "output_smoothing_s": 0.2,
         "lost_iou": 0.3,
         "relocalize": "never",
         "select_person": "never",
         "lost_frames": 9,
     },
 }
-INSTEAD = {"effort": "particles", "output_smoothing_s": "particles", "corrector": "particles"}
+INSTEAD = {"effort": "particles"}
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -509,12 +507,6 @@ def test_a_settings_file_gives_what_has_no_parameter(tmp_path: Path, make_node: 
     path.write_text("lost_frame: 7\n")
     with pytest.raises(CardboxError, match=r"settings\.yaml.*lost_frame'.*'lost_frames'"):
         LiveParameters(make_node("-p", f"settings_file:={path}"), TrackerParameters)
-
-
-@pytest.mark.parametrize("name", ["best", "missing.npz", "no_such_module:make", "os:missing"])
-def test_a_corrector_that_is_none_is_refused_at_the_start(make_node: Callable, name: str) -> None:
-    with pytest.raises(CardboxError, match=name):
-        LiveParameters(make_node("-p", f"corrector:={name}"), TrackerParameters)
 
 
 @pytest.mark.parametrize("value", [1e-5, 0.1, 2.0, 0.00012])

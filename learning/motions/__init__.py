@@ -1,1 +1,0 @@
-"""Motions of people: motion capture of several sources and scripted movements."""
