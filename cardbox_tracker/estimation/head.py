@@ -15,23 +15,22 @@ estimated and not returned.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from math import cos, exp, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import (
-    forward_kinematics,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-)
+from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.neck import NECK_LIMITS
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PITCH, YAW
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.compiling import kernel
 from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
+from cardbox_tracker.estimation.cost.kernel_arguments import Floats
+from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.low_pass import LowPass
@@ -94,46 +93,6 @@ class Neck(NamedTuple):
     stddev: FloatArray
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """The fit of one face.
-
-    Attributes:
-        camera: the camera.
-        torso_rotation: (3, 3), torso to reference frame.
-        centre_m: (3,), where the model has the middle of the head, reference frame.
-        face_m: points of the face of this size, (n, 3).
-        px: the same points in the image, (n, 2).
-        sigma_px: standard deviation of a coordinate.
-    """
-
-    camera: Camera
-    torso_rotation: FloatArray
-    centre_m: FloatArray
-    face_m: FloatArray
-    px: FloatArray
-    sigma_px: float
-
-    def residuals(self, values: FloatArray) -> FloatArray:
-        """Return the residuals (..., 2n + 6) of values (..., 6), in standard deviations."""
-        yaw, pitch, roll, across_m, up_m, log_size = np.moveaxis(values, -1, 0)
-        neck = rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
-        face = (self.torso_rotation @ neck) @ self.face_m.T * np.exp(log_size)[..., None, None]
-        place = self.centre_m + np.stack([0.0 * up_m, across_m, up_m], axis=-1)
-        points = np.swapaxes(face, -1, -2) + place[..., None, :]
-        optical = self.camera.reference_to_optical(points)
-        optical[..., 2] = np.maximum(optical[..., 2], 0.05)
-        off = (self.camera.project(optical) - self.px) / self.sigma_px
-        return np.concatenate([off.reshape(*values.shape[:-1], -1), values / _PRIOR], axis=-1)
-
-    def linearized(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return residuals (s, m) and their Jacobians (s, m, 6) at values (s, 6)."""
-        steps = np.concatenate([np.zeros((1, 6)), _DIFFERENCE * np.eye(6)])
-        all_values = self.residuals(values[:, None] + steps)
-        here = all_values[:, 0]
-        return here, np.swapaxes(all_values[:, 1:] - here[:, None], 1, 2) / _DIFFERENCE
-
-
 def fit_neck(
     points: ImagePoints, body: BodyModel, camera: Camera, posture: FloatArray
 ) -> Neck | None:
@@ -157,15 +116,16 @@ def fit_neck(
     if depth_m <= _FARTHEST_M:
         return None
     size = body_parts(body.sizes).head.height_m / HEAD_HEIGHT_M
-    problem = _Problem(
-        camera,
-        frames.torso_rotation,
-        frames.head,
+    axes = camera.reference_to_optical_rotation()
+    values, rms, covariance = _solve(
+        np.ascontiguousarray(axes @ frames.torso_rotation),
+        np.ascontiguousarray(axes.T),
+        camera.reference_to_optical(frames.head),
         size * FACE_M[known],
         points.px[chosen[known]],
+        (camera.fx, camera.fy, camera.cx, camera.cy),
         float(np.hypot(_POINT_PX, camera.fx * _POINT_M / depth_m)),
     )
-    values, rms, covariance = _solve(problem)
     angles = values[:2]
     beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
     stddev = np.sqrt(np.diag(covariance)[:2]) * max(1.0, rms)
@@ -175,21 +135,107 @@ def fit_neck(
     return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
 
 
-def _solve(problem: _Problem) -> tuple[FloatArray, float, FloatArray]:
-    """Return the best values (6,), the residuals' RMS and the covariance (6, 6)."""
-    values = np.zeros((len(_STARTS_RAD), 6))
-    values[:, :2] = _STARTS_RAD
-    for _ in range(_STEPS):
-        residuals, jacobians = problem.linearized(values)
-        normal = np.swapaxes(jacobians, 1, 2)
-        step = np.linalg.solve(normal @ jacobians, normal @ residuals[..., None])[..., 0]
-        values = values - np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-    residuals, jacobians = problem.linearized(values)
-    costs = (residuals**2).sum(axis=1)
-    best = int(np.argmin(costs))
+@kernel
+def _residuals(
+    values: Floats,
+    torso: Floats,
+    axes: Floats,
+    centre_m: Floats,
+    face_m: Floats,
+    px: Floats,
+    lens: tuple[float, float, float, float],
+    sigma_px: float,
+    residuals: Floats,
+) -> None:
+    """Write the residuals (2n + 6,) of values (6,), in standard deviations.
+
+    Args:
+        values: yaw, pitch and roll of the neck, rad; place across and up, m; logarithm of the size.
+        torso: rotation (3, 3) from the torso's to the optical frame.
+        axes: rows are the reference frame's axes X, Y and Z in the optical frame, (3, 3).
+        centre_m: where the model has the middle of the head, (3,), optical frame.
+        face_m: points of a face of this size, (n, 3).
+        px: the same points in the image, (n, 2).
+        lens: focal lengths and principal point, px.
+        sigma_px: standard deviation of a coordinate.
+        residuals: written.
+    """
+    cy, sy = cos(values[0]), sin(values[0])
+    cp, sp = cos(values[1]), sin(values[1])
+    cr, sr = cos(values[2]), sin(values[2])
+    size = exp(values[5])
+    fx, fy, cx, cy_px = lens
+    for i in range(face_m.shape[0]):
+        x, y, z = size * face_m[i, 0], size * face_m[i, 1], size * face_m[i, 2]
+        # Rx(roll), then Ry(pitch), then Rz(yaw).
+        y, z = cr * y - sr * z, sr * y + cr * z
+        x, z = cp * x + sp * z, cp * z - sp * x
+        x, y = cy * x - sy * y, sy * x + cy * y
+        at = [0.0, 0.0, 0.0]
+        for c in range(3):
+            at[c] = centre_m[c] + values[3] * axes[1, c] + values[4] * axes[2, c]
+            at[c] += torso[c, 0] * x + torso[c, 1] * y + torso[c, 2] * z
+        depth = max(at[2], 0.05)
+        residuals[2 * i] = (fx * at[0] / depth + cx - px[i, 0]) / sigma_px
+        residuals[2 * i + 1] = (fy * at[1] / depth + cy_px - px[i, 1]) / sigma_px
+    for j in range(6):
+        residuals[2 * face_m.shape[0] + j] = values[j] / _PRIOR[j]
+
+
+@kernel
+def _solve(
+    torso: Floats,
+    axes: Floats,
+    centre_m: Floats,
+    face_m: Floats,
+    px: Floats,
+    lens: tuple[float, float, float, float],
+    sigma_px: float,
+) -> tuple[Floats, float, Floats]:
+    """Return the best values (6,), the residuals' RMS and the covariance (6, 6); see above."""
+    count = 2 * face_m.shape[0] + 6
+    here, above, jacobian = np.empty(count), np.empty(count), np.empty((count, 6))
+    normal, step, best = np.empty((6, 6)), np.empty(6), np.empty(6)
+    least, kept = np.inf, np.empty((6, 6))
+    for start in range(_STARTS_RAD.shape[0]):
+        values = np.zeros(6)
+        values[:2] = _STARTS_RAD[start]
+        for number in range(_STEPS + 1):
+            _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, here)
+            for j in range(6):
+                before = values[j]
+                values[j] = before + _DIFFERENCE
+                _residuals(values, torso, axes, centre_m, face_m, px, lens, sigma_px, above)
+                values[j] = before
+                for i in range(count):
+                    jacobian[i, j] = (above[i] - here[i]) / _DIFFERENCE
+            for j in range(6):
+                step[j] = 0.0
+                for i in range(count):
+                    step[j] += jacobian[i, j] * here[i]
+                for k in range(6):
+                    normal[j, k] = 0.0
+                    for i in range(count):
+                        normal[j, k] += jacobian[i, j] * jacobian[i, k]
+            if number == _STEPS:
+                break
+            solve(normal, step)
+            for j in range(6):
+                values[j] -= min(max(step[j], -_LARGEST_STEP[j]), _LARGEST_STEP[j])
+        cost = 0.0
+        for i in range(count):
+            cost += here[i] ** 2
+        if cost < least:
+            least = cost
+            best[:], kept[:] = values, normal
+    covariance, matrix = np.empty((6, 6)), np.empty((6, 6))
+    for j in range(6):
+        matrix[:] = kept
+        covariance[j] = 0.0
+        covariance[j, j] = 1.0
+        solve(matrix, covariance[j])
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
-    rms = float(np.sqrt(costs[best] / problem.px.size))
-    return values[best], rms, np.linalg.inv(jacobians[best].T @ jacobians[best])
+    return best, sqrt(least / (2 * face_m.shape[0])), covariance
 
 
 class HeadTracker:

@@ -86,9 +86,7 @@ class DepthTerm:
         inside = cv2.erode(frame.silhouette, np.ones((3, 3), np.uint8))
         known = (inside > 0) & np.isfinite(frame.depth_m)
         depth_m = np.where(known, frame.depth_m, 0.0).astype(np.float32)
-        return DepthObservation(
-            (depth_m, self._areas_px, self.config.unit_m, self.config.expected)
-        )
+        return DepthObservation((depth_m, self._areas_px, self.config.unit_m, self.config.expected))
 
 
 @dataclass(frozen=True, eq=False)

@@ -182,6 +182,7 @@ class JointPointsObservation(TermObservation):
     seen: EvidenceTuple
     weight_px: float
     shows_back: bool = False
+    locates = True
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate hips, ears and shoulders of trunks, and all joints of arms."""
@@ -197,7 +198,9 @@ class JointPointsObservation(TermObservation):
             np.empty((count, kernels.N_RESIDUALS, N_STATE)),
             np.empty(count),
         )
-        kernels.residuals(posed.states, posed.body, self.seen, tuple(found))
+        kernels.residuals(
+            posed.states, posed.body, self.seen, (found.values, found.jacobian, found.costs)
+        )
         return found
 
 

@@ -17,8 +17,17 @@ from dataclasses import replace
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import NEAREST_M, TORSO_X
+from cardbox_tracker.body.posture import (
+    N_STATE,
+    NEAREST_M,
+    PITCH,
+    ROLL,
+    TORSO_X,
+    TORSO_Z,
+    YAW,
+)
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost.outline import Outline
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import Bodies, Ratings, WholeBodyCost, iou_of
@@ -52,6 +61,7 @@ class MultiViewCost:
         config: WholeBodyCostConfig,
     ) -> None:
         """Prepare for one body before ``camera`` and for the further ``views`` of the body."""
+        self._config = config
         without_priors = replace(config, weight=0.0)
         self.costs = [WholeBodyCost(body, camera, config)]
         self.costs += [WholeBodyCost(view.body, view.camera, without_priors) for view in views]
@@ -96,6 +106,28 @@ class MultiViewCost:
             frame = frames[number].changed(foreground_px=cost.silhouette_px)
             observed = (term.observe(frame) for term in counting)
             cost.terms = tuple(one for one in observed if one is not None)
+
+    def outlines(self, state: FloatArray) -> list[tuple[int, Outline]]:
+        """Return the outline of each camera that shows the person, near a state (14,), by index."""
+        return [
+            (number, self.costs[number].outline(self.to_views[number](state)))
+            for number in self.seeing
+        ]
+
+    def prior(self) -> tuple[FloatArray, FloatArray]:
+        """Return mean and inverse variance (14,) of the priors of the torso, without their caps."""
+        config, (x_m, z_m, home_m, yaw_rad) = self._config, self.anchor.tolist()
+        mean, inverse = np.zeros((2, N_STATE))
+        inverse[ROLL] = np.radians(config.roll_deg) ** -2
+        inverse[PITCH] = np.radians(config.pitch_forward_deg) ** -2
+        mean[YAW], inverse[YAW] = yaw_rad, np.radians(config.yaw_deg) ** -2
+        step, home = (self.x_factor * np.array([config.x_step_m, config.x_home_m])) ** -2
+        inverse[TORSO_X] = step + home
+        mean[TORSO_X] = (step * x_m + home * home_m) / inverse[TORSO_X]
+        step, home = config.z_step_m**-2, config.z_home_m**-2
+        inverse[TORSO_Z] = step + home
+        mean[TORSO_Z] = step * z_m / inverse[TORSO_Z]
+        return mean, inverse
 
     @property
     def silhouette_px(self) -> int:

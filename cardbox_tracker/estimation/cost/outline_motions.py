@@ -1,11 +1,10 @@
-"""Compiled motions of the body's rigid segments, and normal equations of points that move along.
+"""Compiled motions of the body's rigid segments, from which all Jacobians follow.
 
 The segments are trunk, left upper arm, left forearm, right upper arm and right forearm. To first
 order a point on their outline moves with its segment: where a round limb turns towards the camera,
 its outline moves along the line of sight only. Each value of a state moves a segment and all those
 beyond it as one rigid body, so its twist, six numbers in the optical frame, describes the motion of
-all points. Sums over the points of a segment therefore suffice for the normal equations, as in the
-composite rigid body algorithm (Featherstone, "Rigid Body Dynamics Algorithms", 2008).
+all points.
 
 A twist consists of the velocity v of the point that is at the camera's centre, and the angular
 velocity w: the point X has the velocity v + w x X. A point's force f = d(distance)/dX and torque
@@ -22,7 +21,6 @@ from cardbox_tracker.body.posture import (
     ARM_ANGLES,
     ELBOW_ABDUCTION,
     ELBOW_FLEXION,
-    N_STATE,
     PITCH,
     ROLL,
     SHOULDER_ABDUCTION,
@@ -53,7 +51,7 @@ from cardbox_tracker.estimation.cost.kinematics import (
     turn_arm,
 )
 
-SEGMENTS, TWIST = 5, 6
+TWIST = 6
 # The bar of a limb, and the square at its end.
 _PATCHES_OF_LIMB = 2
 # The nearest segment that a value moves, in the order of a state.
@@ -164,44 +162,3 @@ def write_twists(state: Floats, body: BodyTuple, twists: Floats) -> None:
         turn_arm(arm, rotation, hip)
         here = twists[first : first + ARM_ANGLES]
         _arm_twists(angles, side_of(k), of.girdle, arm.joints, rotation, here)
-
-
-@kernel
-def add_moments(
-    twists: Floats, sums: Floats, moments: Floats, matrix: Floats, right: Floats
-) -> None:
-    """Add the points of all segments to normal equations.
-
-    Args:
-        twists: of the values of a state, (14, 6).
-        sums: weighted sums of distance * derivative of each segment, (5, 6); overwritten.
-        moments: weighted sums of derivative * derivative, (5, 6, 6); overwritten.
-        matrix: (14, 14), its lower triangle changes.
-        right: (14,); changed.
-    """
-    # Forearms move with their upper arms, and these with the trunk.
-    for part, whole in ((2, 1), (4, 3), (1, 0), (3, 0)):
-        for a in range(TWIST):
-            sums[whole, a] += sums[part, a]
-            for b in range(TWIST):
-                moments[whole, a, b] += moments[part, a, b]
-    momentum = np.empty(TWIST)
-    for i in range(N_STATE):
-        moved = _MOVED[i]
-        for a in range(TWIST):
-            total = 0.0
-            for b in range(TWIST):
-                total += moments[moved, a, b] * twists[i, b]
-            momentum[a] = total
-            right[i] += twists[i, a] * sums[moved, a]
-        for j in range(N_STATE):
-            whole = _MOVED[j]
-            if whole == moved:
-                counts = j <= i
-            else:
-                counts = whole == 0 or (whole % 2 == 1 and moved == whole + 1)
-            if counts:
-                total = 0.0
-                for a in range(TWIST):
-                    total += momentum[a] * twists[j, a]
-                matrix[max(i, j), min(i, j)] += total

@@ -45,7 +45,7 @@ ARMS = {"left": LEFT_ARM, "right": RIGHT_ARM}
 WHOLE: Drawn = (True, True, True)
 TRUNK: Drawn = (True, False, False)
 ARM: tuple[Drawn, Drawn] = (False, True, False), (False, False, True)
-"""Which of trunk, left arm and right arm count; ``ARM[0]`` is the left arm, ``ARM[1]`` the right."""
+"""Which of trunk, left arm and right arm count; ``ARM[0]`` is the left arm."""
 
 TorsoCosts = Callable[[FloatArray], FloatArray]
 """Takes torsos d1..d4, (N, 4), rad and metres; returns costs (N,), px."""
@@ -141,17 +141,20 @@ class Frame:
     @property
     def image(self) -> Image | None:
         """(H, W) grey or (H, W, 3) bgr, undistorted; None without one."""
-        return self["image"]
+        found: Image | None = self["image"]
+        return found
 
     @property
     def depth_m(self) -> DepthImage | None:
         """(H, W), metres along the optical axis; unknown depths are 0; None without one."""
-        return self["depth_m"]
+        found: DepthImage | None = self["depth_m"]
+        return found
 
     @property
     def points(self) -> ImagePoints | None:
         """The person's joints in the image, from a detector; None without one."""
-        return self["points"]
+        found: ImagePoints | None = self["points"]
+        return found
 
     def changed(self, **values: Any) -> Frame:
         """Return the frame with other attributes."""
@@ -175,7 +178,14 @@ class Residuals(NamedTuple):
 
 
 class TermObservation:
-    """The evidence of one term in one frame. A term overrides what it knows."""
+    """The evidence of one term in one frame. A term overrides what it knows.
+
+    Attributes:
+        locates: whether the residuals tell where joints are. Then states that fit them are
+            proposed, and the search needs fewer others.
+    """
+
+    locates = False
 
     def rate(self, posed: Posed) -> FloatArray:
         """Return the costs (N,) of the parts that count, px."""

@@ -34,6 +34,7 @@ from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_o
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.kernel_arguments import Drawn, intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.kinematics import keypoints
+from cardbox_tracker.estimation.cost.outline import Outline
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.rating_arguments import ObservedTuple, Points
 from cardbox_tracker.estimation.cost.terms import (
@@ -115,6 +116,7 @@ class WholeBodyCost:
             new_planes(camera.width, camera.height) for _ in range(3)
         )
         self.terms: tuple[TermObservation, ...] = ()
+        self._outline: Outline | None = None
         self.anchor = np.zeros(4)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
         front = body.reference_state()[None]
@@ -125,6 +127,7 @@ class WholeBodyCost:
         """Set the silhouette (H, W) of a person whose hips are near those of ``state`` (14,)."""
         config, camera = self._config, self._camera
         check_array("silhouette", silhouette, (camera.height, camera.width))
+        self._silhouette, self._outline = silhouette, None
         aside_m, down_m, ahead_m = self.hips(state)
         depth_m = max(ahead_m, 1e-3)
         column = camera.fx * aside_m / depth_m + camera.cx
@@ -162,10 +165,11 @@ class WholeBodyCost:
         down_m = -cos_pitch * z_m - sin_pitch * x_m
         return float(state[TORSO_Y]), down_m, cos_pitch * x_m - sin_pitch * z_m
 
-    def hip_row(self, state: FloatArray, camera: Camera) -> float:
-        """Return the row of the hips of a state (14,) in the camera's image, at any size."""
-        _, down_m, ahead_m = self.hips(state)
-        return float(camera.fy * down_m / max(ahead_m, 1e-3) + camera.cy)
+    def outline(self, state: FloatArray) -> Outline:
+        """Return the present silhouette's outline above the hips of a state (14,)."""
+        if self._outline is None:
+            self._outline = Outline(self._silhouette, self._camera, self.hips(state)[1:])
+        return self._outline
 
     def see_nothing(self) -> None:
         """Ignore this frame's silhouette and terms: ratings are the priors alone."""

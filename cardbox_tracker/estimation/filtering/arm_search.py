@@ -11,7 +11,7 @@ from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.filtering import arm_proposals, state_choice
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS, propose_arms
 from cardbox_tracker.estimation.filtering.draws import Draws
-from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.estimation.filtering.whole_body_config import SearchProfile
 
 # Noise around the best arms, as a fraction of the usual noise.
 _AGAIN_NOISE = 0.45
@@ -24,48 +24,56 @@ class ArmSearch:
         spreads_m: deviations of left elbow and hand, right elbow and hand, in the last frame, m.
     """
 
-    def __init__(self, cost: MultiViewCost, config: WholeBodyConfig) -> None:
+    def __init__(self, cost: MultiViewCost) -> None:
         """Prepare for searches with ``cost``."""
-        self._cost, self._config = cost, config
+        self._cost = cost
         self.forget()
 
     def forget(self) -> None:
         """Forget the last frame."""
         self.spreads_m: list[float] = [0.0, 0.0, 0.0, 0.0]
 
-    def __call__(self, pool: FloatArray, arm: int, draws: Draws) -> tuple[FloatArray, FloatArray]:
+    def __call__(
+        self, pool: FloatArray, arm: int, profile: SearchProfile, draws: Draws
+    ) -> tuple[FloatArray, FloatArray]:
         """Return arms (N, 4), 0 left or 1 right, and their ratings (N,).
 
         Args:
             pool: states (M, 14) with this torso, the best first.
             arm: 0 left, 1 right.
+            profile: numbers of arms.
             draws: random numbers.
         """
-        config, cost = self._config, self._cost
-        arms = self._proposed(pool, arm, *draws.for_arms())
+        cost = self._cost
+        arms = self._proposed(pool, arm, profile, *draws.for_arms())
         ratings, joints_m = cost.arms(arms, arm)
         self.spreads_m[2 * arm : 2 * arm + 2] = state_choice.spread_of_arm(
-            joints_m, ratings, config.spread
+            joints_m, ratings, profile.spread
         )
         near = arm_proposals.around_best(
             arms,
             ratings,
-            config.best_arms,
-            _AGAIN_NOISE * config.arm_noise_rad,
+            profile.best_arms,
+            _AGAIN_NOISE * profile.arm_noise_rad,
             ARM_LIMITS,
             draws.for_near_arms(),
         )
-        near = self.promising(near, arm)
+        near = self.promising(near, arm, profile.candidates)
         return np.concatenate([arms, near]), np.concatenate([ratings, cost.arms(near, arm)[0]])
 
     def _proposed(
-        self, pool: FloatArray, arm: int, normals: FloatArray, uniforms: FloatArray
+        self,
+        pool: FloatArray,
+        arm: int,
+        profile: SearchProfile,
+        normals: FloatArray,
+        uniforms: FloatArray,
     ) -> FloatArray:
         """Return arms (N, 4), of which each camera that shows the person proposes an equal part.
 
         Each camera uses its own uncovered foreground and line of sight.
         """
-        cost, candidates = self._cost, self._config.candidates
+        cost, candidates = self._cost, profile.candidates
         seeing: Sequence[int] = cost.seeing
         count, rated = len(seeing), len(normals) // candidates
         ends = [candidates * (rated * part // count) for part in range(count + 1)]
@@ -73,7 +81,7 @@ class ArmSearch:
             propose_arms(
                 cost.to_views[number](pool),
                 arm,
-                self._config,
+                profile,
                 cost.costs[number],
                 (normals[begin:end], uniforms[begin:end]),
                 count,
@@ -81,11 +89,10 @@ class ArmSearch:
             for number, begin, end in zip(seeing, ends, ends[1:], strict=False)
         ]
         arms = proposed[0] if count == 1 else np.concatenate(proposed)
-        return self.promising(arms, arm)
+        return self.promising(arms, arm, candidates)
 
-    def promising(self, arms: FloatArray, arm: int) -> FloatArray:
+    def promising(self, arms: FloatArray, arm: int, candidates: int) -> FloatArray:
         """Return the arm with the least approximate cost of each ``candidates`` arms (N, 4)."""
-        candidates = self._config.candidates
         if candidates == 1:
             return arms
         # Neighbouring arms are of one kind of proposal, so all kinds remain.

@@ -12,7 +12,7 @@ from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.pose_prior import sample_bank
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering import arm_proposals
-from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.estimation.filtering.whole_body_config import SearchProfile
 
 ARM_LIMITS = np.ascontiguousarray(JOINT_LIMITS[LEFT_ARM])
 """Lowest and highest angles of an arm, (4, 2), rad."""
@@ -29,7 +29,7 @@ def bank_of_arms() -> FloatArray:
 def propose_arms(
     pool: FloatArray,
     arm: int,
-    config: WholeBodyConfig,
+    config: SearchProfile,
     cost: WholeBodyCost,
     numbers: tuple[FloatArray, FloatArray],
     share: int = 1,

@@ -6,7 +6,7 @@ import numpy as np
 
 from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
+from cardbox_tracker.estimation.filtering.whole_body_config import SearchProfile
 
 # Uniform numbers per torso, per arm, and per state of the last rounds.
 _OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
@@ -15,7 +15,7 @@ _OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
 class Draws:
     """Supplies the normal numbers and the uniform numbers in 0..1 of one search."""
 
-    def __init__(self, rng: np.random.Generator, config: WholeBodyConfig) -> None:
+    def __init__(self, rng: np.random.Generator, config: SearchProfile) -> None:
         """Draw all numbers; ``config`` has the numbers of torsos, arms and states."""
         c, together = config, config.rounds * config.together
         # One arm of each group of candidates is rated, and all groups are complete.

@@ -29,12 +29,11 @@ def evidence_in(
         spreads_m: deviations of elbows and hands in the search of the arms, m.
         age: frames since the search began.
     """
-    states, ratings = rated
+    _, ratings = rated
     mean, stddev = result
     differing_px, area_px = drawn_px
     pixels = loss.Pixels(cost.silhouette_px, cost.frontal_px_at(mean), differing_px, area_px)
     best = int(np.argmin(ratings))
-    # The coefficients belong to ratings without points.
-    rating = float(ratings[best] - cost.point_costs(states[best : best + 1])[0])
+    rating = float(ratings[best])
     arm_m = sum(spreads_m) / len(spreads_m)
     return loss.evidence_of(pixels, rating, arm_m, stddev, mean, age)

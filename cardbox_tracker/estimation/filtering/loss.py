@@ -69,6 +69,7 @@ class Pixels(NamedTuple):
     mean: float
 
 
+UNCERTAIN_FROM, LOST_FROM = 0.55, 0.95
 INTERCEPT = -3.936
 COEFFICIENTS: Mapping[str, float] = MappingProxyType(
     {

@@ -12,20 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import exp
+from typing import Any
 
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.detection.image_points import ImagePoints
-from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation
+from cardbox_tracker.estimation.cost.joint_points import JointPointsObservation, projected
 from cardbox_tracker.estimation.cost.joint_points_kernels import (
     ELBOW,
     KNUCKLES,
-    N_POINTS,
     POINTS_OF_ARM,
     WRIST,
-    project,
 )
+from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
+from cardbox_tracker.estimation.cost.terms import Posed
 
 FEATURES = ("hand_depth_m", "upper_arm_depth", "distance_to_point_m", "distance_m")
 """Largest difference of a hand's depth from the detector's; largest component of an upper arm along
@@ -40,6 +41,7 @@ FAR_M = 0.15
 
 _LIMBS = [POINTS_OF_ARM * arm + joint for arm in (0, 1) for joint in (ELBOW, WRIST, KNUCKLES)]
 _LEAST_SCORE, _SHARE = 0.5, 0.5
+_MISSING_FRAMES = 30
 
 
 def shows_person(points: ImagePoints | None) -> bool:
@@ -52,25 +54,46 @@ def are_certain(scores: FloatArray) -> bool:
     return float(np.mean(scores >= _LEAST_SCORE)) >= _SHARE
 
 
-def distance_to_points(
-    states: Sequence[FloatArray], observations: Sequence[JointPointsObservation]
-) -> float:
-    """Return the largest distance of a limb's joint from its point, m, at the person's depth.
+class PointDoubt:
+    """Doubt about results of one person from the points of all cameras."""
 
-    Args:
-        states: the state (14,) in the frame of each camera that has points.
-        observations: points of these cameras.
-    """
-    farthest_m = 0.0
-    for state, observation in zip(states, observations, strict=True):
-        pixels = np.empty((N_POINTS, 3))
-        project(np.ascontiguousarray(state), observation.body, pixels)
-        points, focal_px = observation.evidence[0], observation.body[4][0]
-        certain = [joint for joint in _LIMBS if points[joint, 2] >= _LEAST_SCORE]
-        for joint in certain:
-            away_px = float(np.hypot(*(points[joint, :2] - pixels[joint, :2])))
-            farthest_m = max(farthest_m, away_px * float(pixels[joint, 2]) / focal_px)
-    return farthest_m
+    def __init__(self, cost: MultiViewCost) -> None:
+        """Prepare for the cameras of ``cost``."""
+        self._cost, self._missing = cost, _MISSING_FRAMES
+
+    def confirms(self, state: FloatArray, cues: Sequence[tuple[int, Any]]) -> bool:
+        """Return whether a result, state (14,), agrees with certain points in this frame."""
+        is_certain = any(are_certain(cue.seen[0][:, 2]) for _, cue in cues)
+        return is_certain and self._farthest_m(state, cues) <= FAR_M
+
+    def is_doubtful(self, state: FloatArray, cues: Sequence[tuple[int, Any]]) -> bool:
+        """Return whether a result, state (14,), is uncertain."""
+        cost = self._cost
+        self._missing = 0 if cues else self._missing + 1
+        is_measured = cost.costs[0].is_measured
+        if not cues:
+            leading = self._missing < _MISSING_FRAMES and not is_measured
+            return leading and len(cost.seeing) == 1
+        farthest_m = self._farthest_m(state, cues)
+        if farthest_m > FAR_M or any(cue.shows_back for _, cue in cues):
+            return True
+        if is_measured or len(cost.seeing) > 1 or [number for number, _ in cues] != [0]:
+            return False
+        features = features_of(cost.keypoints(state), cues[0][1], farthest_m)
+        return chance_of_error(features) > UNCERTAIN_FROM
+
+    def _farthest_m(self, state: FloatArray, cues: Sequence[tuple[int, Any]]) -> float:
+        """Return the largest distance of a limb's joint from its point, m, at its depth."""
+        farthest_m = 0.0
+        for number, cue in cues:
+            there = self._cost.to_views[number](state)
+            body = self._cost.costs[number].body
+            pixels, points = projected(Posed(body, there[None])), cue.seen[0]
+            for joint in _LIMBS:
+                if points[joint, 2] >= _LEAST_SCORE:
+                    away_px = float(np.hypot(*(points[joint, :2] - pixels[joint, :2])))
+                    farthest_m = max(farthest_m, away_px * float(pixels[joint, 2]) / body[4][0])
+        return farthest_m
 
 
 def features_of(
@@ -83,7 +106,7 @@ def features_of(
         observation: points of the first camera.
         farthest_m: see :func:`distance_to_points`.
     """
-    _, _, bones, away = observation.evidence
+    _, _, bones, away = observation.seen
     hand_m, upper_arm = 0.0, 0.0
     for arm in (0, 1):
         shoulder, elbow, hand = keypoints_m[3 * arm : 3 * arm + 3]

@@ -1,19 +1,21 @@
 """The whole-body filter: a few dozen whole postures survive from frame to frame.
 
-A frame is searched in stages, each of which starts with the best states of the previous one:
-torsos, then each arm beside the best torso, then all joints together (``docs/architecture.md``).
+A frame is searched by :data:`STAGES`, each of which adds rated states to those of the previous
+ones: torsos, then arms beside the best torso, then states that are fitted to the cues, then all
+joints together. :class:`~.refiner.Refiner` fits the weighted mean of the best states to all cues.
 Proposals are in :mod:`.torso_proposals`, :mod:`.arm_search` and :mod:`.joint_moves`, ratings in
-:mod:`cardbox_tracker.estimation.cost.multi_view`. :mod:`.search_plan` has all parameters that
-depend on the number of cameras.
+:mod:`cardbox_tracker.estimation.cost.multi_view`, and all numbers in :mod:`.whole_body_config`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from cardbox_tracker.body.posture import (
+    ARM_ANGLES,
     LEFT_ARM,
     PLACE,
     POSTURE,
@@ -21,6 +23,7 @@ from cardbox_tracker.body.posture import (
     TORSO_X,
     TORSO_Y,
     TORSO_Z,
+    YAW,
 )
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
@@ -33,6 +36,7 @@ from cardbox_tracker.estimation.cost.whole_body import iou_of
 from cardbox_tracker.estimation.filtering import (
     joint_moves,
     loss,
+    point_doubt,
     state_choice,
     torso_proposals,
 )
@@ -43,19 +47,67 @@ from cardbox_tracker.estimation.filtering.draws import Draws
 from cardbox_tracker.estimation.filtering.evidence import evidence_in
 from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, judged
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
-from cardbox_tracker.estimation.filtering.outline_fit import OutlineFit
+from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
 from cardbox_tracker.estimation.filtering.particles import Particles
-from cardbox_tracker.estimation.filtering.point_fit import PointFit
 from cardbox_tracker.estimation.filtering.pose_filter import Corrector, Fit, Presence
 from cardbox_tracker.estimation.filtering.presence import PersonPresence
 from cardbox_tracker.estimation.filtering.rated_states import RatedStates
-from cardbox_tracker.estimation.filtering.search_plan import SearchPlan
+from cardbox_tracker.estimation.filtering.refiner import Cue, Prior, Refiner
 from cardbox_tracker.estimation.filtering.visibility import is_trackable
+from cardbox_tracker.estimation.filtering.whole_body_config import SearchProfile
 
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
 _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
+# Factor on the numbers of states in a frame whose cues tell where joints are.
+_LOCATED_EFFORT = 0.25
+# States that are fitted to such cues: number, number of similar ones, least distance of the others,
+# m; Gauss-Newton steps, and deviation of a value in a step, rad and m.
+_FITTED, _FITTED_STEPS, _FITTED_DAMPING = (6, 1, 0.1), 3, 0.25**-2
+# The same for fits to outlines.
+_OUTLINED, _OUTLINED_STEPS = (3, 1, 0.1), 2
+# Deviations (14,) of the prior around the search's mean, angles in rad and places in m: the outline
+# only moves it slightly, so that it does not become another posture with a similar outline.
+_NEAR = Prior(
+    np.zeros(14), (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
+)
+_LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
+# Weight of the last correction by the outline in the next one, against jitter.
+_KEPT = 0.6
+
+
+@dataclass
+class Search:
+    """The search of one frame.
+
+    Attributes:
+        cost: rates states by the cameras that show the person.
+        profile: numbers of the search.
+        survivors: states (M, 14) of the last frame, the best first.
+        before: state (14,) of the last frame.
+        rated: rated states, to which each stage adds.
+        location: the person's place by the silhouettes.
+        reference: state (14,) of the front reference posture.
+        draws: random numbers.
+        age: frames since the search began.
+        is_new: whether the person is new in this frame.
+        is_lost: whether the person was lost.
+        cues: observations that tell where joints are, by camera.
+    """
+
+    cost: MultiViewCost
+    profile: SearchProfile
+    survivors: FloatArray
+    before: FloatArray
+    rated: RatedStates
+    location: Location
+    reference: FloatArray
+    draws: Draws
+    age: int
+    is_new: bool
+    is_lost: bool
+    cues: list[Cue]
 
 
 class WholeBodyFilter:
@@ -66,7 +118,7 @@ class WholeBodyFilter:
 
     Attributes:
         rated: rated states of the last frame.
-        outline: fits the result to the outlines.
+        refine: fits states to the cues of a frame.
         approach: expects and proposes distances of the person.
     """
 
@@ -80,30 +132,25 @@ class WholeBodyFilter:
     ) -> None:
         """Prepare, and compile the kernels if necessary; see ``MakeFilter``."""
         self._views, self._corrector = tuple(views), corrector
-        self._plan = plan = SearchPlan.of(config.whole_body.scaled(), 1 + len(views))
-        self._config = c = plan.config
+        self._config = settings = config.whole_body
+        self._profile = settings.profile_for(1 + len(views)).scaled(settings.effort)
+        self._located = self._profile.scaled(_LOCATED_EFFORT)
         self._rng, self._lost_iou = rng, config.lost_iou
         self._use_body(silhouette)
-        self._sigma = c.noise()
-        self._torso_sigma = self._sigma.copy()
-        self._torso_sigma[LEFT_ARM] = self._torso_sigma[RIGHT_ARM] = 0.0
         self._reference = self._body.reference_state()
-        self.approach = Approach(c.home_rate)
+        self.approach = Approach(self._profile.home_rate)
         self.forget()
 
     def _use_body(self, silhouette: SilhouetteTerm) -> None:
         """Prepare rating and fits for the body of ``silhouette``."""
-        self._body, camera, views = silhouette.body, silhouette.camera, self._views
-        self._cost = cost = MultiViewCost(self._body, camera, views, self._config.cost)
-        first, *others = cost.costs
+        self._body, views = silhouette.body, self._views
+        self._cost = cost = MultiViewCost(self._body, silhouette.camera, views, self._config.cost)
         self._presence = PersonPresence(cost, self._config)
-        self._arm = ArmSearch(cost, self._plan.config)
-        self._points = PointFit(cost, self._config.cost, views)
-        self._locator = Locator(cost, self._body.placement.distance_m, views, self._plan.crosses)
-        steps, further = self._config.outline_steps, list(zip(others, views, strict=True))
-        self.outline = OutlineFit(first, camera, steps, further)
-        # The height of the torso's top above the hips is about that of the shoulders.
-        self._lever_m = float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])
+        self._arm = ArmSearch(cost)
+        crosses = self._profile.crosses
+        self._locator = Locator(cost, self._body.placement.distance_m, views, crosses)
+        self.refine = Refiner(cost, views)
+        self._point_doubt = point_doubt.PointDoubt(cost)
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -115,7 +162,7 @@ class WholeBodyFilter:
         self.approach.begin(0.0)
         self._locator.forget()
         self._output: FloatArray | None = None
-        self.outline.forget()
+        self._correction: FloatArray | None = None
         self._arm.forget()
         self._chance: float | None = None
 
@@ -126,8 +173,7 @@ class WholeBodyFilter:
         """
         self._is_lost = True
         # A wrong result must not be smoothed into the next one.
-        self._output = None
-        self.outline.forget()
+        self._output = self._correction = None
 
     def configure(self, config: TrackerConfig) -> None:
         """See :class:`~.pose_filter.PoseFilter`; all other settings of this filter restart it."""
@@ -143,7 +189,7 @@ class WholeBodyFilter:
     def follow(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Fit:
         """See :class:`~.pose_filter.PoseFilter`."""
         location = self._observe(frames, terms)
-        passes = self._config.start_passes if self._is_new else 1
+        passes = self._profile.start_passes if self._is_new else 1
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
             self._survivors = self.approach.with_upright(self._cost, frames, *given)
@@ -155,112 +201,144 @@ class WholeBodyFilter:
             self._cost.choose(self._seeing)
         self._age += not self._is_new
         for _ in range(passes):
-            self._search(frames, location)
+            self._search(location)
         self._is_new = self._is_lost = False
         return self._fit(frames)
 
     def _observe(self, frames: Sequence[Frame], terms: Sequence[Sequence[Term]]) -> Location:
         """Set the observations of the terms, and return the place of the person."""
         seeing, cost = self._seeing, self._cost
-        self.outline.seeing = tuple(seeing)
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
         cost.observe(frames, terms)
-        self._points.see()
+        self._cues = [
+            (number, cue) for number in seeing for cue in cost.costs[number].terms if cue.locates
+        ]
         return location
 
-    def _search(self, frames: Sequence[Frame], location: Location) -> None:
+    def _search(self, location: Location) -> None:
         """Run all stages once."""
-        config, cost = self._config, self._cost
-        draws = Draws(self._rng, config)
+        profile, cost = self._located if self._cues else self._profile, self._cost
         before = self._survivors[0].copy()
         approach, z_m = self.approach, float(before[TORSO_Z])
         approach.see(float(before[TORSO_X]))
         cost.expect(approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad)
+        self.rated = RatedStates(cost)
+        search = Search(
+            cost,
+            profile,
+            self._survivors,
+            before,
+            self.rated,
+            location,
+            self._reference,
+            Draws(self._rng, profile),
+            self._age,
+            self._is_new,
+            self._is_lost,
+            self._cues,
+        )
+        for stage in STAGES:
+            stage(self, search)
+        self._survivors = self.rated.different(profile.survivors, profile.alike, profile.apart_m)
 
-        pool, upright = self._torsos(before, location, draws)
-        self.rated = rated = RatedStates(cost)
-        rated.add(pool)
-        best = rated.best(config.survivors)
-        if (self._is_new or self._is_lost) and len(pool[upright]):
-            # Its own arms make a wrong torso better than an upright one with hanging arms.
-            standing = pool[upright][np.argmin(rated.ratings[upright])]
-            self._add_arms(np.concatenate([standing[None], best]), Draws(self._rng, config))
-        self._add_arms(best, draws)
-        self._together(frames, draws)
-
-    def _add_arms(self, pool: FloatArray, draws: Draws) -> None:
-        """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
-        self._cost.fix_torso(pool[0])
-        left, right = (self._arm(pool, arm, draws) for arm in (0, 1))
-        most = self._config.paired_arms
-        self.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
-
-    def _torsos(
-        self, before: FloatArray, location: Location, draws: Draws
-    ) -> tuple[FloatArray, slice]:
-        """Return states (N, 14), survivors and new torsos with arms, and where upright ones are."""
-        config, cost = self._config, self._cost
-        is_settled = not self._is_new and self._age > _SETTLED_FRAMES
-        fresh = self._reference.copy()
+    def torsos(self, search: Search) -> None:
+        """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
+        profile, cost, before = search.profile, search.cost, search.before
+        location = search.location
+        is_settled = not search.is_new and search.age > _SETTLED_FRAMES
+        fresh = search.reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
-        upright = config.fresh_torsos if is_settled else config.torso_explorers
+        upright = profile.fresh_torsos if is_settled else profile.torso_explorers
         torsos = torso_proposals.propose_torsos(
-            self._survivors,
-            (self._torso_sigma, cost.limits, self._lever_m),
+            search.survivors,
+            (_of_torso(profile.noise()), cost.limits, _lever_m(cost)),
             location.step_m,
-            config.torso_explorers,
-            (upright, fresh, fresh_x_m, location.bearing, self._body.placement.distance_m),
-            draws.for_torsos(config.torsos),
+            profile.torso_explorers,
+            (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
+            search.draws.for_torsos(profile.torsos),
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
-            self._survivors, torsos, ratings, config.best_torsos, before, cost.body, ARM_LIMITS
+            search.survivors, torsos, ratings, profile.best_torsos, before, cost.body, ARM_LIMITS
         )
         # Upright torsos were rated with the arms of the last frame, but keep their hanging arms.
-        more = [torsos[len(torsos) - upright :], self.approach.nearer_and_farther(before, cost)]
-        if self._points.is_given:
-            more.append(self._points.torsos(self._survivors, before, self._reference))
-        return np.concatenate([pool, *more]), slice(len(pool), len(pool) + upright)
+        standing = torsos[len(torsos) - upright :]
+        more = [standing, self.approach.nearer_and_farther(before, cost)]
+        if search.cues:
+            turned, hanging = before.copy(), search.reference.copy()
+            turned[YAW] *= -1.0
+            hanging[[TORSO_X, TORSO_Y]] = before[[TORSO_X, TORSO_Y]]
+            begin = [search.survivors[0], search.survivors[-1], turned, hanging]
+            more.append(self._located_by_cues(np.array(begin)))
+        search.rated.add(np.concatenate([pool, *more]))
+        if (search.is_new or search.is_lost) and len(standing):
+            # Its own arms make a wrong torso better than an upright one with hanging arms.
+            rated = search.rated.ratings[len(pool) : len(pool) + upright]
+            best = search.rated.best(profile.survivors)
+            first = standing[np.argmin(rated)]
+            self._add_arms(search, np.concatenate([first[None], best]), Draws(self._rng, profile))
 
-    def _together(self, frames: Sequence[Frame], draws: Draws) -> None:
-        """Move all joints of the best states together; then choose the survivors."""
-        config, cost, rated = self._config, self._cost, self.rated
-        if self._plan.fits_outlines:
-            rated.add(self.outline.different(frames, rated))
-        if self._points.is_given:
-            rated.add(self._points.bodies(rated))
-        sigma = config.together_noise * self._sigma
-        different = config.survivors, config.alike, config.apart_m
-        sources = rated.different(*different)
-        for number in range(config.rounds):
+    def arms(self, search: Search) -> None:
+        """Rate arms beside the best torso, and pairs of the best ones."""
+        self._add_arms(search, search.rated.best(search.profile.survivors), search.draws)
+
+    def _add_arms(self, search: Search, pool: FloatArray, draws: Draws) -> None:
+        """Search arms for the torso of the first state of a pool (M, 14), and rate their pairs."""
+        search.cost.fix_torso(pool[0])
+        left, right = (self._arm(pool, arm, search.profile, draws) for arm in (0, 1))
+        most = search.profile.paired_arms
+        search.rated.add_pairs(joint_moves.combine(pool[0], *left, *right, most))
+
+    def fitted(self, search: Search) -> None:
+        """Rate states that are fitted to the cues, from the best different ones."""
+        rated = search.rated
+        if search.profile.fits_outlines:
+            chosen = rated.different(*_OUTLINED)
+            near = _NEAR._replace(mean=chosen)
+            rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
+        if search.cues:
+            chosen = rated.different(*_FITTED)
+            # A point gives a line of sight, on which a bone has two directions.
+            mirrored = mirrored_states(chosen[0], search.cost.body, ARM_LIMITS)
+            rated.add(self._located_by_cues(np.concatenate([chosen, mirrored[1:]])))
+
+    def _located_by_cues(self, states: FloatArray) -> FloatArray:
+        """Return states (N, 14) near ``states`` that fit the cues and the priors of the torso."""
+        prior = Prior(*self._cost.prior())
+        return self.refine(states, self._cues, prior, _FITTED_STEPS, _FITTED_DAMPING)[0]
+
+    def together(self, search: Search) -> None:
+        """Move all joints of the best states together, and by the differences of others."""
+        profile, rated = search.profile, search.rated
+        sigma = profile.together_noise * profile.noise()
+        sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
+        for number in range(profile.rounds):
             if number > 0:
-                sources = rated.best(config.survivors)
+                sources = rated.best(profile.survivors)
             moved = joint_moves.move_all(
                 sources,
-                (sigma, cost.limits, self._lever_m),
-                int(config.differing * config.together),
-                config.difference_scale,
-                draws.for_states(config.together),
+                (sigma, search.cost.limits, _lever_m(search.cost)),
+                int(profile.differing * profile.together),
+                profile.difference_scale,
+                search.draws.for_states(profile.together),
             )
             rated.add(moved)
-            sigma = config.round_decay * sigma
-        self._survivors = rated.different(*different)
+            sigma = profile.round_decay * sigma
 
     def _fit(self, frames: Sequence[Frame]) -> Fit:
         """Return the refined mean of the best states with its confidence."""
-        config, cost = self._config, self._cost
+        profile, cost = self._profile, self._cost
         rated = self.rated.states, self.rated.ratings
-        mean, stddev = state_choice.mean_and_spread(*rated, config.average, config.spread)
+        average = (self._located if self._cues else profile).average
+        mean, stddev = state_choice.mean_and_spread(*rated, average, profile.spread)
         before = mean if self._output is None else self._output
-        self._output = config.smoothing * before + (1.0 - config.smoothing) * mean
+        kept = self._config.smoothing * profile.smoothing
+        self._output = kept * before + (1.0 - kept) * mean
         deviations, total = loss.state_stddev(stddev), cost.silhouette_px
-        fitted = self.outline(frames, self._output)
+        fitted = self._refined(frames, self._output)
         _, (mean_differs_px,), (mean_px,), _ = cost.bodies(mean[None])
-        is_by_points = self._points.leads(iou_of(total, mean_px, mean_differs_px))
-        if is_by_points and self._points.is_given:
-            fitted = self._points.polished(fitted)
         result = self._corrected(frames, fitted)
         both = np.array([fitted, result])
         _, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
@@ -269,11 +347,11 @@ class WholeBodyFilter:
         evidence = evidence_in(cost, rated, *found, self._age)
         self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
         self._result = result
-        if self._plan.keeps_result:
+        if profile.keeps_result:
             self._survivors[-1] = fitted  # in place of the worst one
-        is_poor = self._chance > config.lost_from or fit_iou < self._lost_iou
-        is_sure = self._chance <= config.uncertain_from and is_trackable(cost, fitted)
-        is_doubtful = self._points.is_doubtful(result)
+        is_poor = self._chance > loss.LOST_FROM or fit_iou < self._lost_iou
+        is_sure = self._chance <= loss.UNCERTAIN_FROM and is_trackable(cost, fitted)
+        is_doubtful = self._point_doubt.is_doubtful(result, self._cues)
         chances, states = judged(cost, result, deviations, is_doubtful)
         is_sure = is_sure and are_sure(chances[HANDS])
         return Fit(
@@ -283,15 +361,31 @@ class WholeBodyFilter:
             cost_px=int(cost_px),
             iou=iou_of(total, area_px, cost_px),
             is_uncertain=not is_sure or is_doubtful,
-            is_poor=is_poor and not self._points.confirm(result),
+            is_poor=is_poor and not self._point_doubt.confirms(result, self._cues),
             offset_m=result[PLACE],
             offset_stddev_m=deviations[PLACE],
             seen=fitted,
             seen_iou=fit_iou,
-            particles=Particles(*rated, mean, config.spread),
+            particles=Particles(*rated, mean, profile.spread),
             keypoint_chances=chances,
             keypoint_states=states,
         )
+
+    def _refined(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
+        """Return the state (14,) near ``state`` that fits all cues best."""
+        cost, steps = self._cost, self._profile.outline_steps
+        fitted = state
+        # A depth image determines the distance better than an outline.
+        if frames[0].depth_m is None:
+            near = _NEAR._replace(mean=state)
+            (outlined,), _ = self.refine(state[None], cost.outlines(state), near, steps)
+            if self._correction is None:
+                self._correction = outlined - state
+            self._correction = _KEPT * self._correction + (1.0 - _KEPT) * (outlined - state)
+            fitted = np.clip(state + self._correction, *cost.limits.T)
+        if self._cues:
+            (fitted,), _ = self.refine(fitted[None], self._cues, Prior(fitted, _LOCATED), 2)
+        return fitted
 
     def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
         """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""
@@ -307,3 +401,25 @@ class WholeBodyFilter:
         if self._output is None:
             return [None] * len(self._cost.costs)
         return self._cost.ious(self._result, self._seeing)
+
+
+Stage = Callable[[WholeBodyFilter, Search], None]
+
+STAGES: tuple[Stage, ...] = (
+    WholeBodyFilter.torsos,
+    WholeBodyFilter.arms,
+    WholeBodyFilter.fitted,
+    WholeBodyFilter.together,
+)
+"""The search of a frame: each stage adds rated states to those of the previous ones."""
+
+
+def _of_torso(noise: FloatArray) -> FloatArray:
+    """Return the noise (14,) of a torso, whose arms keep their angles."""
+    noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
+    return noise
+
+
+def _lever_m(cost: MultiViewCost) -> float:
+    """Return the height of the torso's top above the hips, which is about that of the shoulders."""
+    return float(cost.parts[TORSO, BOTTOM] + cost.parts[TORSO, HEIGHT])

@@ -18,7 +18,8 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.errors import BodyModelError, CameraError, InitializationError
 from cardbox_tracker.estimation.cost.depth import Depth, DepthTerm
-from cardbox_tracker.estimation.cost.terms import DepthImage, Frame
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.terms import DepthImage, Frame, Posed
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
@@ -123,7 +124,12 @@ def depth_scale(body: BodyModel, camera: Camera, references: Mapping[str, DepthR
         InitializationError: the depth images do not show the person.
     """
     frames = {
-        name: Frame(seen.silhouette, len(seen.silhouette), 1, depth_m=seen.depth_m)
+        name: Frame(
+            camera,
+            {"silhouette": seen.silhouette, "depth_m": seen.depth_m},
+            len(seen.silhouette),
+            1,
+        )
         for name, seen in references.items()
     }
     for name, (silhouette, depth_m) in references.items():
@@ -198,8 +204,11 @@ def _share(
 def _off_surface(body: BodyModel, camera: Camera, frames: Mapping[str, Frame]) -> float:
     """Return the mean share of the visible surface that differs from the depth images."""
     term = DepthTerm(_TERM, body, camera)
-    shares = [
-        float(term.observe(frame).postures(body.reference_state(name)[None])[0]) / term.body_px
-        for name, frame in frames.items()
-    ]
+    posable = body_tuple(body, camera, WholeBodyCostConfig())
+    shares = []
+    for name, frame in frames.items():
+        seen = term.observe(frame)
+        if seen is not None:
+            posed = Posed(posable, body.reference_state(name)[None])
+            shares.append(float(seen.rate(posed)[0]) / term.body_px)
     return float(np.mean(shares)) + _TERM.expected
