@@ -106,7 +106,6 @@ setup(
         NAME: ["py.typed"],
         f"{NAME}.estimation.cost": ["*.json"],
         f"{NAME}.ros": ["*.csv"],
-        f"{NAME}.estimation.filtering": ["*.npz"],
     },
     zip_safe=False,
     data_files=[
