@@ -35,6 +35,8 @@ POINT_NAMES: tuple[str, ...] = (
 knuckles at the base."""
 
 _FARTHEST = 1e6
+# Score of a certain point, and share of certain points that shows a person.
+_CERTAIN, _SHARE = 0.5, 0.5
 
 POINT_INDEX = {name: index for index, name in enumerate(POINT_NAMES)}
 
@@ -108,6 +110,11 @@ class ImagePoints:
             scores=self.scores[_OTHER_SIDE],
             spatial_m=None if self.spatial_m is None else self.spatial_m[_OTHER_SIDE],
         )
+
+    @property
+    def are_certain(self) -> bool:
+        """Whether at least half of the points are certain."""
+        return float(np.mean(self.scores >= _CERTAIN)) >= _SHARE
 
     @property
     def is_empty(self) -> bool:

@@ -7,6 +7,7 @@ person). Only ``tracking`` and ``uncertain`` have a posture.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cardbox_tracker.body.keypoint_state import KeypointState
@@ -32,7 +33,9 @@ class Estimate:
             more than 30 cm); ``lost`` (it rather is); ``hidden`` (behind the trunk or outside of
             the images). ``tracking`` has no ``uncertain`` or ``lost`` hand. None if the filter has
             none.
-        keypoint_chances: probability of each keypoint to be off by more than 30 cm, (6,), or None.
+        keypoint_chances: probability of each keypoint to be off by more than 30 cm relative to the
+            middle of the shoulders, (6,), or None.
+        evidence: what these probabilities follow from, by name, one value for each keypoint, (6,).
         cost_px: cost of the posture (equation (2)), px.
         iou: intersection over union of model and silhouette, above the hips.
         offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
@@ -55,6 +58,7 @@ class Estimate:
     neck_stddev: FloatArray | None = None
     keypoint_states: tuple[KeypointState, ...] | None = None
     keypoint_chances: FloatArray | None = None
+    evidence: Mapping[str, FloatArray] | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

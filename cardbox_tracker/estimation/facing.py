@@ -21,7 +21,6 @@ from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.inner_cue import chest_levels
 from cardbox_tracker.estimation.cost.inner_cue_arms import zones_of
 from cardbox_tracker.estimation.cost.terms import Frame, Image, Posed, Silhouette
-from cardbox_tracker.estimation.filtering.point_doubt import shows_person
 
 # Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse; fewest of
 # its pixels that count.
@@ -77,7 +76,7 @@ class Facing:
             posed: the person in it, one state.
         """
         state = posed.states[0]
-        if shows_person(frame.points):
+        if frame.points is not None and frame.points.are_certain:
             self.shows_back, self._now = False, None
             return
         if self._appearance is None or frame.image is None or frame.image.ndim != 3:

@@ -28,7 +28,7 @@ from cardbox_tracker.estimation.estimate import (
 )
 from cardbox_tracker.estimation.facing import Facing
 from cardbox_tracker.estimation.filtering.cycles import Cycles
-from cardbox_tracker.estimation.filtering.keypoint_states import doubted
+from cardbox_tracker.estimation.filtering.doubt import doubted
 from cardbox_tracker.estimation.filtering.particles import Particles
 from cardbox_tracker.estimation.filtering.pose_filter import (
     Corrector,
@@ -291,11 +291,13 @@ class Tracker:
             return Estimate(LOST)
         if self.agreement is not None and fit.offset_m is not None:
             self.agreement.see(self._before, *_silhouettes(frames))
-        states, is_doubtful = fit.keypoint_states, self._is_doubtful(frames[0])
+        judged, is_doubtful = fit.judged, self._is_doubtful(frames[0])
+        states = None if judged is None else judged.states
         if is_doubtful and states is not None:
             states = doubted(states)
+        is_uncertain = is_doubtful or (judged is not None and judged.is_uncertain)
         return Estimate(
-            UNCERTAIN if fit.is_uncertain or is_doubtful else TRACKING,
+            UNCERTAIN if is_uncertain else TRACKING,
             fit.posture,
             fit.posture_stddev,
             fit.keypoints_m,
@@ -304,7 +306,8 @@ class Tracker:
             fit.offset_m,
             fit.offset_stddev_m,
             keypoint_states=states,
-            keypoint_chances=fit.keypoint_chances,
+            keypoint_chances=None if judged is None else judged.chances,
+            evidence=None if judged is None else judged.evidence,
         )
 
     def _is_doubtful(self, frame: Frame) -> bool:

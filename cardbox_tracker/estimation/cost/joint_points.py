@@ -203,6 +203,53 @@ class JointPointsObservation(TermObservation):
         )
         return found
 
+    def evidence(self, posed: Posed) -> dict[str, FloatArray]:
+        """Return how the joints of one state differ from the points, see :data:`EVIDENCE`."""
+        pixels, points, bones, away = projected(posed), *self.seen[:1], *self.seen[2:]
+        focal_px, keypoints_m = posed.body[4][0], posed.keypoints_m[0]
+        known = points[:, 2] >= _CERTAIN
+        away_m = np.linalg.norm(points[:, :2] - pixels[:, :2], axis=1) * pixels[:, 2] / focal_px
+        away_m = np.where(known, away_m, 0.0)
+        found = {name: np.zeros(6) for name in EVIDENCE}
+        found["back"][:] = self.shows_back
+        found["distance"][:] = float(np.linalg.norm(keypoints_m[[0, 3]].mean(axis=0)))
+        for arm in (0, 1):
+            first = POINTS_OF_ARM * arm
+            hand = [first + WRIST, first + KNUCKLES]
+            joints = [first + SHOULDER], [first + ELBOW], hand
+            off_m = 0.0
+            for k, joint in enumerate(joints):
+                at = 3 * arm + k
+                found["point distance"][at] = away_m[joint].max()
+                found["point missing"][at] = not known[joint].all()
+                if k == 0:
+                    continue
+                bone = keypoints_m[at] - keypoints_m[at - 1]
+                length, number = float(np.linalg.norm(bone)), 2 * arm + k - 1
+                found["foreshortened"][at] = abs(float(bone[2])) / max(length, 1e-6)
+                if bones[number, 1] > 0.0:
+                    off_m += float(bone @ away) - length * float(bones[number, 0])
+                found["depth difference"][at] = abs(off_m)
+            # A hand also has the error of the upper arm.
+            found["elbow foreshortened"][3 * arm + 2] = found["foreshortened"][3 * arm + 1]
+        return found
+
+
+EVIDENCE = (
+    "point distance",
+    "point missing",
+    "depth difference",
+    "foreshortened",
+    "elbow foreshortened",
+    "distance",
+    "back",
+)
+"""Distance of a joint from its point at its depth, m; whether the point is not certain; difference
+of its depth from that of the detector, m; component of the bone that ends there, and of the upper
+arm, along the line of sight, as a fraction; distance of the person, m; whether the back is seen."""
+# Score of a certain point.
+_CERTAIN = 0.5
+
 
 def projected(posed: Posed) -> FloatArray:
     """Return column, row (px) and depth (m) of the ten joints of the first state, (10, 3)."""

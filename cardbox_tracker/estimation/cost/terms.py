@@ -195,8 +195,11 @@ class TermObservation:
         """Return residuals of whole bodies for the refiner; None without any."""
         return None
 
-    def evidence(self, posed: Posed) -> Mapping[str, float]:
-        """Return values by name that tell whether a result, one state, may be wrong."""
+    def evidence(self, posed: Posed) -> Mapping[str, FloatArray]:
+        """Return what tells that a result, one state, may be wrong, by name.
+
+        Each has one value for each keypoint, (6,); the doubt (:mod:`.doubt`) has its coefficients.
+        """
         return MappingProxyType({})
 
 

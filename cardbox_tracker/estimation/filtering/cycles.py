@@ -13,6 +13,7 @@ from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.filtering import doubt
 from cardbox_tracker.estimation.filtering.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.estimation.filtering.pose_filter import Fit, Presence
 from cardbox_tracker.vision.rasterisation import render
@@ -56,7 +57,9 @@ class Cycles:
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
+        self._person_px = max(1, np.count_nonzero(model))
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
+        self._doubt = doubt.Doubt()
         self._started = False
         self._iou: float | None = None
 
@@ -73,6 +76,7 @@ class Cycles:
     def forget(self) -> None:
         """See :class:`PoseFilter`."""
         self._started = False
+        self._doubt.forget()
 
     def recover(self) -> None:
         """See :class:`PoseFilter`."""
@@ -99,7 +103,11 @@ class Cycles:
         is_poor = iou < self._config.lost_iou
         keypoints_m = self._keypoints(posture)
         stddev = self.hierarchy.stddev()
-        return Fit(posture, stddev, keypoints_m, cost_px, iou, False, is_poor, posture, iou)
+        area = frame.foreground_px / self._person_px
+        evidence = doubt.evidence_of_particles(iou, area, posture, stddev, self._posable)
+        judged = self._doubt.judge(evidence, doubt.Source.PAPER, np.zeros(6, np.bool_))
+        fit = posture, stddev, keypoints_m, cost_px, iou, is_poor, posture, iou
+        return Fit(*fit, judged=judged)
 
     def _start(self, frame: Frame, observation: SumOfTerms) -> None:
         """Start around the front reference at the person's place, then run the first cycles."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from cardbox_tracker.body.posture import POSTURE, TURNING_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.filtering.loss import calibrated_deviations
+from cardbox_tracker.estimation.filtering.doubt import calibrated_deviations
 
 
 @dataclass(frozen=True)

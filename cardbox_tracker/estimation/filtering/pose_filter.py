@@ -10,12 +10,12 @@ from typing import Protocol
 
 import numpy as np
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term
 from cardbox_tracker.estimation.cost.view import View
+from cardbox_tracker.estimation.filtering.doubt import Judgement
 from cardbox_tracker.estimation.filtering.particles import Particles
 
 
@@ -38,7 +38,6 @@ class Fit:
             optical frame.
         cost_px: pixels in which the drawn posture and the silhouette differ.
         iou: intersection over union of drawn posture and silhouette.
-        is_uncertain: whether the posture may be wrong.
         is_poor: whether it does not fit; several such frames in a row mean that the person is lost.
         seen: state that fits the image best, before any correction, (14,), or (12,) without
             an offset.
@@ -46,8 +45,7 @@ class Fit:
         offset_m: ``torso_x`` and ``torso_z``, (2,), or None.
         offset_stddev_m: standard deviations of ``offset_m``, (2,), or None.
         particles: particles of whole states; None if the filter has none.
-        keypoint_chances: probability of each keypoint to be off by more than 30 cm, (6,), or None.
-        keypoint_states: state of each keypoint, (6,), or None.
+        judged: the doubt about the result; None if the filter has none.
     """
 
     posture: FloatArray
@@ -55,21 +53,20 @@ class Fit:
     keypoints_m: FloatArray
     cost_px: int
     iou: float
-    is_uncertain: bool
     is_poor: bool
     seen: FloatArray
     seen_iou: float
     offset_m: FloatArray | None = None
     offset_stddev_m: FloatArray | None = None
     particles: Particles | None = None
-    keypoint_chances: FloatArray | None = None
-    keypoint_states: tuple[KeypointState, ...] | None = None
+    judged: Judgement | None = None
 
     @property
     def is_finite(self) -> bool:
         """Whether all values are finite."""
         values = self.posture, self.posture_stddev, self.keypoints_m.ravel()
-        others = self.offset_m, self.offset_stddev_m, self.keypoint_chances
+        chances = None if self.judged is None else self.judged.chances
+        others = self.offset_m, self.offset_stddev_m, chances
         # A sum is only finite if all summands are; for few numbers, Python adds them fastest.
         total = self.iou
         for value in (*values, *others):

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.terms import Frame
-from cardbox_tracker.estimation.filtering.point_doubt import shows_person
 from cardbox_tracker.estimation.filtering.pose_filter import Presence
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
 
@@ -53,7 +52,7 @@ class PersonPresence:
             near: state (14,) of the last frame.
         """
         found = [
-            presence_of(*share, *self._limits, shows_person(frame.points))
+            presence_of(*share, *self._limits, frame.points is not None and frame.points.are_certain)
             for share, frame in zip(self._cost.shares(near), frames, strict=True)
         ]
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0

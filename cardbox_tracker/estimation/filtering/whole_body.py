@@ -30,13 +30,12 @@ from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.kernel_arguments import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
-from cardbox_tracker.estimation.cost.terms import Frame, Term
+from cardbox_tracker.estimation.cost.terms import Frame, Posed, Term
 from cardbox_tracker.estimation.cost.view import View
 from cardbox_tracker.estimation.cost.whole_body import iou_of
 from cardbox_tracker.estimation.filtering import (
+    doubt,
     joint_moves,
-    loss,
-    point_doubt,
     state_choice,
     torso_proposals,
 )
@@ -44,8 +43,6 @@ from cardbox_tracker.estimation.filtering.approach import Approach
 from cardbox_tracker.estimation.filtering.arm_search import ArmSearch
 from cardbox_tracker.estimation.filtering.arms import ARM_LIMITS
 from cardbox_tracker.estimation.filtering.draws import Draws
-from cardbox_tracker.estimation.filtering.evidence import evidence_in
-from cardbox_tracker.estimation.filtering.keypoint_states import HANDS, are_sure, judged
 from cardbox_tracker.estimation.filtering.locating import Location, Locator
 from cardbox_tracker.estimation.filtering.mirroring import mirrored_states
 from cardbox_tracker.estimation.filtering.particles import Particles
@@ -53,7 +50,7 @@ from cardbox_tracker.estimation.filtering.pose_filter import Corrector, Fit, Pre
 from cardbox_tracker.estimation.filtering.presence import PersonPresence
 from cardbox_tracker.estimation.filtering.rated_states import RatedStates
 from cardbox_tracker.estimation.filtering.refiner import Cue, Prior, Refiner
-from cardbox_tracker.estimation.filtering.visibility import is_trackable
+from cardbox_tracker.estimation.filtering.visibility import are_hidden, is_trackable
 from cardbox_tracker.estimation.filtering.whole_body_config import SearchProfile
 
 # Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
@@ -73,6 +70,7 @@ _NEAR = Prior(
     np.zeros(14), (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
 )
 _LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
+_NONE = np.zeros(6)
 # Weight of the last correction by the outline in the next one, against jitter.
 _KEPT = 0.6
 
@@ -150,7 +148,7 @@ class WholeBodyFilter:
         crosses = self._profile.crosses
         self._locator = Locator(cost, self._body.placement.distance_m, views, crosses)
         self.refine = Refiner(cost, views)
-        self._point_doubt = point_doubt.PointDoubt(cost)
+        self._doubt = doubt.Doubt()
 
     def forget(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`."""
@@ -164,7 +162,7 @@ class WholeBodyFilter:
         self._output: FloatArray | None = None
         self._correction: FloatArray | None = None
         self._arm.forget()
-        self._chance: float | None = None
+        self._doubt.forget()
 
     def recover(self) -> None:
         """See :class:`~.pose_filter.PoseFilter`; an upright state is added to the search.
@@ -336,39 +334,40 @@ class WholeBodyFilter:
         before = mean if self._output is None else self._output
         kept = self._config.smoothing * profile.smoothing
         self._output = kept * before + (1.0 - kept) * mean
-        deviations, total = loss.state_stddev(stddev), cost.silhouette_px
         fitted = self._refined(frames, self._output)
-        _, (mean_differs_px,), (mean_px,), _ = cost.bodies(mean[None])
         result = self._corrected(frames, fitted)
         both = np.array([fitted, result])
-        _, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
+        ratings, (differs_px, cost_px), (drawn_px, area_px), points = cost.bodies(both)
+        deviations, total = doubt.deviations_of(stddev), cost.silhouette_px
         fit_iou = iou_of(total, drawn_px, differs_px)
-        found = (mean, stddev), (mean_differs_px, mean_px), self._arm.spreads_m
-        evidence = evidence_in(cost, rated, *found, self._age)
-        self._chance = loss.remembered(loss.chance_of_loss(evidence), self._chance)
+        pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
+        prior = float(ratings[1]) - float(cost_px) / max(total, 1)
+        found = pixels, prior, self._arm.spreads_m, (result, deviations), cost.body, self._age
+        evidence = doubt.evidence_of_search(*found)
+        for number, cue in self._cues:
+            there = cost.to_views[number](result[None])
+            evidence |= cue.evidence(Posed(cost.costs[number].body, there))
+        evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
+        source = doubt.Source.POINTS if self._cues else doubt.Source.OUTLINE
+        vetoes = not is_trackable(cost, fitted), bool(evidence.get("back", _NONE).any())
+        judged = self._doubt.judge(evidence, source, are_hidden(cost, result), vetoes)
         self._result = result
         if profile.keeps_result:
             self._survivors[-1] = fitted  # in place of the worst one
-        is_poor = self._chance > loss.LOST_FROM or fit_iou < self._lost_iou
-        is_sure = self._chance <= loss.UNCERTAIN_FROM and is_trackable(cost, fitted)
-        is_doubtful = self._point_doubt.is_doubtful(result, self._cues)
-        chances, states = judged(cost, result, deviations, is_doubtful)
-        is_sure = is_sure and are_sure(chances[HANDS])
         return Fit(
             posture=result[POSTURE],
             posture_stddev=deviations[POSTURE],
             keypoints_m=points.keypoints_m[1],
             cost_px=int(cost_px),
             iou=iou_of(total, area_px, cost_px),
-            is_uncertain=not is_sure or is_doubtful,
-            is_poor=is_poor and not self._point_doubt.confirms(result, self._cues),
-            offset_m=result[PLACE],
-            offset_stddev_m=deviations[PLACE],
+            # Points that the result fits show that a silhouette which it does not fit is wrong.
+            is_poor=judged.is_poor or (fit_iou < self._lost_iou and not self._cues),
             seen=fitted,
             seen_iou=fit_iou,
+            offset_m=result[PLACE],
+            offset_stddev_m=deviations[PLACE],
             particles=Particles(*rated, mean, profile.spread),
-            keypoint_chances=chances,
-            keypoint_states=states,
+            judged=judged,
         )
 
     def _refined(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
-from cardbox_tracker.estimation.filtering.keypoint_states import FAR_M, HANDS
+from cardbox_tracker.estimation.filtering.doubt import FAR_M, HANDS
 from cardbox_tracker.evaluation.metrics import (
     SHOULDERS,
     acceleration_error,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.estimation.filtering.keypoint_states import FAR_M
+from cardbox_tracker.estimation.filtering.doubt import FAR_M
 
 FloatArray = NDArray[np.float64]
 
