@@ -52,7 +52,9 @@ class PersonPresence:
             near: state (14,) of the last frame.
         """
         found = [
-            presence_of(*share, *self._limits, frame.points is not None and frame.points.are_certain)
+            presence_of(
+                *share, *self._limits, frame.points is not None and frame.points.are_certain
+            )
             for share, frame in zip(self._cost.shares(near), frames, strict=True)
         ]
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0

@@ -88,7 +88,7 @@ def figures(session: RecordedSession, run: SessionRun) -> dict[str, Any]:
         "acceleration_beside": acceleration_error(beside_shoulders(off_m), session.stamps_ns),
         "coverage": coverage(session, run),
         "keypoint_states": compared(
-            np.linalg.norm(off_m, axis=2), run.chances, run.keypoint_states
+            np.linalg.norm(beside_shoulders(off_m), axis=2), run.chances, run.keypoint_states
         ),
         "hand_far_but_tracking": int(
             ((distance[:, HANDS] > FAR_CM).any(axis=1) & is_tracking[have]).sum()
