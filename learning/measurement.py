@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.errors import CardboxError
@@ -78,7 +78,7 @@ def true_lengths_m(posed: Posed) -> FloatArray:
 
 
 def _shoulders_m(measured: BodyModel) -> float:
-    keypoints = keypoints_m(measured, reference_posture("front"))
+    keypoints = pose(measured, reference_posture("front")).keypoints_m
     return float(keypoints[[0, 3], 2].mean())
 
 

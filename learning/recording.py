@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.proportions import STATURE_LIMITS_M, body_from_proportions
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.filtering.whole_body import WholeBodyFilter

@@ -56,7 +56,7 @@ class Facing:
         """Prepare for a body, whose appearance may be missing, before a working camera."""
         appearance = body.appearance
         self._appearance = None if appearance is None or appearance.is_grey else appearance
-        self._view = ArmView.of(body, camera, np.zeros(2), lifts_shoulders=True)
+        self._view = ArmView.of(body, camera, np.zeros(2))
         if self._appearance is not None:
             histograms = self._appearance.histograms
             self._is_hair = np.log(histograms[HAND] / histograms[HEAD]) < _HAIR_NATS

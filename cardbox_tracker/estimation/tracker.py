@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import clavicles
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.camera_agreement import CameraAgreement
@@ -93,9 +94,11 @@ class Tracker:
 
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next frame on."""
-        self.body, self._silhouette = body, silhouette
+        self.body = body if self.config.filter == "whole_body" else body.rigid
+        self._silhouette = silhouette
         self._cameras = [
-            TrackedCamera(body, self.camera, self.config, other) for other in (None, *self._others)
+            TrackedCamera(self.body, self.camera, self.config, other)
+            for other in (None, *self._others)
         ]
         views = self.views
         earlier = self.agreement
@@ -279,6 +282,7 @@ class Tracker:
         states, is_doubtful = fit.keypoint_states, self._is_doubtful(frames[0])
         if is_doubtful and states is not None:
             states = doubted(states)
+        clavicles_m, clavicles_stddev_m = clavicles(self.body, fit.posture, fit.posture_stddev)
         return Estimate(
             UNCERTAIN if fit.is_uncertain or is_doubtful else TRACKING,
             fit.posture,
@@ -290,6 +294,8 @@ class Tracker:
             fit.offset_stddev_m,
             keypoint_states=states,
             keypoint_chances=fit.keypoint_chances,
+            clavicles_m=clavicles_m,
+            clavicles_stddev_m=clavicles_stddev_m,
         )
 
     def _is_doubtful(self, frame: Frame) -> bool:

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.terms import ARMS, Frame, Silence
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -64,7 +65,7 @@ def silhouette_of(tracker: Tracker, posture: np.ndarray = FRONT) -> np.ndarray:
 
 
 def projected(tracker: Tracker, posture: np.ndarray) -> np.ndarray:
-    points_m = tracker.camera.reference_to_optical(keypoints_m(tracker.body, posture))
+    points_m = tracker.camera.reference_to_optical(pose(tracker.body.rigid, posture).keypoints_m)
     return tracker.camera.project(points_m)
 
 
@@ -131,7 +132,7 @@ def test_the_tracker_follows_clicked_points(folder: Path) -> None:
 def test_a_corrector_from_a_file_is_fitted_and_used(folder: Path) -> None:
     linear = module_of("linear_corrector")
     rng = np.random.default_rng(0)
-    body_m = np.array([0.0, 0.0, 2.5]) + keypoints_m(made_by(CODE[1]).body, FRONT)
+    body_m = np.array([0.0, 0.0, 2.5]) + pose(made_by(CODE[1]).body.rigid, FRONT).keypoints_m
     found_m = body_m + 0.2 * rng.standard_normal((200, 6, 3))
     # All results are 10 cm too near.
     linear.fit(found_m, found_m + np.array([0.0, 0.0, 0.1]))

@@ -15,11 +15,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_STATE, PLACE, POSTURE, TORSO
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost import depth_kernels as kernels
-from cardbox_tracker.estimation.cost.inner_cue_arms import torsos_of
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.parts import (
     BOTTOM_WIDTH,
     FOREARM,
     HEAD,
@@ -27,9 +23,13 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TOP_WIDTH,
     UPPER_ARM,
     WAIST,
-    Drawn,
 )
-from cardbox_tracker.estimation.cost.kernel_arguments import TORSO as TORSO_PART
+from cardbox_tracker.body.parts import TORSO as TORSO_PART
+from cardbox_tracker.body.posture import N_STATE, PLACE, POSTURE, TORSO
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost import depth_kernels as kernels
+from cardbox_tracker.estimation.cost.inner_cue_arms import torsos_of
+from cardbox_tracker.estimation.cost.kernel_arguments import Drawn
 from cardbox_tracker.estimation.cost.terms import (
     ARMS,
     ArmCosts,

@@ -83,11 +83,6 @@ class InnerCue(Settings):
         "constant",
         limits=(0.0, 1.0),
     )
-    lifts_shoulders: bool = setting(
-        True,
-        "the shoulders rise with the arms, as in the filter whole_body; false: they are rigid, as "
-        "in the filter hierarchical",
-    )
 
     def build(self, body: BodyModel, camera: Camera) -> Term:
         """Return the term, which is zero for a body without an appearance."""
@@ -111,9 +106,7 @@ class InnerCueTerm:
         self.config = config
         self._appearance = body.appearance
         self._brightness = body.appearance.brightness.copy()
-        self._arms = ArmView.of(
-            body, camera, np.array([config.hand, config.forearm]), config.lifts_shoulders
-        )
+        self._arms = ArmView.of(body, camera, np.array([config.hand, config.forearm]))
         self._sleeves: Sleeves | None = None
         self._ratios = ratios_of(body.appearance.histograms)
         self._warm_up(camera)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import PLACE_NAMES, POSTURE, TORSO
+from cardbox_tracker.body.posture import POSTURE, TORSO
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import PLACE_NAMES
 from cardbox_tracker.estimation.cost import inner_cue_kernels as kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
 from cardbox_tracker.vision.camera import Camera
 
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
@@ -27,28 +27,21 @@ class ArmView:
     """One person before one camera: the arguments that are constant over frames.
 
     Attributes:
-        person: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Person`.
+        person: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
         forearm: fields of :class:`~cardbox_tracker.estimation.cost.inner_cue_kernels.Forearm`.
         weights: weight of a nat of hand and forearm, px of the outline, (2,).
     """
 
-    person: kernels.PersonTuple
+    person: BodyTuple
     forearm: kernels.ForearmTuple
     weights: FloatArray
 
     @classmethod
-    def of(
-        cls, body: BodyModel, camera: Camera, weights: FloatArray, lifts_shoulders: bool
-    ) -> ArmView:
-        """Return the view of ``body`` before a working camera that includes the pitch.
-
-        With ``lifts_shoulders``, the shoulders rise with the arms as in the whole-body filter by
-        default.
-        """
+    def of(cls, body: BodyModel, camera: Camera, weights: FloatArray) -> ArmView:
+        """Return the view of ``body`` before a working camera that includes the pitch."""
+        forearm = body.size("forearm_length"), body.size("forearm_width")
         px_per_m = float(camera.fx) / body.placement.distance_m
-        lengths = _lengths(body, lifts_shoulders)
-        person = tuple(lengths), place_of(body), intrinsics_of(camera)
-        return cls(person, (lengths.forearm, lengths.forearm_width, px_per_m), weights)
+        return cls(body_tuple(body, camera), (*forearm, px_per_m), weights)
 
     def project(
         self, torsos: FloatArray, arms: FloatArray, side: str
@@ -105,25 +98,3 @@ def torsos_of(postures: FloatArray) -> FloatArray:
     torsos[:, TORSO] = postures[:, TORSO]
     torsos[:, TORSO.stop : TORSO.stop + places.shape[1]] = places
     return torsos
-
-
-def _lengths(body: BodyModel, lifts_shoulders: bool) -> kernels.Lengths:
-    girdle = WholeBodyCostConfig()
-    parts = body_parts(body.sizes)
-    return kernels.Lengths(
-        parts.shoulder_aside_m,
-        parts.shoulder_height_m,
-        parts.upper_arm.height_m,
-        parts.forearm.height_m,
-        parts.forearm.top_width_m,
-        parts.torso.top_m,
-        parts.torso.top_width_m,
-        parts.head.middle_m,
-        parts.head.forward_m,
-        parts.head.top_width_m,
-        parts.head.height_m,
-        parts.waist.height_m,
-        girdle.clavicle * body.size("shoulder_breadth"),
-        girdle.lift_gain if lifts_shoulders else 0.0,
-        float(np.radians(girdle.lift_from_deg)),
-    )

@@ -5,19 +5,15 @@ A torso is (6,): d1..d4, ``torso_x`` and ``torso_z``.
 
 from __future__ import annotations
 
-from math import acos, cos, sin, sqrt
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import Pitched, Place, new_arm, pose_arm, torso_pose, turn_arm
+from cardbox_tracker.body.parts import BOTTOM, FORWARD, HEAD, HEIGHT, TOP_WIDTH, TORSO, WAIST
 from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    Intrinsics,
-    IntrinsicsTuple,
-    Place,
-    PlaceTuple,
-)
-from cardbox_tracker.estimation.cost.kinematics import torso_pose, turn_limb
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, body_of
 
 # Begin and end of the forearm's patch between elbow and fist, and its width in forearm widths; a
 # wider patch would sample pixels outside of the forearm.
@@ -36,38 +32,6 @@ _BEHIND_M, _NEAREST_M = 0.03, 0.1
 _X, _Z = 4, 5
 
 _TORSO_ZONE, _HEAD_ZONE, _LOWER_ZONE = 0, 1, 2
-
-
-class Lengths(NamedTuple):
-    """Lengths of a body, metres, and the lift of its shoulders; kernels get a plain tuple.
-
-    ``clavicle`` is the radius of the circle on which the girdle lifts a shoulder joint, by
-    ``lift_gain`` times the elevation of the upper arm beyond ``lift_from``, rad.
-    """
-
-    shoulder_aside: float
-    shoulder_height: float
-    upper_arm: float
-    forearm: float
-    forearm_width: float
-    torso_top: float
-    torso_width: float
-    head_middle: float
-    head_forward: float
-    head_width: float
-    head_height: float
-    waist_height: float
-    clavicle: float
-    lift_gain: float
-    lift_from: float
-
-
-class Person(NamedTuple):
-    """A person before a camera."""
-
-    lengths: Lengths
-    place: Place
-    camera: Intrinsics
 
 
 class Maps(NamedTuple):
@@ -93,40 +57,33 @@ class Forearm(NamedTuple):
     px_per_m: float
 
 
-LengthsTuple = tuple[float, ...]
-PersonTuple = tuple[LengthsTuple, PlaceTuple, IntrinsicsTuple]
 MapsTuple = tuple[Any, int, int]
 ForearmTuple = tuple[float, float, float]
 Pair = tuple[float, float]
 
 
 @inlined_kernel
-def _person_of(fields: PersonTuple) -> Person:
-    """Return a person with its fields named."""
-    lengths, place, camera = fields
-    return Person(Lengths(*lengths), Place(*place), Intrinsics(*camera))
-
-
-@inlined_kernel
-def _torso_pose(torso: Any, place: Place, camera: Intrinsics, rotation: Any, hip: Any) -> None:
+def _torso_pose(torso: Any, place: Place, camera: Pitched, rotation: Any, hip: Any) -> None:
     """Write rotation (3, 3) and mid-hip (3,) of a torso (6,) in the optical frame."""
     moved = Place(place.distance_m - torso[_X], place.hip_height_m + torso[_Z])
     torso_pose(torso, moved, camera, rotation, hip)
 
 
 @kernel
-def torso_zones(torso: Any, person: PersonTuple, zones: Any) -> None:
+def torso_zones(torso: Any, body: BodyTuple, zones: Any) -> None:
     """Write the places of head and torso of a torso (6,) in the image: ``zones`` (6,), px.
 
     The values are the head's centre (u, v), the half axes of an ellipse around it, the row of the
     hips, and the row of the torso's top.
     """
-    body, place, camera = _person_of(person)
+    of = body_of(body)
+    camera, head, torso_part = of.camera, of.parts[HEAD], of.parts[TORSO]
     rotation, hip = np.empty((3, 3)), np.empty(3)
-    _torso_pose(torso, place, camera, rotation, hip)
-    heights = (body.head_middle, 0.6 * body.waist_height, body.torso_top)
+    _torso_pose(torso, of.place, camera, rotation, hip)
+    middle, top = head[BOTTOM] + 0.5 * head[HEIGHT], torso_part[BOTTOM] + torso_part[HEIGHT]
+    heights = (middle, 0.6 * of.parts[WAIST, HEIGHT], top)
     for i in range(3):
-        forward = body.head_forward if i == 0 else 0.0
+        forward = head[FORWARD] if i == 0 else 0.0
         x = hip[0] + forward * rotation[0, 0] + heights[i] * rotation[0, 2]
         y = hip[1] + forward * rotation[1, 0] + heights[i] * rotation[1, 2]
         z = max(hip[2] + forward * rotation[2, 0] + heights[i] * rotation[2, 2], _NEAREST_M)
@@ -134,7 +91,7 @@ def torso_zones(torso: Any, person: PersonTuple, zones: Any) -> None:
         if i == 0:
             per_m = camera.fx / z
             zones[0], zones[1] = camera.fx * x / z + camera.cx, row
-            zones[2], zones[3] = 0.6 * body.head_width * per_m, 0.6 * body.head_height * per_m
+            zones[2], zones[3] = 0.6 * head[TOP_WIDTH] * per_m, 0.6 * head[HEIGHT] * per_m
         elif i == 1:
             zones[4] = row
         else:
@@ -178,7 +135,7 @@ def project_arms(
     torsos: Any,
     arms: Any,
     side: float,
-    person: PersonTuple,
+    body: BodyTuple,
     points: Any,
     hidden: Any,
 ) -> None:
@@ -188,41 +145,24 @@ def project_arms(
     ``arms`` (N, 4), rad, at ``torsos`` (N, 6), or (1, 6) for all arms. ``hidden`` marks hands
     behind the torso. ``side`` is 1 for left arms, -1 for right arms.
     """
-    body, place, camera = _person_of(person)
-    torso, upper, fore = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    hip, joint = np.empty(3), np.empty(3)
+    of = body_of(body)
+    camera, torso_part, head = of.camera, of.parts[TORSO], of.parts[HEAD]
+    top = torso_part[BOTTOM] + torso_part[HEIGHT]
+    rotation, hip, arm = np.empty((3, 3)), np.empty(3), new_arm()
     for i in range(arms.shape[0]):
         if i == 0 or torsos.shape[0] > 1:
-            _torso_pose(torsos[i], place, camera, torso, hip)
-        turn_limb(torso, side * arms[i, 0], arms[i, 1], upper)
-        aside, height = body.shoulder_aside, body.shoulder_height
-        if body.lift_gain > 0.0:
-            upright = 0.0
-            for c in range(3):
-                upright += upper[c, 2] * torso[c, 2]
-            elevation = acos(min(max(upright, -1.0), 1.0))
-            lift = body.lift_gain * max(elevation - body.lift_from, 0.0)
-            aside -= body.clavicle * (1.0 - cos(lift))
-            height += body.clavicle * sin(lift)
-        for c in range(3):
-            joint[c] = hip[c] + side * aside * torso[c, 1] + height * torso[c, 2]
-            joint[c] -= body.upper_arm * upper[c, 2]
-        turn_limb(upper, side * arms[i, 2], arms[i, 3], fore)
+            _torso_pose(torsos[i], of.place, camera, rotation, hip)
+        pose_arm(arms[i], side, of.parts, of.girdle, arm.points, arm.directions)
+        turn_arm(arm, rotation, hip)
         for j in range(2):
+            joint = arm.joints[1 + j]
             z = max(joint[2], _NEAREST_M)
             points[i, j, 0] = camera.fx * joint[0] / z + camera.cx
             points[i, j, 1] = camera.fy * joint[1] / z + camera.cy
             points[i, j, 2] = camera.fx / z
-            if j == 0:
-                for c in range(3):
-                    joint[c] -= body.forearm * fore[c, 2]
-        x = y = h = 0.0
-        for c in range(3):
-            x += (joint[c] - hip[c]) * torso[c, 0]
-            y += (joint[c] - hip[c]) * torso[c, 1]
-            h += (joint[c] - hip[c]) * torso[c, 2]
-        width = body.torso_width if h < body.torso_top else body.head_width
-        hidden[i] = x < -_BEHIND_M and abs(y) < width / 2
+        hand = arm.points[2]
+        width = torso_part[TOP_WIDTH] if hand[2] < top else head[TOP_WIDTH]
+        hidden[i] = hand[0] < -_BEHIND_M and abs(hand[1]) < width / 2
 
 
 @kernel

@@ -49,7 +49,6 @@ from cardbox_tracker.estimation.cost.terms import (
     TermObservation,
     TorsoCosts,
 )
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.camera import Camera
 
@@ -98,7 +97,7 @@ class JointPointsTerm:
         """Prepare, and compile the kernels if necessary."""
         self.config, self._camera = config, camera
         self._uses_bones = body.source != MEASURED
-        self.body = body_tuple(body, camera, WholeBodyCostConfig())
+        self.body = body_tuple(body, camera)
         self._elsewhere = 0
         # Time since left and right were first exchanged, s; None if they are not.
         self._exchanged_s: float | None = None

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import Place, PosedArm, new_arm
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.joint_points_kernels import (
@@ -23,10 +24,8 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     BodyTuple,
     Floats,
     Intrinsics,
-    Place,
     body_of,
 )
-from cardbox_tracker.estimation.cost.kinematics import PosedArm, new_arm
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 
 _N_RESIDUALS = 2 * N_POINTS + N_BONES

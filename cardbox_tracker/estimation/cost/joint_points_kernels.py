@@ -15,19 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    BOTTOM,
-    FORWARD,
-    HEAD,
-    HEIGHT,
-    Body,
-    BodyTuple,
-    Floats,
-    Intrinsics,
-    body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
+from cardbox_tracker.body.kinematics import (
     PosedArm,
     angles_in,
     new_arm,
@@ -35,6 +23,15 @@ from cardbox_tracker.estimation.cost.kinematics import (
     side_of,
     state_pose,
     turn_arm,
+)
+from cardbox_tracker.body.parts import BOTTOM, FORWARD, HEAD, HEIGHT
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    Body,
+    BodyTuple,
+    Floats,
+    Intrinsics,
+    body_of,
 )
 
 # Joints with a point: four of each arm, the middle of the hips, and the middle of the ears.

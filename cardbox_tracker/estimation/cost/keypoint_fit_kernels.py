@@ -13,16 +13,10 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import first_angle, keypoints, pose_arm, side_of, state_pose
 from cardbox_tracker.body.posture import ARM_ANGLES, N_STATE, TORSO_X, TORSO_Y, TORSO_Z
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
-from cardbox_tracker.estimation.cost.kinematics import (
-    first_angle,
-    keypoints,
-    pose_arm,
-    side_of,
-    state_pose,
-)
 from cardbox_tracker.estimation.cost.linear_kernels import solve
 
 KEYPOINTS = 6
@@ -74,7 +68,7 @@ def pose_at_keypoints(state: Floats, body: BodyTuple, wanted: Floats, limits: Fl
         ce, se = cos(side * turned), sin(side * turned)
         bent = atan2(along_x, se * along_y - ce * along_z)
         angles[2], angles[3] = turned, _nearest(bent, within[3, 0], within[3, 1])
-    keypoints(state, body, now)
+    keypoints(state, of, now)
     for c in range(3):
         ahead[c] = 0.5 * (wanted[0, c] + wanted[3, c] - now[0, c] - now[3, c])
     cos_pitch, sin_pitch = of.camera.cos_pitch, of.camera.sin_pitch
@@ -123,23 +117,23 @@ def fit_keypoints(
         steps: steps of the central differences, (14,).
         count: number of steps.
     """
-    trial = state.copy()
+    of, trial = body_of(body), state.copy()
     now = np.empty((KEYPOINTS, 3))
     above, below = np.empty_like(now), np.empty_like(now)
     jacobian = np.empty((N_STATE, KEYPOINTS * 3))
     matrix, change = np.empty((N_STATE, N_STATE)), np.empty(N_STATE)
     scale = 1.0 / (SPREAD_M * SPREAD_M)
     for _ in range(count):
-        keypoints(state, body, now)
+        keypoints(state, of, now)
         for j in range(N_STATE):
             if stddev[j] == 0.0:
                 jacobian[j] = 0.0
                 continue
             trial[:] = state
             trial[j] = state[j] + steps[j]
-            keypoints(trial, body, above)
+            keypoints(trial, of, above)
             trial[j] = state[j] - steps[j]
-            keypoints(trial, body, below)
+            keypoints(trial, of, below)
             for i in range(KEYPOINTS * 3):
                 jacobian[j, i] = (above[i // 3, i % 3] - below[i // 3, i % 3]) / (2.0 * steps[j])
         for j in range(N_STATE):

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.kinematics import TWIST, state_twists
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.body_outline import (
@@ -26,10 +27,8 @@ from cardbox_tracker.estimation.cost.linear_kernels import solve
 from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
 from cardbox_tracker.estimation.cost.outline_motions import (
     SEGMENTS,
-    TWIST,
     add_moments,
     segment_of,
-    write_twists,
 )
 from cardbox_tracker.estimation.cost.outline_points import (
     Ints,
@@ -157,7 +156,7 @@ def add_equations(
             for k in range(TWIST):
                 moments[segment, j, k] += weighted * slope[k]
     own, twists = np.empty((N_STATE, TWIST)), np.zeros((N_STATE, TWIST))
-    write_twists(there, body, own)
+    state_twists(there, of, own)
     for i in range(N_STATE):
         for j in range(N_STATE):
             if turned[i, j] != 0.0:

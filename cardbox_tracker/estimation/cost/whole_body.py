@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import TORSO as TORSO_ANGLES
 from cardbox_tracker.body.posture import (
@@ -38,7 +39,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     intrinsics_of,
     place_of,
 )
-from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.rating_arguments import ObservedTuple, Points
 from cardbox_tracker.estimation.cost.terms import ARMS, Silhouette, TermObservation
@@ -80,9 +80,10 @@ class WholeBodyCost:
     """Ratings of states (N, 14) of one body before one camera with the present silhouette.
 
     Attributes:
+        person: the body.
         body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
         parts: measured parts of ``body``, (6, 6), metres.
-        girdle: girdle of ``body``, (5,).
+        girdle: girdle of ``body``, (3,).
         place: place of the hips of ``body``.
         view: camera of ``body``.
         size: width and height of the image, px.
@@ -98,7 +99,7 @@ class WholeBodyCost:
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
         """Prepare for one body and one camera, which includes the pitch."""
-        self._camera, self._config = camera, config
+        self.person, self._camera, self._config = body, camera, config
         self.body = body_tuple(body, camera, config)
         self.parts, _, self.girdle, self.place, self.view = self.body
         self.size = camera.width, camera.height
@@ -270,9 +271,7 @@ class WholeBodyCost:
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
-        points = np.empty((6, 3))
-        keypoints(state, self.body, points)
-        return points
+        return pose(self.person, state, self.pitch_rad).keypoints_m
 
     def corners(self, state: FloatArray) -> FloatArray:
         """Return the drawn patches (13, 4, 3) of a state (14,), metres in the optical frame."""

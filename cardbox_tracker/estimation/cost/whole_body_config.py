@@ -36,23 +36,6 @@ class WholeBodyCostConfig(Settings):
         unit="m",
         limits=(0.0, 0.3),
     )
-    # Clavicle and shoulder blade contribute about a third of an arm's elevation, and a part of it
-    # moves the joint; the gain was fitted to motion capture.
-    clavicle: float = restarting(
-        0.43,
-        "radius of the circle on which the girdle lifts a shoulder joint, as a fraction of the "
-        "shoulder breadth",
-        limits=(0.0, 1.0),
-    )
-    lift_gain: float = restarting(
-        0.18, "lift on this circle, rad per rad of elevation", limits=(0.0, 1.0)
-    )
-    lift_from_deg: float = restarting(
-        30.0,
-        "elevation of the upper arm above which the shoulder is lifted",
-        unit="deg",
-        limits=(0.0, 180.0),
-    )
     below_hips_m: float = restarting(
         0.35,
         "distance below the hips up to which rows of the image count, so that hanging hands count",

@@ -13,11 +13,9 @@ from math import erfc, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.body.kinematics import jacobian
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.compiling import kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
-from cardbox_tracker.estimation.cost.kinematics import keypoints
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES, KeypointState
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering.correction import FAR_M
@@ -35,8 +33,6 @@ with several cameras that look from different directions, and with points of a d
 HANDS = [2, 5]
 """Indices of the hands among the keypoints."""
 _LIMBS = [1, 2, 4, 5]
-# Step of the numerical derivatives, rad and m.
-_STEP = 1e-3
 
 
 def judged(
@@ -74,30 +70,10 @@ def chances_by_spread(cost: WholeBodyCost, state: FloatArray, stddev: FloatArray
         state: state (14,), rad and m.
         stddev: its standard deviations, (14,).
     """
-    return _chances(state, stddev, cost.body)
-
-
-@kernel
-def _chances(state: FloatArray, stddev: FloatArray, body: BodyTuple) -> FloatArray:
-    """Return :func:`chances_by_spread` of a body with these fields."""
-    middle_m, moved_m, moved = np.empty((6, 3)), np.empty((6, 3)), state.copy()
-    variances_m2, chances = np.zeros(6), np.zeros(6)
-    keypoints(state, body, middle_m)
-    for number in range(len(state)):
-        if stddev[number] == 0.0:
-            continue
-        moved[number] = state[number] + _STEP
-        keypoints(moved, body, moved_m)
-        moved[number] = state[number]
-        for point in range(6):
-            squares = 0.0
-            for axis in range(3):
-                squares += ((moved_m[point, axis] - middle_m[point, axis]) / _STEP) ** 2
-            variances_m2[point] += squares * stddev[number] ** 2
-    for point in range(6):
-        if variances_m2[point] > 0.0:
-            chances[point] = erfc(FAR_M / sqrt(2.0 * variances_m2[point]))
-    return chances
+    by_state = jacobian(cost.person, state)[-len(KEYPOINT_NAMES) :]
+    variances_m2 = (by_state**2).sum(axis=1) @ stddev**2
+    least_m2 = np.finfo(np.float64).tiny
+    return np.array([erfc(FAR_M / sqrt(2.0 * max(v, least_m2))) for v in variances_m2.tolist()])
 
 
 def are_sure(chances: FloatArray) -> bool:

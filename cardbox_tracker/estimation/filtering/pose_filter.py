@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term

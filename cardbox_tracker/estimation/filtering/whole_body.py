@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cardbox_tracker.body.parts import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     PLACE,
@@ -24,7 +25,6 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.kernel_arguments import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Term

@@ -11,7 +11,7 @@ import pytest
 
 from cardbox_tracker.body.appearance import PARTS, TORSO, UNSEEN, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import default_preset
@@ -23,7 +23,6 @@ from cardbox_tracker.estimation.cost.inner_cue import (
 )
 from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
 from cardbox_tracker.estimation.cost.terms import Frame, Silence
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.initialization.part_colors import learn_appearance
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -97,7 +96,7 @@ def flat_observation(hand: float, forearm: float) -> InnerCueObservation:
     maps = np.empty((2, 2000, 320), np.float32)  # beyond the image, so that no hand leaves it
     maps[0], maps[1] = hand, forearm
     away = np.array([[[-500.0, -500.0, 165.0], [-500.0, -400.0, 165.0]]])
-    view = ArmView.of(BODY, CAMERA, np.array([0.7, 0.7]), False)
+    view = ArmView.of(BODY, CAMERA, np.array([0.7, 0.7]))
     return InnerCueObservation(view, maps, (0, 0), {"left": away, "right": away})
 
 
@@ -155,8 +154,8 @@ def test_arms_are_projected_as_the_kinematics_place_them(offset: tuple[float, fl
     moved = BODY.with_values(
         distance_m=2.0 - offset[0], hip_height_m=BODY.placement.hip_height_m + offset[1]
     )
-    optical = camera.reference_to_optical(keypoints_m(moved, postures[:, :12]))
-    view = ArmView.of(BODY, camera, np.ones(2), False)
+    optical = camera.reference_to_optical(pose(moved, postures[:, :12]).keypoints_m)
+    view = ArmView.of(BODY, camera, np.ones(2))
     for side, joints, first in (("left", slice(4, 8), 1), ("right", slice(8, 12), 4)):
         points, _ = view.project(torsos_of(postures), postures[:, joints], side)
         expected = camera.project(optical[:, first : first + 2])
@@ -164,30 +163,12 @@ def test_arms_are_projected_as_the_kinematics_place_them(offset: tuple[float, fl
         np.testing.assert_allclose(points[..., 2], 330.0 / optical[:, first : first + 2, 2])
 
 
-def test_shoulders_rise_with_the_arms_as_in_the_whole_body_filter() -> None:
-    """By the default clavicle and gain; hanging arms are where rigid shoulders have them."""
-    arms = np.radians([[0.0, 0, 0, 0], [90, 0, 0, 0]])
-    rigid, lifted = (
-        ArmView.of(BODY, CAMERA, np.ones(2), lifts).project(np.zeros((1, 6)), arms, "left")[0]
-        for lifts in (False, True)
-    )
-    np.testing.assert_array_equal(lifted[0], rigid[0])
-    girdle = WholeBodyCostConfig()
-    turn = girdle.lift_gain * np.radians(90 - girdle.lift_from_deg)
-    radius_px = girdle.clavicle * BODY.size("shoulder_breadth") * 330 / 2.0
-    moved = (lifted - rigid)[1]
-    np.testing.assert_allclose(moved[:, 0], -radius_px * (1 - np.cos(turn)))  # towards the neck
-    np.testing.assert_allclose(moved[:, 1], -radius_px * np.sin(turn))
-
-
 def test_zones_are_where_head_and_torso_are() -> None:
     posture = np.zeros(14)
     posture[[0, 12, 13]] = 0.2, 0.4, 0.1
     moved = BODY.with_values(distance_m=1.6, hip_height_m=BODY.placement.hip_height_m + 0.1)
-    frames = forward_kinematics(moved, posture[:12])
-    u, v, half_width, half_height, hips, top = ArmView.of(BODY, CAMERA, np.ones(2), False).zones(
-        posture
-    )
+    frames = pose(moved.rigid, posture[:12])
+    u, v, half_width, half_height, hips, top = ArmView.of(BODY, CAMERA, np.ones(2)).zones(posture)
 
     def pixel(point_m: Any) -> Any:
         return CAMERA.project(CAMERA.reference_to_optical(np.asarray(point_m)))
@@ -320,9 +301,9 @@ def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None
     high[4:8] = np.radians((-10, 30, -110, 40))
     way = [(FRONT, low, share) for share in np.linspace(0.0, 1.0, 15)]
     way += [(low, high, share) for share in np.linspace(0.0, 1.0, 15)] + [(low, high, 1.0)] * 5
-    truth = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(body, high)))
+    truth = CAMERA.project(CAMERA.reference_to_optical(pose(body.rigid, high).keypoints_m))
     away_px = {}
-    for with_image in (True, False):
+    for with_image in True:
         tracker = Tracker(body, CAMERA, preset, np.random.default_rng(0))
         for begin, end, share in way:
             image, silhouette = drawn((1 - share) * begin + share * end)
