@@ -13,11 +13,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import load_body_model, save_body_model
-    from cardbox_tracker.body.posture import JOINT_NAMES
     from cardbox_tracker.body.proportions import body_from_proportions
+    from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
     from cardbox_tracker.errors import (
         BackgroundFileError,
         BagError,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES, KeypointState
 from cardbox_tracker.estimation.estimate import Estimate
 
 CHANCE_KEY = "chance of an error beyond 0.3 m"

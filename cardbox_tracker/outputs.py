@@ -2,8 +2,7 @@
 
 :mod:`.ros.messages.results` encodes them as messages of the nodes, :mod:`.recordings.result_bag`
 as messages of a bag, and :mod:`.recordings.result_table` as rows of a table. Add a joint to
-``JOINT_STATE_NAMES`` and the two functions after it, a topic to ``outputs``, and a number to
-``METRICS``.
+:mod:`.body.skeleton` and ``joint_values``, a topic to ``outputs``, and a number to ``METRICS``.
 """
 
 from __future__ import annotations
@@ -14,9 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import (
+    CLAVICLE_NAMES,
+    JOINT_NAMES,
+    JOINT_STATE_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+)
 from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
@@ -106,14 +110,6 @@ class Metric:
 # The mean velocity over a longer gap is not that of the moment.
 _LONGEST_NS = 1_000_000_000
 
-JOINT_STATE_NAMES: tuple[str, ...] = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
-"""Joints of ``joint_states``: those of the posture, the person's place, then the neck."""
-
-
-def unit_of(joint: str) -> str:
-    """Return the unit of a joint, ``m`` or ``rad``."""
-    return "m" if joint in (JOINT_NAMES[TORSO_Y], *PLACE_NAMES) else "rad"
-
 
 def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
     """Return the joints of an estimate; None without a posture.
@@ -122,7 +118,8 @@ def joint_values(estimate: Estimate, torso_place: bool = True) -> JointValues | 
     """
     if estimate.posture is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture)
-    return _joints(JOINT_STATE_NAMES, estimate.posture, place_of(estimate), neck_of(estimate))
+    others = place_of(estimate), neck_of(estimate), clavicles_of(estimate)
+    return _joints(JOINT_STATE_NAMES, estimate.posture, *others)
 
 
 def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValues | None:
@@ -132,10 +129,11 @@ def joint_deviations(estimate: Estimate, torso_place: bool = True) -> JointValue
     """
     if estimate.posture_stddev is None or not torso_place:
         return _joints(JOINT_NAMES, estimate.posture_stddev)
-    known = estimate.posture_stddev, _or_zeros(estimate.offset_stddev_m)
-    if estimate.neck_stddev is None:
-        return _joints((*JOINT_NAMES, *PLACE_NAMES), *known)
-    return _joints(JOINT_STATE_NAMES, *known, estimate.neck_stddev)
+    names, known = [*JOINT_NAMES, *PLACE_NAMES], [_or_zeros(estimate.offset_stddev_m)]
+    if estimate.neck_stddev is not None:
+        names, known = [*names, *NECK_NAMES], [*known, estimate.neck_stddev]
+    known.append(_or_zeros(estimate.clavicles_stddev_m))
+    return _joints((*names, *CLAVICLE_NAMES), estimate.posture_stddev, *known)
 
 
 def place_of(estimate: Estimate) -> FloatArray:
@@ -146,6 +144,11 @@ def place_of(estimate: Estimate) -> FloatArray:
 def neck_of(estimate: Estimate) -> FloatArray:
     """Return ``neck_yaw`` and ``neck_pitch`` (2,), rad; 0 if the face was not seen."""
     return _or_zeros(estimate.neck)
+
+
+def clavicles_of(estimate: Estimate) -> FloatArray:
+    """Return the rise of both shoulders, (2,), metres; 0 if it is not known."""
+    return _or_zeros(estimate.clavicles_m)
 
 
 def _or_zeros(pair: FloatArray | None) -> FloatArray:
@@ -200,8 +203,7 @@ def _markers(estimate: Estimate, tracker: Tracker) -> Markers | None:
     if estimate.posture is None:
         return None
     body = estimate.placed(tracker.body)
-    seen = body, tracker.camera, estimate.posture, estimate.keypoints_m, estimate.neck
-    return Markers(marker_shapes(*seen))
+    return Markers(marker_shapes(body, tracker.camera, estimate.posture, estimate.neck))
 
 
 def outputs(torso_place: bool = True) -> tuple[Output, ...]:
@@ -299,5 +301,5 @@ class _Motion:
         found: FloatArray = (joints.values - before[1]) / (step_ns / 1e9)
         if not (has_neck and before[2]):
             # A face that appears does not turn.
-            found[-len(NECK_NAMES) :] = 0.0
+            found[[JOINT_STATE_NAMES.index(name) for name in NECK_NAMES]] = 0.0
         return found

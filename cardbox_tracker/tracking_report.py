@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import PLACE_NAMES
+from cardbox_tracker.body.skeleton import PLACE_NAMES
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
 from cardbox_tracker.outputs import METRICS, place_of
 

@@ -10,8 +10,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.estimation.config import paper_preset
 from cardbox_tracker.files import atomic_path
 from experiments.results import Curves, motions_in

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.files import atomic_path
 from experiments.results import motions_in, recorded_results
 from experiments.tracking import AXES

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS, TURNS
+from cardbox_tracker.body.posture import N_JOINTS, TURNS
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.evaluation.metrics import align, angle_errors_deg, distances_m

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import Part, body_parts
 from cardbox_tracker.body.sizes import FloatArray
@@ -44,7 +44,7 @@ def volumetric_faces(body: BodyModel, postures: FloatArray) -> FloatArray:
         Shape (..., 42, 4, 3), metres in the reference frame, six faces a part, the parts ordered as
         ``PART_NAMES``.
     """
-    frames = forward_kinematics(body, postures)
+    frames = pose(body.rigid, postures)
     parts = body_parts(body.sizes)
     placed = [
         (_box(part), frames.torso_rotation, frames.hip)

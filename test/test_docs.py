@@ -242,13 +242,8 @@ def test_each_common_complaint_has_an_entry_with_cause_and_remedy(complaint: str
 def test_joint_limits_of_the_conventions_are_those_of_the_code() -> None:
     import numpy as np
 
-    from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES
-    from cardbox_tracker.body.posture import (
-        JOINT_NAMES,
-        PLACE_NAMES,
-        TURNING_LIMITS,
-        place_limits,
-    )
+    from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
+    from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_LIMITS, NECK_NAMES, PLACE_NAMES
 
     rows = re.findall(
         r"(?m)^\| `(\w+)`.*\| (-?[\d.]+) to ([\d.]+) \|$", text_of(Path("docs/conventions.md"))

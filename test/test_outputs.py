@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import (
     LOST,
     NO_PERSON,
@@ -43,7 +44,7 @@ STAMP_NS = 5_000_000_000
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TRACKER = cast(Tracker, SimpleNamespace(body=BodyModel(), camera=CAMERA))
 POSTURE = reference_posture("arms")
-POINTS_M = CAMERA.reference_to_optical(keypoints_m(BodyModel(), POSTURE))
+POINTS_M = CAMERA.reference_to_optical(pose(BodyModel().rigid, POSTURE).keypoints_m)
 STATES = tuple(KeypointState(one) for one in ("tracked", "uncertain", "lost") * 2)
 CHANCES = np.array([0.01, 0.3, 0.8] * 2)
 FOUND = Estimate(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.simulation.motions import wave
@@ -98,7 +98,7 @@ class Person:
         """Return the mean distance of shoulders, elbows and hands from the truth, metres."""
         if found.posture is None:
             return float("inf")
-        truth = keypoints_m(self.body, self.posture(at_s))
+        truth = pose(self.body.rigid, self.posture(at_s)).keypoints_m
         return float(np.linalg.norm(self._keypoints(found) - truth, axis=1).mean())
 
     def iou(self, found: Found, at_s: float) -> float:
@@ -110,7 +110,8 @@ class Person:
         return float(np.count_nonzero(model & truth) / np.count_nonzero(model | truth))
 
     def _keypoints(self, found: Found) -> NDArray[np.float64]:
-        return keypoints_m(self._placed(found), found.posture)  # type: ignore[arg-type]
+        assert found.posture is not None
+        return pose(self._placed(found).rigid, found.posture).keypoints_m
 
     def _placed(self, found: Found) -> BodyModel:
         if found.place_m is None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
+from cardbox_tracker.body.kinematics import PosedBodies, pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import Part, parts_of_bodies
 from cardbox_tracker.body.sizes import FloatArray
@@ -80,7 +80,7 @@ def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
 
 
 def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float = 0.0) -> FloatArray:
-    """Return the corners of the 15 patches in each posture.
+    """Return the corners of the 15 patches in each posture, with rigid shoulders as in the paper.
 
     Args:
         body: the measured person.
@@ -92,11 +92,11 @@ def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float =
         around it, the patches ordered as ``PATCH_NAMES``. With a neck its patch follows as the
         16th, ``NECK_PATCHES``.
     """
-    return patches_at(body, forward_kinematics(body, postures), neck_to_head)
+    return patches_at(body, pose(body.rigid, postures), neck_to_head)
 
 
-def patches_at(body: BodyModel, frames: BodyFrames, neck_to_head: float = 0.0) -> FloatArray:
-    """Return the corners of the patches, given the frames of the parts of ``body``.
+def patches_at(body: BodyModel, frames: PosedBodies, neck_to_head: float = 0.0) -> FloatArray:
+    """Return the corners of the patches of a posed body, in its frame.
 
     See :func:`cardbox_patches`, which takes postures.
     """

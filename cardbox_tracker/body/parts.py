@@ -18,6 +18,10 @@ import numpy as np
 
 from cardbox_tracker.body.sizes import SIZE_INDEX, FloatArray
 
+# Rows of the lengths of :func:`shape_of`, ordered as ``BodyParts``, and columns, as ``Part``.
+TORSO, WAIST, NECK, HEAD, UPPER_ARM, FOREARM = 0, 1, 2, 3, 4, 5
+BOTTOM, HEIGHT, BOTTOM_WIDTH, TOP_WIDTH, DEPTH, FORWARD = 0, 1, 2, 3, 4, 5
+
 Length = TypeVar("Length", float, FloatArray)
 """Metres: a number for one body, an array (...) for many."""
 
@@ -85,6 +89,25 @@ def body_parts(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts[floa
 def parts_of_bodies(sizes_m: FloatArray, neck_to_head: float = 0.0) -> BodyParts[FloatArray]:
     """Return the parts of many bodies (..., 18) at once, every length of shape (...)."""
     return _parts(list(np.moveaxis(np.asarray(sizes_m), -1, 0)), neck_to_head)
+
+
+def shape_of(sizes_m: FloatArray, neck_to_head: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return parts and shoulders of one or many bodies, metres.
+
+    Args:
+        sizes_m: shape (..., 18).
+        neck_to_head: width of the neck as a fraction of the head's; 0, as in the paper, draws none.
+
+    Returns:
+        The six lengths of each :class:`Part`, (..., 6, 6), the parts
+        ordered as in :class:`BodyParts`; and the lateral and vertical
+        coordinate of a shoulder joint in the torso's frame, (..., 2).
+    """
+    *parts, aside, height = parts_of_bodies(sizes_m, neck_to_head)
+    lengths = np.array([length for part in parts for length in part])
+    # Each body's lengths become contiguous.
+    bodies = np.ascontiguousarray(lengths.T).reshape(*np.shape(sizes_m)[:-1], len(parts), -1)
+    return bodies, np.ascontiguousarray(np.array([aside, height]).T)
 
 
 def _parts(sizes: Sequence[Length], neck_to_head: float) -> BodyParts[Length]:

@@ -1,26 +1,13 @@
-"""The 14 values of a state: names, order, limits, mirror image, and the reference postures.
+"""The 14 values of a state: their places, limits and mirror image, and the reference postures.
 
-A state (14,) is a posture d1..d12 followed by ``torso_x`` and ``torso_z``. All other modules take
-the places of these values from here.
+A state (14,) is a posture d1..d12 followed by ``torso_x`` and ``torso_z``, the searched joints of
+the skeleton (:mod:`.skeleton`). All other modules take the places of these values from here.
 
-The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm. The
-rest posture (upright, arms hanging) is all zero. Angles are radians, ``torso_y`` is metres in the
-reference frame, 0 on the optical axis.
+The order is fixed (paper, equation (3)): 4 of the torso, 4 of the left arm, 4 of the right arm.
+Angles are radians, ``torso_y`` is metres in the reference frame, 0 on the optical axis.
 
 In the paper the person's distance and height stay as measured. If they are estimated, they are
 called ``torso_x`` and ``torso_z``; they are not part of the posture (12,).
-
-The anatomical ranges are from the American Academy of Orthopaedic Surgeons, "Joint Motion: Method
-of Measuring and Recording", 1965 (reprinted in Norkin & White, "Measurement of Joint Motion"), in
-degrees: thoraco-lumbar lateral flexion 35, flexion 80, extension 25, rotation 45; hip flexion 120,
-abduction 45, rotation 45; shoulder abduction 180, flexion 180, extension 60, horizontal adduction
-45; elbow flexion 150, none backwards (10 are allowed for a straight arm).
-
-The torso reaches from the hips to the neck, so the ranges of hips and spine add up, rounded down to
-the range of a standing person. The two angles of a limb reach every direction twice: flexion beyond
-90 degrees equals less flexion with the abduction turned by half a circle. Flexion therefore ends at
-about 90 degrees, and abduction covers the rest. A forearm can point to either side, since the upper
-arm of this model does not turn about its axis.
 """
 
 from __future__ import annotations
@@ -28,27 +15,16 @@ from __future__ import annotations
 import numpy as np
 
 from cardbox_tracker.body.sizes import FloatArray
-
-JOINT_NAMES: tuple[str, ...] = (
-    "torso_y",
-    "torso_roll",
-    "torso_pitch",
-    "torso_yaw",
-    "left_shoulder_abduction",
-    "left_shoulder_flexion",
-    "left_elbow_abduction",
-    "left_elbow_flexion",
-    "right_shoulder_abduction",
-    "right_shoulder_flexion",
-    "right_elbow_abduction",
-    "right_elbow_flexion",
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
+    PLACE_NAMES,
+    PRISMATIC,
+    Group,
+    Joint,
+    joints_of,
 )
-N_JOINTS = len(JOINT_NAMES)
 
-PLACE_NAMES: tuple[str, ...] = ("torso_x", "torso_z")
-"""How far the hips are nearer to the camera, and higher, than where they were measured, metres."""
-
-N_STATE = N_JOINTS + len(PLACE_NAMES)
+N_JOINTS, N_STATE = len(JOINT_NAMES), len(JOINT_NAMES) + len(PLACE_NAMES)
 SHOULDER_ABDUCTION, SHOULDER_FLEXION, ELBOW_ABDUCTION, ELBOW_FLEXION = range(4)
 ARM_ANGLES = 4
 """Values of an arm, in that order."""
@@ -63,32 +39,30 @@ TURNS = slice(ROLL, YAW + 1)
 LEFT_ARM, RIGHT_ARM = (slice(first, first + ARM_ANGLES) for first in FIRST_ANGLES)
 POSTURE, PLACE = slice(0, N_JOINTS), slice(N_JOINTS, N_STATE)
 
-_TORSO_LIMITS_DEG = ((-45, 45), (-25, 90), (-60, 60))
-_ARM_LIMITS_DEG = ((-45, 180), (-60, 90), (-150, 150), (-10, 95))
-TORSO_Y_LIMIT_M = 3.0
-"""Largest sideways distance at which a fixed camera sees a person, metres."""
 
-JOINT_LIMITS: FloatArray = np.vstack(
-    [
-        [[-TORSO_Y_LIMIT_M, TORSO_Y_LIMIT_M]],
-        np.radians(_TORSO_LIMITS_DEG),
-        np.radians(_ARM_LIMITS_DEG),
-        np.radians(_ARM_LIMITS_DEG),
-    ]
-)
-"""Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``)."""
-JOINT_LIMITS.setflags(write=False)
+def _mirror_sign(joint: Joint) -> float:
+    """Return -1 for a joint in the middle of the body that moves or turns to a side."""
+    is_aside = abs(joint.axis[1]) == 1.0
+    turns_over = is_aside if joint.kind == PRISMATIC else not is_aside
+    return -1.0 if turns_over and joint.name.startswith("torso") else 1.0
 
-_TURN_DEG = 100.0
-TURNING_LIMITS: FloatArray = JOINT_LIMITS.copy()
-"""Shape (12, 2): limits of a person who also turns with the feet, to walk or to look aside."""
-TURNING_LIMITS[YAW] = np.radians([-_TURN_DEG, _TURN_DEG])
+
+MIRRORED = np.array([*range(4), *range(8, 12), *range(4, 8), TORSO_X, TORSO_Z])
+"""Index (14,) of each value in the state of the mirror image, where the arms change places."""
+MIRROR_SIGNS = np.array([_mirror_sign(joint) for joint in joints_of(Group.POSTURE, Group.PLACE)])
+"""Factor (14,) of each value in the mirror image: aside, roll and yaw turn over."""
+
+TURNING_LIMITS: FloatArray = np.array([joint.limits for joint in joints_of(Group.POSTURE)])
+"""Shape (12, 2): lowest and highest value of each joint, rad (metres for ``torso_y``), of a person
+who also turns with the feet, to walk or to look aside."""
+JOINT_LIMITS: FloatArray = TURNING_LIMITS.copy()
+"""Shape (12, 2): the same of a person who stands."""
+JOINT_LIMITS[YAW] = np.radians([-60.0, 60.0])
 TURNING_LIMITS.setflags(write=False)
+JOINT_LIMITS.setflags(write=False)
 
 NEAREST_M, FARTHEST_M = 0.5, 10.0
 """Distances of the hips from the camera between which a person is searched, metres."""
-TORSO_Z_LIMITS_M = (-0.6, 0.3)
-"""Range of ``torso_z`` between sitting on a low stool and standing on tiptoe, metres."""
 _FARTHER_M = 1.0
 
 
@@ -103,7 +77,8 @@ def place_limits(distance_m: float) -> FloatArray:
     """
     farthest_m = max(FARTHEST_M, distance_m + _FARTHER_M)
     nearest_m = min(NEAREST_M, distance_m)
-    return np.array([[distance_m - farthest_m, distance_m - nearest_m], TORSO_Z_LIMITS_M])
+    _, torso_z = joints_of(Group.PLACE)
+    return np.array([[distance_m - farthest_m, distance_m - nearest_m], torso_z.limits])
 
 
 def state_limits(distance_m: float) -> FloatArray:

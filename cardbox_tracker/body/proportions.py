@@ -13,8 +13,7 @@ body is less exact than a measured one.
 
 from __future__ import annotations
 
-from cardbox_tracker.body.model import PROPORTIONS, BodyModel
-from cardbox_tracker.body.ranges import check_range
+from cardbox_tracker.body.model import PROPORTIONS, BodyModel, check_range
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZES, FloatArray
 
 STATURE_M = 1.72

@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 
 from cardbox_tracker.body.model_file import save_body_model
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file

@@ -29,9 +29,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
 
 _TORSO_JOINTS = ("body", "r_waist", "waist", "y_waist")
 _ARM_JOINTS = ("y_shoulder", "p_shoulder", "r_shoulder", "elbow")

@@ -19,10 +19,10 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_LIMITS, head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.body.parts import BodyParts, body_parts
 from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import NECK_LIMITS, head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.description.rep155 import LOWEST_BEND_RAD, LOWEST_RAISE_RAD
 from cardbox_tracker.description.urdf_elements import (
     AT_PARENT,

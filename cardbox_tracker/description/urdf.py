@@ -21,14 +21,16 @@ import math
 from xml.etree import ElementTree as Xml
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import (
+from cardbox_tracker.body.parts import BodyParts, body_parts
+from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
     NECK_LIMITS,
     NECK_NAMES,
+    PLACE_NAMES,
     head_from_pivot_m,
     neck_pivot_m,
 )
-from cardbox_tracker.body.parts import BodyParts, body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TURNING_LIMITS, place_limits
 from cardbox_tracker.description.urdf_elements import (
     AT_PARENT,
     PATCH_THICKNESS_M,

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import FloatArray
@@ -95,7 +95,7 @@ def _draw_asked(canvas: ImageArray, asked: Asked) -> None:
     # A dark rim keeps the line visible on a white silhouette.
     draw_outline(canvas, view, patches, (0, 0, 0), width + 4)
     draw_outline(canvas, view, patches, colour, width)
-    frames = forward_kinematics(asked.body, asked.posture)
+    frames = pose(asked.body, asked.posture)
     forward = frames.torso_rotation[:, 0]
     if abs(float(forward[1])) > _SIDEWAYS:
         depth_m = body_parts(asked.body.sizes).head.depth_m

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
+from cardbox_tracker.body.kinematics import gaze_m, pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import gaze_m
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.model_frames import model_frames
 from cardbox_tracker.vision.camera import Camera
 
 Rgba = tuple[float, float, float, float]
@@ -51,15 +50,13 @@ def marker_shapes(
     body: BodyModel,
     camera: Camera,
     posture: FloatArray,
-    keypoints_m: FloatArray | None = None,
     neck: FloatArray | None = None,
 ) -> tuple[MarkerShape, MarkerShape]:
     """Return the patches and the skeleton of ``body`` in a posture (12,) before ``camera``.
 
-    If ``keypoints_m`` (6, 3), metres in the optical frame, are given, they place the shoulders. If
-    ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
+    If ``neck`` (2,), rad, is given, the skeleton has a line in the direction of the face.
     """
-    frames = model_frames(body, camera, posture, keypoints_m)
+    frames = pose(body, posture)
     corners = camera.reference_to_optical(patches_at(body, frames))
     colors = [
         color

@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import PATCH_NAMES, patches_at
-from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.body.kinematics import BodyFrames, forward_kinematics
+from cardbox_tracker.body.kinematics import PosedBodies, gaze_m, pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import gaze_m
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PLACE, POSTURE
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.model_frames import model_frames
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -74,11 +72,10 @@ def draw_overlay(
         view = camera.scaled(*canvas.shape[1::-1])
         outline = UNCERTAIN_BGR if estimate.state == "uncertain" else OUTLINE_BGR
         there = estimate.placed(body)
-        seen = estimate.keypoints_m, estimate.keypoint_states
-        draw_model(canvas, there, view, estimate.posture, outline, *seen)
+        draw_model(canvas, there, view, estimate.posture, outline, estimate.keypoint_states)
         if estimate.neck is not None:
-            frames = forward_kinematics(there, estimate.posture)
-            _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), frames, estimate.neck))
+            posed = pose(there, estimate.posture)
+            _draw_gaze(canvas, view, gaze_m(body_parts(there.sizes), posed, estimate.neck))
         text += f"  IoU {estimate.iou:.2f}  {estimate.cost_px} px"
     draw_text(canvas, text, colour=_STATE_BGR.get(estimate.state, TEXT_BGR))
     return canvas
@@ -101,16 +98,10 @@ def draw_camera_overlay(
     if number == 0:
         return draw_overlay(picture, tracker.body, tracker.camera, estimate, scale)
     view = tracker.views[number - 1]
-    if estimate.posture is not None and estimate.keypoints_m is not None:
+    if estimate.posture is not None:
         place_m = np.zeros(2) if estimate.offset_m is None else estimate.offset_m
         state = view.states(np.concatenate([estimate.posture, place_m]))
-        points_m = view.points(tracker.camera.optical_to_reference(estimate.keypoints_m))
-        estimate = replace(
-            estimate,
-            posture=state[POSTURE],
-            offset_m=state[PLACE],
-            keypoints_m=view.camera.reference_to_optical(points_m),
-        )
+        estimate = replace(estimate, posture=state[POSTURE], offset_m=state[PLACE])
     return draw_overlay(view.upright(picture), view.body, view.camera, estimate, scale)
 
 
@@ -127,17 +118,15 @@ def draw_model(
     camera: Camera,
     posture: FloatArray,
     outline_bgr: tuple[int, int, int] = OUTLINE_BGR,
-    keypoints_m: FloatArray | None = None,
     states: Sequence[KeypointState] | None = None,
 ) -> None:
     """Draw the parts of ``posture`` (12,) into ``canvas`` (H, W, 3), in place.
 
-    Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. The skeleton
-    has the shoulders of ``keypoints_m`` (6, 3), metres in the optical frame, if given. With
+    Patches are tinted by side, and their common outline is drawn in ``outline_bgr``. With
     ``states`` of the keypoints, bones to uncertain ones are yellow, to lost ones red, and to hidden
     ones dashed.
     """
-    frames = model_frames(body, camera, posture, keypoints_m)
+    frames = pose(body, posture)
     patches = patches_at(body, frames)
     tint = canvas.copy()
     # The torso is drawn first, so that an arm in front of it stays visible.
@@ -169,7 +158,7 @@ def draw_outline(
 
 def _draw_skeleton(
     canvas: ImageArray,
-    frames: BodyFrames,
+    frames: PosedBodies,
     camera: Camera,
     thickness: int,
     states: Sequence[KeypointState] | None,

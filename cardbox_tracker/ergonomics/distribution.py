@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_LIMITS
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import NECK_LIMITS
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.parts import PARTS
 from cardbox_tracker.ergonomics.rula import rula_scores

@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import arm_directions
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.tables import TABLE_A, TABLE_B, TABLE_C, ScoreArray
 

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import (
@@ -139,7 +139,7 @@ def _guesses(
     column = float(np.median(np.flatnonzero(front[top : top + 3].any(axis=0))))
     ray = np.array([(column - camera.cx) / camera.fx, (top - camera.cy) / camera.fy, 1.0])
     ray /= np.linalg.norm(ray)
-    frames = forward_kinematics(body, reference_posture("front"))
+    frames = pose(body, reference_posture("front"))
     crown = frames.head + np.array([0.0, 0.0, body_parts(body.sizes).head.height_m / 2])
     crown[1] += body.placement.lateral_m
     crown = first.reference_to_optical(crown)

@@ -7,13 +7,10 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost.depth import Depth
-from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
 from cardbox_tracker.estimation.cost.joint_points import JointPoints
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
 from cardbox_tracker.estimation.cost.terms import TermSettings
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.estimation.filtering.whole_body_config import WholeBodyConfig
@@ -25,7 +22,6 @@ from cardbox_tracker.settings import (
     setting,
     suggestion,
 )
-from cardbox_tracker.vision.camera import Camera
 
 FILTERS = ("hierarchical", "whole_body")
 """Allowed values of ``filter``."""
@@ -150,16 +146,6 @@ class TrackerConfig(Settings):
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")
-
-    def posable(self, body: BodyModel, camera: Camera) -> BodyTuple:
-        """Return the body before a camera as the filter poses it, for the kernels.
-
-        The filter ``hierarchical`` has the paper's shoulders, which the arms do not raise.
-        """
-        cost = self.whole_body.cost
-        return body_tuple(
-            body, camera, cost if self.has_several_views else replace(cost, lift_gain=0.0)
-        )
 
     def with_depth(self) -> TrackerConfig:
         """Return these settings with the term for depth images."""

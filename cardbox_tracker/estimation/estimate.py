@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KeypointState
 
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 
@@ -41,9 +41,12 @@ class Estimate:
         offset_m: ``torso_x`` and ``torso_z``, (2,), metres: displacement of the hips from the body
             model's placement, towards the camera and up; None if the filter keeps it constant.
         offset_stddev_m: standard deviations of ``offset_m``, (2,), metres.
-        neck: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso (``body/neck.py``);
-            None without points of the face.
+        neck: ``neck_yaw`` and ``neck_pitch``, (2,), rad, relative to the torso; None without points
+            of the face.
         neck_stddev: standard deviations of ``neck``, (2,), rad, those of the torso included.
+        clavicles_m: rise of the left and right shoulder with the arms, (2,), metres; None without a
+            posture.
+        clavicles_stddev_m: standard deviations of ``clavicles_m``, (2,), metres.
     """
 
     state: str
@@ -59,6 +62,8 @@ class Estimate:
     keypoint_states: tuple[KeypointState, ...] | None = None
     keypoint_chances: FloatArray | None = None
     evidence: Mapping[str, FloatArray] | None = None
+    clavicles_m: FloatArray | None = None
+    clavicles_stddev_m: FloatArray | None = None
 
     def placed(self, body: BodyModel) -> BodyModel:
         """Return ``body`` at the place of this estimate."""

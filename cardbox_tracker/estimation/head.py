@@ -21,12 +21,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_LIMITS
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import PITCH, YAW
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import NECK_LIMITS
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.detection.image_points import POINT_INDEX, ImagePoints
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
@@ -111,7 +111,7 @@ def fit_neck(
     known = points.scores[chosen] >= LEAST_SCORE
     if np.count_nonzero(known) < LEAST_POINTS:
         return None
-    frames = forward_kinematics(body, posture)
+    frames = pose(body, posture)
     depth_m = float(camera.reference_to_optical(frames.head)[2])
     if depth_m <= _FARTHEST_M:
         return None

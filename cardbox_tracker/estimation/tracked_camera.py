@@ -10,6 +10,7 @@ import numpy as np
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.silhouette import rows_above_hips
 from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Posed, Term
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
@@ -64,7 +65,7 @@ class TrackedCamera:
         """Build the terms from other settings."""
         built = (settings.build(self._body, self._camera) for settings in config.terms)
         self.terms: list[Term] = [term for term in built if term is not None]
-        self._posable = config.posable(self._body, self._camera)
+        self._posable = body_tuple(self._body, self._camera)
 
     def reset(self, config: TrackerConfig) -> None:
         """Forget the region of the person in the images."""

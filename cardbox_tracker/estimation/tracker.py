@@ -10,12 +10,14 @@ from types import MappingProxyType
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import clavicles
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.camera_agreement import CameraAgreement
 from cardbox_tracker.estimation.config import TrackerConfig
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
@@ -105,9 +107,11 @@ class Tracker:
 
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next frame on."""
-        self.body, self._silhouette = body, silhouette
+        self.body = body if self.config.filter == "whole_body" else body.rigid
+        self._silhouette = silhouette
         self._cameras = [
-            TrackedCamera(body, self.camera, self.config, other) for other in (None, *self._others)
+            TrackedCamera(self.body, self.camera, self.config, other)
+            for other in (None, *self._others)
         ]
         views = self.views
         earlier = self.agreement
@@ -296,6 +300,7 @@ class Tracker:
         if is_doubtful and states is not None:
             states = doubted(states)
         is_uncertain = is_doubtful or (judged is not None and judged.is_uncertain)
+        clavicles_m, clavicles_stddev_m = clavicles(self.body, fit.posture, fit.posture_stddev)
         return Estimate(
             UNCERTAIN if is_uncertain else TRACKING,
             fit.posture,
@@ -308,12 +313,14 @@ class Tracker:
             keypoint_states=states,
             keypoint_chances=None if judged is None else judged.chances,
             evidence=None if judged is None else judged.evidence,
+            clavicles_m=clavicles_m,
+            clavicles_stddev_m=clavicles_stddev_m,
         )
 
     def _is_doubtful(self, frame: Frame) -> bool:
         """Return whether poses of cameras, or a person's back, make the whole result doubtful."""
         if self._facing is not None and self._before is not None:
-            posable = self.config.posable(self.body, self.camera)
+            posable = body_tuple(self.body, self.camera)
             self._facing.see(frame, Posed(posable, self._before[None]))
             return self._facing.shows_back
         return self.agreement is not None and self.agreement.is_contradicted

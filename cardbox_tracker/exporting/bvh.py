@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import (
     ELBOW_ABDUCTION,
@@ -27,13 +26,16 @@ from cardbox_tracker.body.posture import (
     YAW,
 )
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import head_from_pivot_m, neck_pivot_m
 from cardbox_tracker.errors import CardboxError
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.exporting.motion import Motion
 from cardbox_tracker.exporting.placed import frames_of
 from cardbox_tracker.files import atomic_path
 
 _FINGERS_TO_FOREARM = 0.25
+# Length of the clavicles in shoulder breadths: so a shoulder that turns about their inner ends is
+# within 3 mm of the line on which the model raises it.
+_CLAVICLE = 0.43
 _TURN_BOW_BEND = ("Yrotation", "Xrotation", "Zrotation")
 _SWING = ("Zrotation", "Xrotation", "Yrotation")
 _PLACE = ("Xposition", "Yposition", "Zposition")
@@ -82,7 +84,7 @@ def skeleton(body: BodyModel) -> Bone:
 
 
 def _clavicle_m(body: BodyModel) -> float:
-    return WholeBodyCostConfig().clavicle * body.size("shoulder_breadth")
+    return _CLAVICLE * body.size("shoulder_breadth")
 
 
 def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:

@@ -16,25 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import (
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.posture import LEFT_ARM, PITCH, RIGHT_ARM, ROLL, TORSO_Y, YAW
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
     arm_directions,
     rotation_x,
     rotation_y,
     rotation_z,
 )
-from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import (
-    JOINT_NAMES,
-    LEFT_ARM,
-    PITCH,
-    PLACE_NAMES,
-    RIGHT_ARM,
-    ROLL,
-    TORSO_Y,
-    YAW,
-)
-from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.exporting.markers import LABORATORY
 from cardbox_tracker.exporting.motion import Motion
 from cardbox_tracker.files import write_table

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 
 _MOST_FRAMES = 1_000_000

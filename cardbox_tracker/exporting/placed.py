@@ -6,25 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import (
-    KEYPOINT_NAMES,
-    BodyFrames,
-    forward_kinematics,
-    with_shoulders,
-)
+from cardbox_tracker.body.kinematics import PosedBodies, pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import POSTURE, TORSO_X, TORSO_Z
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES, Group, joints_of
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.exporting.motion import Motion
 from cardbox_tracker.vision.camera import Camera
 
 SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
-_ENDS = [i for i in range(len(KEYPOINT_NAMES)) if i not in SHOULDERS]
 
-# Rounding in tables is far below the first. A girdle lifts a shoulder by less than the second.
+# Rounding in tables is far below the first. A shoulder rises by less than the second.
 _MOST_APART_M = 0.005
-_MOST_LIFT_M = 0.15
+_MOST_RISE_M = 0.15
 
 
 def keypoints_in_reference(motion: Motion, body: BodyModel | None) -> FloatArray:
@@ -39,10 +33,14 @@ def keypoints_in_reference(motion: Motion, body: BodyModel | None) -> FloatArray
     return camera.optical_to_reference(motion.keypoints_m)
 
 
-def frames_of(motion: Motion, body: BodyModel) -> BodyFrames:
-    """Return the frames of the body's parts in each image, with the shoulders of the motion."""
-    frames = _modelled(motion, body)
-    return with_shoulders(frames, keypoints_in_reference(motion, body)[:, SHOULDERS])
+def frames_of(motion: Motion, body: BodyModel) -> PosedBodies:
+    """Return the body in each image, with the shoulders raised as in the motion."""
+    rigid = pose(body.rigid, motion.states)
+    shoulders_m = keypoints_in_reference(motion, body)[:, SHOULDERS]
+    moved_m = shoulders_m - rigid.keypoints_m[:, SHOULDERS]
+    axes = np.array([joint.axis for joint in joints_of(Group.CLAVICLES)])
+    rise_m = np.einsum("nkj,nji,ki->nk", moved_m, rigid.torso_rotation, axes)
+    return pose(body, motion.states, clavicles_m=rise_m)
 
 
 def images_of_body(motion: Motion, body: BodyModel) -> Motion:
@@ -54,35 +52,21 @@ def images_of_body(motion: Motion, body: BodyModel) -> Motion:
         CardboxError: most images were tracked with another body.
     """
     keypoints_m = keypoints_in_reference(motion, body)
-    modelled = _modelled(motion, body)
     frames = frames_of(motion, body)
-    ends_m = np.stack([*frames.left[1:3], *frames.right[1:3]], axis=1)
-    apart_m = _largest(ends_m - keypoints_m[:, _ENDS])
-    shoulders_m = np.stack([modelled.left.shoulder, modelled.right.shoulder], axis=1)
-    lift_m = _largest(shoulders_m - keypoints_m[:, SHOULDERS])
-    is_other = motion.is_seen & ((apart_m > _MOST_APART_M) | (lift_m > _MOST_LIFT_M))
+    apart_m = _largest(frames.keypoints_m - keypoints_m)
+    rise_m = np.nan_to_num(np.abs(frames.clavicles_m)).max(axis=1)
+    is_other = motion.is_seen & ((apart_m > _MOST_APART_M) | (rise_m > _MOST_RISE_M))
     if 2 * is_other.sum() > motion.is_seen.sum():
         raise CardboxError(
             f"the results are not those of the body: joints differ by {max(apart_m):.3f} m, "
-            f"shoulders by {max(lift_m):.3f} m; give the model with which they were tracked. With "
-            "--stature that is OUT.body.yaml, unless most images were tracked before the last fit "
-            "of the sizes, as with several people in turn: then track each person alone"
+            f"shoulders rise by {max(rise_m):.3f} m; give the model with which they were tracked. "
+            "With --stature that is OUT.body.yaml, unless most images were tracked before the last "
+            "fit of the sizes, as with several people in turn: then track each person alone"
         )
     return replace(
         motion,
         states=np.where(is_other[:, None], np.nan, motion.states),
         keypoints_m=np.where(is_other[:, None, None], np.nan, motion.keypoints_m),
-    )
-
-
-def _modelled(motion: Motion, body: BodyModel) -> BodyFrames:
-    """Return the frames of the body's parts with the shoulders of hanging arms."""
-    frames = forward_kinematics(body, motion.states[:, POSTURE])
-    moved = np.zeros((len(motion.states), 3))
-    moved[:, 0], moved[:, 2] = motion.states[:, TORSO_X], motion.states[:, TORSO_Z]
-    shoulders_m = np.stack([frames.left.shoulder, frames.right.shoulder], axis=1)
-    return with_shoulders(frames, shoulders_m + moved[:, None])._replace(
-        hip=frames.hip + moved, neck=frames.neck + moved, head=frames.head + moved
     )
 
 

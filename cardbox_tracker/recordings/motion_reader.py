@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, N_STATE, PLACE_NAMES
+from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, NECK_NAMES, PLACE_NAMES
 from cardbox_tracker.errors import BagError, CardboxError, quoted
 from cardbox_tracker.estimation.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN
 from cardbox_tracker.exporting.motion import Motion

@@ -12,14 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import (
+    CLAVICLE_NAMES,
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    NECK_NAMES,
+    PLACE_NAMES,
+    UNITS,
+)
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.files import atomic_path
 from cardbox_tracker.keypoint_status import keypoint_states
-from cardbox_tracker.outputs import METRICS, joint_deviations, joint_values, positions_of, unit_of
+from cardbox_tracker.outputs import METRICS, joint_deviations, joint_values, positions_of
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 Cell = int | float | str | Decimal | None
@@ -58,15 +63,17 @@ def units(has_points: bool = False) -> dict[str, str]:
         **_deviation_units(_BODY_NAMES),
         **{f"{name}_{what}": "" for what in ("state", "chance") for name in KEYPOINT_NAMES},
         **(_units(NECK_NAMES) | _deviation_units(NECK_NAMES) if has_points else {}),
+        **_units(CLAVICLE_NAMES),
+        **_deviation_units(CLAVICLE_NAMES),
     }
 
 
 def _units(joints: Iterable[str]) -> dict[str, str]:
-    return {name: unit_of(name) for name in joints}
+    return {name: UNITS[name] for name in joints}
 
 
 def _deviation_units(joints: Iterable[str]) -> dict[str, str]:
-    return {f"{name}_stddev_{unit_of(name)}": unit_of(name) for name in joints}
+    return {f"{name}_stddev_{UNITS[name]}": UNITS[name] for name in joints}
 
 
 def row_of(

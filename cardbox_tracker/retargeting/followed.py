@@ -11,16 +11,15 @@ import math
 
 import numpy as np
 
-from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import (
     ELBOW_ABDUCTION,
     ELBOW_FLEXION,
-    JOINT_NAMES,
     LEFT_ARM,
     N_JOINTS,
     RIGHT_ARM,
 )
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES
 
 WITH_NECK: tuple[str, ...] = (*JOINT_NAMES, *NECK_NAMES)
 """Order of a posture with the head, (14,)."""

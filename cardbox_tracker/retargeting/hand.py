@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.body.kinematics import arm_directions, rotation_x, rotation_y, rotation_z
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.robot import Robot

@@ -7,8 +7,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES, N_JOINTS
+from cardbox_tracker.body.posture import N_JOINTS
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.followed import with_neck

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import Arm, BodyFrames, forward_kinematics
+from cardbox_tracker.body.kinematics import PosedBodies, pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
+from cardbox_tracker.body.skeleton import POINT_NAMES
 
 FloatArray = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ keypoint of the hand is at 1, where the fingers begin."""
 # Shoulder rhythm: beyond the setting angle, the clavicle rises by a fraction of the arm's elevation
 # (Inman, Saunders & Abbott, "Observations on the Function of the Shoulder Joint", 1944, rounded).
 _CLAVICLE_OF_BREADTH, _CLAVICLE_RISE, _SETTING_RAD = 0.43, 0.18, np.radians(30.0)
+
+_LEFT, _RIGHT = POINT_NAMES.index("left_shoulder"), POINT_NAMES.index("right_shoulder")
 
 SKIN, SHIRT, TROUSERS = 125, 70, 45
 """Brightness of the parts, grey levels."""
@@ -72,7 +75,7 @@ def person_parts(body: BodyModel, posture: FloatArray) -> list[VolumePart]:
     return parts
 
 
-def person_frames(body: BodyModel, postures: FloatArray) -> BodyFrames:
+def person_frames(body: BodyModel, postures: FloatArray) -> PosedBodies:
     """Return the frames of a person whose shoulders rise with the arms.
 
     Args:
@@ -82,9 +85,15 @@ def person_frames(body: BodyModel, postures: FloatArray) -> BodyFrames:
     Returns:
         Frames in the reference frame, with the leading shape of ``postures``.
     """
-    frames = forward_kinematics(body, postures)
-    left, right = (_with_girdle(body, frames, arm) for arm in (frames.left, frames.right))
-    return frames._replace(left=left, right=right)
+    frames = pose(body.rigid, postures)
+    up = frames.torso_rotation[..., 2]
+    points_m = frames.points_m.copy()
+    for arm, first in ((frames.left, _LEFT), (frames.right, _RIGHT)):
+        along = np.sum(up * arm.upper_arm_rotation[..., 2], axis=-1)
+        elevation_rad = np.arccos(np.clip(along, -1.0, 1.0))
+        lift_m = girdle_lift_m(body.size("shoulder_breadth"), elevation_rad)[..., None] * up
+        points_m[..., first : first + 3, :] += lift_m[..., None, :]
+    return frames._replace(points_m=points_m)
 
 
 def person_keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
@@ -97,8 +106,7 @@ def person_keypoints_m(body: BodyModel, postures: FloatArray) -> FloatArray:
     Returns:
         Shape (..., 6, 3), metres in the reference frame, ordered as ``KEYPOINT_NAMES``.
     """
-    frames = person_frames(body, postures)
-    return np.stack([*frames.left[:3], *frames.right[:3]], axis=-2)
+    return person_frames(body, postures).keypoints_m
 
 
 def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
@@ -113,14 +121,6 @@ def girdle_lift_m(breadth_m: float, elevation_rad: FloatArray) -> FloatArray:
     return lift
 
 
-def _with_girdle(body: BodyModel, frames: BodyFrames, arm: Arm) -> Arm:
-    up = frames.torso_rotation[..., 2]
-    along = np.sum(up * arm.upper_arm_rotation[..., 2], axis=-1)
-    elevation_rad = np.arccos(np.clip(along, -1.0, 1.0))
-    lift = girdle_lift_m(body.size("shoulder_breadth"), elevation_rad)[..., None] * up
-    return arm._replace(shoulder=arm.shoulder + lift, elbow=arm.elbow + lift, hand=arm.hand + lift)
-
-
 def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
     """Return a person of random stature (1.55 to 1.9 m) and proportions."""
     stature = rng.uniform(0.9, 1.1)
@@ -132,7 +132,7 @@ def random_body(rng: np.random.Generator, distance_m: float = 2.0) -> BodyModel:
     )
 
 
-def _trunk(body: BodyModel, frames: BodyFrames) -> VolumePart:
+def _trunk(body: BodyModel, frames: PosedBodies) -> VolumePart:
     parts = body_parts(body.sizes)
     waist, torso = parts.waist, parts.torso
     height = torso.top_m - torso.bottom_m
@@ -150,7 +150,7 @@ def _trunk(body: BodyModel, frames: BodyFrames) -> VolumePart:
     return VolumePart(_rings(profile, frames.torso_rotation, frames.hip), SHIRT)
 
 
-def _neck(body: BodyModel, frames: BodyFrames) -> VolumePart:
+def _neck(body: BodyModel, frames: PosedBodies) -> VolumePart:
     parts = body_parts(body.sizes)
     radius = 0.34 * parts.head.top_width_m
     profile = [
@@ -161,7 +161,7 @@ def _neck(body: BodyModel, frames: BodyFrames) -> VolumePart:
     return VolumePart(_rings(profile, frames.torso_rotation, origin), SKIN)
 
 
-def _head(body: BodyModel, frames: BodyFrames) -> VolumePart:
+def _head(body: BodyModel, frames: PosedBodies) -> VolumePart:
     head = body_parts(body.sizes).head
     half = head.height_m / 2
     angles = np.radians([-80, -55, -25, 5, 35, 60, 80])
@@ -176,7 +176,7 @@ def _head(body: BodyModel, frames: BodyFrames) -> VolumePart:
     return VolumePart(_rings(profile, frames.torso_rotation, frames.head), SKIN)
 
 
-def _legs(body: BodyModel, frames: BodyFrames) -> list[VolumePart]:
+def _legs(body: BodyModel, frames: PosedBodies) -> list[VolumePart]:
     """Return two vertical legs below the hips; they follow only the yaw of the hips."""
     parts = body_parts(body.sizes)
     aside = parts.waist.bottom_width_m / 4

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES, TORSO_Y, TURNS
+from cardbox_tracker.body.posture import TORSO_Y, TURNS
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.errors import EncodingError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.simulation.cameras import (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES
 from cardbox_tracker.description.urdf import ROOT_LINK
 from cardbox_tracker.viewing.library import rerun
 

@@ -11,15 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body import model_file
-from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model import BodyModel, CameraPose, Person, Placement
 from cardbox_tracker.body.model_file import (
     dumps_body_model,
     load_body_model,
     loads_body_model,
     save_body_model,
 )
-from cardbox_tracker.body.person import Person
-from cardbox_tracker.body.placement import CameraPose, Placement
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
 from cardbox_tracker.errors import BodyModelError
 

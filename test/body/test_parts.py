@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import NECK_PATCHES, cardbox_patches, part_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts, parts_of_bodies
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_LIMITS
@@ -63,7 +63,7 @@ def test_cardbox_and_volumetric_model_span_the_same(seed: int) -> None:
 @given(SEEDS)
 def test_joints_are_where_the_parts_end(seed: int) -> None:
     body = BodyModel.of(random_sizes(seed), distance_m=3.0, hip_height_m=0.0)
-    parts, frames = body_parts(body.sizes), forward_kinematics(body, REST)
+    parts, frames = body_parts(body.sizes), pose(body.rigid, REST)
     assert frames.neck[2] == pytest.approx(parts.torso.top_m)
     assert frames.head[0] + 3.0 == pytest.approx(parts.head.forward_m)
     assert frames.head[2] == pytest.approx(parts.head.middle_m)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.estimation.estimate import Estimate
@@ -29,7 +29,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     body = BodyModel.of(hip_height_m=-0.51)
     tracker = Tracker(body, Camera(64, 48, 66.0, 66.0, 31.5, 23.5))
     grey, posture = np.zeros((48, 64), np.uint8), np.full(12, 0.2)
-    points = tracker.camera.reference_to_optical(keypoints_m(body, posture))
+    points = tracker.camera.reference_to_optical(pose(body.rigid, posture).keypoints_m)
     sure, unsure = (
         Estimate(state, posture, np.full(12, 0.1), points, 10, 0.9)
         for state in ("tracking", "uncertain")

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.evaluation.truth import load_ground_truth
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.description.link_transforms import LinkTransform, LinkTransforms
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body

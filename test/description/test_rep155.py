@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import gaze_m, pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import gaze_m, neck_rotation
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
@@ -21,6 +20,7 @@ from cardbox_tracker.body.posture import (
     place_limits,
     reference_posture,
 )
+from cardbox_tracker.body.skeleton import neck_rotation
 from cardbox_tracker.description.rep155 import (
     REP155_JOINTS,
     Rep155Joints,
@@ -60,9 +60,9 @@ def assert_agrees(
 ) -> None:
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pose.pitch_rad)
     body = Estimate(TRACKING, posture, offset_m=np.array(place)).placed(BODY)
-    frames = forward_kinematics(body, posture)
+    frames = pose(body.rigid, posture)
     found = places(ROBOT, np.array([*values, *place, 0.0, 0.0]))
-    expected = dict(zip(LINKS, keypoints_m(body, posture), strict=True))
+    expected = dict(zip(LINKS, pose(body.rigid, posture).keypoints_m, strict=True))
     for name, point in {**expected, "head": frames.head, "body": frames.hip}.items():
         optical = camera.reference_to_optical(point)
         # Where a limb's angle means nothing, it is left as it was.
@@ -101,7 +101,7 @@ def test_the_head_turns_as_the_neck_does(neck: tuple[float, float]) -> None:
     posture[1:4] = (0.1, 0.3, -0.4)
     values = [*Rep155Joints()(posture), 0.0, 0.0, *head_joints(np.array(neck))]
     ROBOT.update_cfg(dict(zip(joint_names("p1"), values, strict=True)))
-    frames = forward_kinematics(BODY, posture)
+    frames = pose(BODY.rigid, posture)
     turned = frames.torso_rotation @ neck_rotation(np.array(neck))
     head = ROBOT.get_transform("head_p1", "eye")
     expected = camera.reference_to_optical_rotation() @ turned

@@ -12,12 +12,18 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import gaze_m, pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import load_body_model
-from cardbox_tracker.body.neck import NECK_LIMITS, NECK_NAMES, gaze_m, neck_rotation
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TURNING_LIMITS, place_limits
+from cardbox_tracker.body.posture import TURNING_LIMITS, place_limits
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
+    NECK_LIMITS,
+    NECK_NAMES,
+    PLACE_NAMES,
+    neck_rotation,
+)
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.description.rep155_urdf import rep155_urdf
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
@@ -145,7 +151,7 @@ def test_the_head_turns_as_the_neck_does(posture: np.ndarray, neck: tuple[float,
     body = BodyModel.of(distance_m=2.3, hip_height_m=-0.4)
     values = [*posture, 0.0, 0.0, *neck]
     head = link_poses(urdf_from_body(body), dict(zip(ALL_NAMES, values, strict=True)))["head"]
-    frames = forward_kinematics(body, posture)
+    frames = pose(body.rigid, posture)
     turned = frames.torso_rotation @ neck_rotation(np.array(neck))
     np.testing.assert_allclose(head[:3, :3], TO_ROOT @ turned, atol=1e-9)
     middle, _ = gaze_m(body_parts(body.sizes), frames, np.array(neck))
@@ -155,8 +161,8 @@ def test_the_head_turns_as_the_neck_does(posture: np.ndarray, neck: tuple[float,
 def assert_agrees(xml: str, body: BodyModel, posture: np.ndarray, joints: dict[str, float]) -> None:
     """The links of the URDF are where our kinematics has them for ``body``."""
     poses = link_poses(xml, joints)
-    frames = forward_kinematics(body, posture)
-    for point, link in zip(keypoints_m(body, posture), KEYPOINT_LINKS, strict=True):
+    frames = pose(body.rigid, posture)
+    for point, link in zip(pose(body.rigid, posture).keypoints_m, KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(poses[link][:3, 3], TO_ROOT @ point, atol=1e-9)
     np.testing.assert_allclose(poses["head"][:3, 3], TO_ROOT @ frames.head, atol=1e-9)
     np.testing.assert_allclose(poses["torso"][:3, 3], TO_ROOT @ frames.hip, atol=1e-9)
@@ -205,7 +211,7 @@ def test_yourdfpy_loads_it_and_agrees() -> None:
     assert robot.validate()
     robot.update_cfg(dict(zip(ALL_NAMES, [*posture, *place, 0.4, -0.2], strict=True)))
     placed = Estimate(TRACKING, posture, offset_m=place).placed(body)
-    for point, link in zip(keypoints_m(placed, posture), KEYPOINT_LINKS, strict=True):
+    for point, link in zip(pose(placed.rigid, posture).keypoints_m, KEYPOINT_LINKS, strict=True):
         np.testing.assert_allclose(
             robot.get_transform(link, ROOT_LINK)[:3, 3], TO_ROOT @ point, atol=1e-6
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import REFERENCE_NAMES, reference_posture
 from cardbox_tracker.drawing.guidance import FIT_BGR, MOOD_BGR, Asked, draw_guidance
@@ -42,7 +42,7 @@ def test_outline_surrounds_the_wanted_posture(name: str, scale: int) -> None:
     rows, columns = np.nonzero(coloured(image[BAND * scale :], FIT_BGR["far"]))
     view = CAMERA.scaled(320 * scale, 240 * scale)
     posture = reference_posture(name)
-    pixels = view.project(view.reference_to_optical(keypoints_m(BODY, posture)))
+    pixels = view.project(view.reference_to_optical(pose(BODY.rigid, posture).keypoints_m))
     assert columns.min() < pixels[:, 0].min()
     assert columns.max() > pixels[:, 0].max()
     assert rows.min() < pixels[:, 1].min()

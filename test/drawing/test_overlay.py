@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.keypoint_state import KeypointState
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.drawing.markers import marker_shapes
 from cardbox_tracker.drawing.overlay import (
     GAZE_BGR,
@@ -23,8 +23,8 @@ from cardbox_tracker.drawing.overlay import (
     draw_model,
     draw_overlay,
 )
-from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
+from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -56,7 +56,7 @@ def test_an_overlay_is_a_colour_image_of_the_asked_size(shape: tuple[int, ...], 
 def test_the_skeleton_is_where_the_joints_are(scale: int) -> None:
     overlay = draw_overlay(GREY, BODY, CAMERA, FOUND, scale)
     view = CAMERA.scaled(320 * scale, 240 * scale)
-    pixels = view.project(view.reference_to_optical(keypoints_m(BODY, FRONT)))
+    pixels = view.project(view.reference_to_optical(pose(BODY.rigid, FRONT).keypoints_m))
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
 
@@ -66,27 +66,24 @@ def test_the_person_is_drawn_where_the_estimate_is() -> None:
     moved = replace(FOUND, offset_m=np.array([0.4, -0.1]))
     overlay = draw_overlay(GREY, BODY, CAMERA, moved)
     body = BODY.with_values(distance_m=1.6, hip_height_m=-0.6)
-    pixels = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(body, FRONT)))
+    pixels = CAMERA.project(CAMERA.reference_to_optical(pose(body.rigid, FRONT).keypoints_m))
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
     assert np.any(overlay != draw_overlay(GREY, BODY, CAMERA, FOUND))
 
 
-def test_raised_arms_are_drawn_where_the_filter_has_them() -> None:
-    """It lifts the shoulders of raised arms; the posture alone does not."""
-    config = default_preset().whole_body.cost
+@pytest.mark.parametrize("body", [BODY, BODY.rigid], ids=["default", "paper"])
+def test_raised_arms_are_drawn_where_the_filter_has_them(body: BodyModel) -> None:
     state = np.zeros(14)
     state[[4, 8]] = 2.0
-    lifted = WholeBodyCost(BODY, CAMERA, config).keypoints(state)
-    rigid = CAMERA.reference_to_optical(keypoints_m(BODY, state[:12]))
-    assert (rigid - lifted)[[0, 3], 1].min() > 0.03, "upwards, which is less of the optical y"
-    raised = replace(FOUND, posture=state[:12], keypoints_m=lifted)
-    overlay = draw_overlay(GREY, BODY, CAMERA, raised, 3)
+    points_m = WholeBodyCost(body, CAMERA, WholeBodyCostConfig()).keypoints(state)
+    raised = replace(FOUND, posture=state[:12], keypoints_m=points_m)
+    overlay = draw_overlay(GREY, body, CAMERA, raised, 3)
     view = CAMERA.scaled(960, 720)
-    for u, v in view.project(lifted).round().astype(int):
+    for u, v in view.project(points_m).round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
-    skeleton = marker_shapes(BODY, CAMERA, state[:12], lifted)[1].points_m
-    for point in lifted:
+    skeleton = marker_shapes(body, CAMERA, state[:12])[1].points_m
+    for point in points_m:
         assert np.linalg.norm(skeleton - point, axis=1).min() < 1e-9
 
 
@@ -98,7 +95,7 @@ def test_live_overlays_of_small_images_are_enlarged(width: int, expected: int) -
     overlay = draw_camera_overlay(grey, 0, FOUND, Tracker(BODY, camera))
     assert overlay.shape == (expected * 3 // 4, expected, 3)
     view = camera.scaled(expected, expected * 3 // 4)
-    pixels = view.project(view.reference_to_optical(keypoints_m(BODY, FRONT)))
+    pixels = view.project(view.reference_to_optical(pose(BODY.rigid, FRONT).keypoints_m))
     for u, v in pixels.round().astype(int):
         assert near(overlay, JOINT_BGR)[v, u]
     assert draw_message(grey, "waiting for a body model").shape == overlay.shape
@@ -159,7 +156,7 @@ def test_the_gaze_points_where_the_face_looks(yaw_rad: float, side: int) -> None
     """To the person's left is to the right of the image; without a neck there is no line."""
     seen = draw_overlay(GREY, BODY, CAMERA, replace(FOUND, neck=np.array([yaw_rad, 0.0])))
     columns = np.nonzero(near(seen, GAZE_BGR))[1]
-    u, _ = CAMERA.project(CAMERA.reference_to_optical(forward_kinematics(BODY, FRONT).head))
+    u, _ = CAMERA.project(CAMERA.reference_to_optical(pose(BODY.rigid, FRONT).head))
     far = columns[np.argmax(np.abs(columns - u))]
     assert side * (far - u) > 10
     assert not near(draw_overlay(GREY, BODY, CAMERA, FOUND), GAZE_BGR).any()
@@ -178,7 +175,9 @@ def test_the_skeletons_marker_has_the_gaze_last() -> None:
 def test_bones_to_uncertain_hands_are_yellow_lost_ones_red_and_hidden_ones_dashed() -> None:
     camera = CAMERA.scaled(960, 720)
     grey = np.full((720, 960), 90, np.uint8)
-    elbow, hand = camera.project(camera.reference_to_optical(keypoints_m(BODY, FRONT)))[[1, 2]]
+    elbow, hand = camera.project(camera.reference_to_optical(pose(BODY.rigid, FRONT).keypoints_m))[
+        [1, 2]
+    ]
     along = elbow + np.linspace(0.15, 0.85, 60)[:, None] * (hand - elbow)
     columns, rows = along.round().astype(int).T
     expected = {

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.body.posture import JOINT_NAMES, TURNING_LIMITS
+from cardbox_tracker.body.posture import TURNING_LIMITS
 from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.ergonomics.config import RulaConfig
 from cardbox_tracker.ergonomics.distribution import (
     SAMPLES,

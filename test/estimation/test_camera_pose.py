@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import PROPORTIONS, BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.errors import InitializationError
 from cardbox_tracker.estimation import camera_calibration, camera_guess
 from cardbox_tracker.estimation.camera_agreement import CameraAgreement

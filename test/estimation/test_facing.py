@@ -9,9 +9,9 @@ import pytest
 
 from cardbox_tracker.body.appearance import HAND, HEAD, TORSO, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import PITCH, YAW, reference_posture
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView
@@ -53,7 +53,7 @@ def seen(hair: float, light: float = 1.0, hair_colour: tuple[int, ...] = HAIR) -
     """The person, with hair in a share of the face's columns, the first of eight."""
     image = np.empty((240, 320, 3), np.uint8)
     image[:] = SHIRT
-    zones = ArmView.of(BODY, CAMERA, np.zeros(2), lifts_shoulders=True).zones(STATE)
+    zones = ArmView.of(BODY, CAMERA, np.zeros(2)).zones(STATE)
     u, v, half_width, half_height = zones[:4]
     top, bottom = int(v - half_height), int(v + half_height)
     image[top:bottom] = SKIN
@@ -143,7 +143,7 @@ def test_a_head_that_is_lower_than_the_models_is_no_back() -> None:
     asked = facing()
     see(asked, seen(0.0), 5.0)
     back = seen(1.0)
-    zones = ArmView.of(BODY, CAMERA, np.zeros(2), lifts_shoulders=True).zones(STATE)
+    zones = ArmView.of(BODY, CAMERA, np.zeros(2)).zones(STATE)
     low = back.silhouette.copy()
     low[: int(zones[1] - 0.5 * zones[3])] = 0
     assert not any(see(asked, replace(back, silhouette=low), 5.0))

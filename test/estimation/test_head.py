@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import NECK_LIMITS, neck_rotation
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import NECK_LIMITS, neck_rotation
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation.cost.terms import Frame
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
@@ -38,7 +38,7 @@ def face(
     yaw_deg: float, pitch_deg: float, posture: FloatArray = UPRIGHT, moved_m: float = 0.0
 ) -> ImagePoints:
     """What a detector without errors sees of a head, ``moved_m`` across from the model's."""
-    frames = forward_kinematics(BODY, posture)
+    frames = pose(BODY.rigid, posture)
     rotation = frames.torso_rotation @ neck_rotation(np.radians([yaw_deg, pitch_deg]))
     points = frames.head + (0.0, moved_m, 0.0) + HEAD_HEIGHT * FACE_M @ rotation.T
     return image_points(CAMERA.project(CAMERA.reference_to_optical(points)))

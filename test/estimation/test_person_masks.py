@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.estimation.person_masks import PersonDrawer, grown
@@ -27,13 +27,13 @@ def projected(points_m: np.ndarray) -> np.ndarray:
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=12, max_size=12), st.floats(-1.0, 1.0))
-def test_points_are_those_of_the_forward_kinematics(shares: list[float], x_m: float) -> None:
+def test_points_are_those_of_the_kinematics(shares: list[float], x_m: float) -> None:
     low, high = JOINT_LIMITS.T
     posture = low + np.array(shares) * (high - low)
     state = np.append(posture, [x_m, 0.1])
     place = BODY.placement
     moved = replace(place, distance_m=place.distance_m - x_m, hip_height_m=place.hip_height_m + 0.1)
-    frames = forward_kinematics(replace(BODY, placement=moved), posture)
+    frames = pose(replace(BODY, placement=moved), posture)
     expected = [frames.hip, frames.neck, frames.head]
     for arm in (frames.left, frames.right):
         expected += [arm.shoulder, arm.elbow, arm.hand + 0.15 * (arm.hand - arm.elbow)]

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.detection.image_points import ImagePoints
@@ -64,7 +64,7 @@ def body() -> BodyModel:
 
 def detected(posture: np.ndarray) -> ImagePoints:
     """The points of shoulders, elbows and knuckles."""
-    pixels = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(BODY, posture)))
+    pixels = CAMERA.project(CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m))
     names = [
         (f"{side}_{joint}",) if joint != "hand" else (f"{side}_index", f"{side}_little_finger")
         for side in ("left", "right")

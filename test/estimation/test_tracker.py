@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.neck import neck_rotation
 from cardbox_tracker.body.posture import JOINT_LIMITS, TORSO, reference_posture, state_limits
+from cardbox_tracker.body.skeleton import neck_rotation
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.config import (
     FilterConfig,
@@ -87,7 +87,7 @@ def test_an_estimate_says_where_it_is_and_how_well_it_fits() -> None:
         assert estimate.state == TRACKING
         posture = estimate.posture
         assert np.all((posture >= JOINT_LIMITS[:, 0]) & (posture <= JOINT_LIMITS[:, 1]))
-        expected = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
+        expected = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
         np.testing.assert_allclose(estimate.keypoints_m, expected, atol=1e-9)
         cost_px, iou = reference.look(silhouette).overlap(posture)
         assert estimate.cost_px == cost_px
@@ -498,7 +498,7 @@ def test_points_of_a_face_add_the_neck_and_change_nothing_else() -> None:
     """The points are projected from a head turned to the left on an upright torso."""
     body, posture, silhouette = BODY, front(), seen(front())
     rotation = neck_rotation(np.radians([30.0, 0.0]))
-    points_m = forward_kinematics(body, posture).head + FACE_M @ rotation.T
+    points_m = pose(body.rigid, posture).head + FACE_M @ rotation.T
     px = CAMERA.project(CAMERA.reference_to_optical(points_m))
     face = {name: (*xy, 1.0) for name, xy in zip(FACE_POINTS, px.tolist(), strict=True)}
     points = ImagePoints.of(face)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.evaluation.metrics import (
     align,
     angle_errors_deg,

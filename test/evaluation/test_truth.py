@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.evaluation.truth import load_ground_truth, tracking_error
 

@@ -12,9 +12,8 @@ from typing import Any
 import cv2
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES
 from cardbox_tracker.body.sizes import SIZE_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.estimation.filtering.resampling import STRATEGIES
 from cardbox_tracker.simulation.motions import MOTIONS

@@ -9,37 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import (
-    forward_kinematics,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-    with_shoulders,
-)
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.exporting.motion import Motion
 from cardbox_tracker.vision.camera import Camera
 
 STEP_NS = 100_000_000
-CLAVICLE = 0.43
 TURNS: dict[str, Callable[..., np.ndarray]] = {"X": rotation_x, "Y": rotation_y, "Z": rotation_z}
 
 
-def motion_of(states: np.ndarray, body: BodyModel, lifts_rad: tuple[float, float] = (0, 0)) -> Any:
+def motion_of(states: np.ndarray, body: BodyModel, rises_m: tuple[float, float] = (0, 0)) -> Any:
     """Return the motion of states (n, 14), 10 a second; rows of nan are gaps.
 
-    ``lifts_rad`` turn the left and right shoulder up about the inner end of their clavicles.
+    ``rises_m`` raise the left and right shoulder.
     """
     states = np.atleast_2d(np.asarray(states, float))
-    frames = forward_kinematics(body, states[:, :12])
-    clavicle_m = CLAVICLE * body.size("shoulder_breadth")
-    shoulders = []
-    for arm, side, lift in zip((frames.left, frames.right), (1, -1), lifts_rad, strict=True):
-        moved = np.array([0, side * (np.cos(lift) - 1), np.sin(lift)]) * clavicle_m
-        shoulders.append(arm.shoulder + frames.torso_rotation @ moved)
-    place = np.stack([states[:, 12], 0 * states[:, 12], states[:, 13]], axis=1)
-    placed = with_shoulders(frames, np.stack(shoulders, axis=1) + place[:, None])
-    points = np.stack([*placed.left[:3], *placed.right[:3]], axis=1)
+    points = pose(body, states, clavicles_m=np.tile(rises_m, (len(states), 1))).keypoints_m
     camera = Camera(1, 1, 1.0, 1.0, 0.0, 0.0, body.camera_pose.pitch_rad)
     stamps = np.arange(len(states)) * STEP_NS
     return Motion(

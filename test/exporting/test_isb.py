@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.exporting.isb import (
     ISB_NAMES,
     LEAST_BENT_RAD,

@@ -55,14 +55,17 @@ def test_without_a_body_the_camera_is_level(motion_of: Callable, body: BodyModel
 
 
 def test_another_body_is_refused(motion_of: Callable, body: BodyModel) -> None:
-    motion = motion_of(np.zeros((3, 14)), body, (0.3, 0.4))
+    motion = motion_of(np.zeros((3, 14)), body, (0.05, 0.07))
     same = images_of_body(motion, body)
     assert same.is_seen.all()
     longer = body.with_values(sizes=body.sizes * 1.02)
     with pytest.raises(CardboxError, match=r"joints differ by 0\.0.* give the model"):
         images_of_body(motion, longer)
-    with pytest.raises(CardboxError, match=r"shoulders by 0\.2"):
+    with pytest.raises(CardboxError, match=r"joints differ by 0\.2"):
         images_of_body(motion, body.with_values(distance_m=2.7))
+    raised = motion_of(np.zeros((3, 14)), body, (0.2, 0.0))
+    with pytest.raises(CardboxError, match=r"shoulders rise by 0\.2"):
+        images_of_body(raised, body)
 
 
 def test_images_of_an_earlier_fit_are_gaps(motion_of: Callable, body: BodyModel) -> None:
@@ -101,7 +104,7 @@ def test_ezc3d_reads_the_same_places(motion_of: Callable, body: BodyModel, tmp_p
     ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
     postures = np.random.default_rng(1).uniform(-0.3, 0.6, (5, 14))
     postures[2] = GAP
-    motion = motion_of(postures, body, (0.2, 0.1))
+    motion = motion_of(postures, body, (0.05, 0.02))
     write_c3d(tmp_path / "a.c3d", motion, body)
     read = ezc3d.c3d(str(tmp_path / "a.c3d"))
     about = read["parameters"]["POINT"]

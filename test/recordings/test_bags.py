@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.errors import BagError, CameraError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import STORAGES, BagWriter

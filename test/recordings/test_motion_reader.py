@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
@@ -31,7 +31,7 @@ GREY = np.zeros((48, 64), np.uint8)
 def estimates() -> list[Estimate]:
     """Results of five images, of which the second and fourth have no posture."""
     postures = np.random.default_rng(2).uniform(-0.2, 0.5, (2, 12))
-    points = CAMERA.reference_to_optical(keypoints_m(BODY, postures))
+    points = CAMERA.reference_to_optical(pose(BODY.rigid, postures).keypoints_m)
     seen = Estimate("tracking", postures[0], np.full(12, 0.1), points[0], 10, 0.9)
     moved = replace(
         seen,

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model_file import load_body_model
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.estimation.filtering.keypoint_states import UNCERTAIN_FROM
 from cardbox_tracker.estimation.initialization.config import InitializationResult

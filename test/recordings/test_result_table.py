@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.recordings.result_table import (

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PLACE_NAMES
 from cardbox_tracker.description.link_transforms import LinkTransforms
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import default_preset
@@ -138,7 +138,7 @@ def test_the_numbers_of_a_row_belong_together(
         )
         place = np.array([float(row[name]) for name in PLACE_NAMES])
         body = Estimate("tracking", posture, offset_m=place).placed(recording.body)
-        expected = source.camera.reference_to_optical(keypoints_m(body, posture))
+        expected = source.camera.reference_to_optical(pose(body.rigid, posture).keypoints_m)
         # The tracker lifts the shoulder of a raised arm a little, which the kinematics do not.
         np.testing.assert_allclose(points_m, expected, atol=2e-3)
         assert 0.5 < float(row["iou"]) <= 1.0

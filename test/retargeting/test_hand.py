@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.posture import JOINT_LIMITS, JOINT_NAMES
+from cardbox_tracker.body.posture import JOINT_LIMITS
 from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.hand import HandFollower, hand_of

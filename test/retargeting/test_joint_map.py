@@ -10,9 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import arm_directions, rotation_x, rotation_y, rotation_z
-from cardbox_tracker.body.posture import JOINT_NAMES, RIGHT_ARM
+from cardbox_tracker.body.posture import RIGHT_ARM
 from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.body.skeleton import (
+    JOINT_NAMES,
+    arm_directions,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.followed import angles_of, with_neck
 from cardbox_tracker.retargeting.joint_map import load_joint_map

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
+from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.joint_map import load_joint_map

@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import LEFT_ARM_PATCHES, RIGHT_ARM_PATCHES, cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS, reference_posture
 from cardbox_tracker.errors import CardboxError
@@ -82,7 +81,7 @@ def test_arms_stay_beside_the_torso(motion: str) -> None:
         middle = patches[:, patch_range].mean(axis=(1, 2))
         hip = np.array([-BODY.placement.distance_m, 0.0, BODY.placement.hip_height_m])
         # In the torso's frame the middle of the arm is further aside than the torso is wide.
-        rotation = forward_kinematics(BODY, path).torso_rotation
+        rotation = pose(BODY.rigid, path).torso_rotation
         local = np.einsum("nji,nj->ni", rotation, middle - hip)
         assert np.all(side * local[:, 1] > sagittal_half)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_JOINTS, reference_posture
 from cardbox_tracker.estimation.initialization.shoulders import GIRDLE_RISE
@@ -53,14 +53,16 @@ def test_the_measurement_expects_the_lift_of_the_reference_arms() -> None:
 def test_hanging_arms_are_those_of_the_model() -> None:
     for name in ("front", "side"):
         posture = reference_posture(name)
-        np.testing.assert_allclose(person_keypoints_m(BODY, posture), keypoints_m(BODY, posture))
+        np.testing.assert_allclose(
+            person_keypoints_m(BODY, posture), pose(BODY.rigid, posture).keypoints_m
+        )
 
 
 @pytest.mark.parametrize("roll", [0.0, 20.0])
 def test_a_raised_arm_is_lifted_along_the_torso_and_the_other_is_not(roll: float) -> None:
     posture = raised(90.0, yaw=40.0, roll=roll)
-    moved = person_keypoints_m(BODY, posture) - keypoints_m(BODY, posture)
-    up = forward_kinematics(BODY, posture).torso_rotation[:, 2]
+    moved = person_keypoints_m(BODY, posture) - pose(BODY.rigid, posture).keypoints_m
+    up = pose(BODY.rigid, posture).torso_rotation[:, 2]
     lift = girdle_lift_m(BREADTH_M, np.pi / 2)
     np.testing.assert_allclose(moved[:3], np.tile(lift * up, (3, 1)), atol=1e-12)
     np.testing.assert_allclose(moved[3:], 0.0, atol=1e-12)

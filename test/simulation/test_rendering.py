@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.simulation.person import (
@@ -52,7 +52,7 @@ def test_a_person_resembles_their_cardbox_but_is_none(name: str) -> None:
     posture = reference_posture(name)
     person = renderer().silhouette(BODY, posture) > 0
     # Below the hips there are legs, which the cardbox lacks.
-    row = int(CAMERA.project(CAMERA.reference_to_optical(forward_kinematics(BODY, posture).hip))[1])
+    row = int(CAMERA.project(CAMERA.reference_to_optical(pose(BODY.rigid, posture).hip))[1])
     box = cardbox_silhouette(BODY, posture) > 0
     iou = (person & box)[:row].sum() / (person | box)[:row].sum()
     # Fingers and raised shoulders are not in the cardbox.
@@ -110,7 +110,7 @@ def test_the_torso_hides_the_far_forearm(turn: str) -> None:
     far, near = (4, 8) if turn == "left" else (8, 4)
     posture[far] = 0.0
     posture[near + 1] = np.radians(90)
-    frames = forward_kinematics(BODY, posture)
+    frames = pose(BODY.rigid, posture)
     arm = frames.left if turn == "left" else frames.right
     u, v = np.rint(CAMERA.project(CAMERA.reference_to_optical(arm.elbow))).astype(int)
     image, mask = renderer().image(BODY, posture)

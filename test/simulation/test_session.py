@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.simulation.person import person_frames

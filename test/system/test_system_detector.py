@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.detection.landmarks import LANDMARKS
@@ -38,7 +38,7 @@ class Network:
     def __init__(self, scene: Any) -> None:
         posture = reference_posture("front")
         posture[0] = scene.body.placement.lateral_m
-        points_m = scene.camera.reference_to_optical(keypoints_m(scene.body, posture))
+        points_m = scene.camera.reference_to_optical(pose(scene.body.rigid, posture).keypoints_m)
         self._px, self._scores = np.zeros((len(LANDMARKS), 2)), np.zeros(len(LANDMARKS))
         of = [LANDMARKS.index(name) for name in JOINTS]
         self._px[of], self._scores[of] = scene.camera.project(points_m), 0.9

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import loads_body_model
-from cardbox_tracker.body.neck import NECK_NAMES
-from cardbox_tracker.body.posture import JOINT_NAMES, N_STATE, PLACE_NAMES, reference_posture
+from cardbox_tracker.body.posture import N_STATE, reference_posture
+from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES
 from cardbox_tracker.estimation.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -272,13 +272,14 @@ def test_each_image_gives_joint_states_of_its_stamp(measured: tuple[Session, str
     messages = session.joint_states[first:]
     assert [message.header.stamp for message in messages] == stamps
     assert all(tuple(message.name) == ALL_NAMES for message in messages)
-    posture, place, neck = np.split(np.array(messages[-1].position), [len(JOINT_NAMES), N_STATE])
-    np.testing.assert_array_equal(neck, 0.0)
+    posture, place, others = np.split(np.array(messages[-1].position), [len(JOINT_NAMES), N_STATE])
+    # Neither the neck nor the clavicles of hanging arms.
+    np.testing.assert_array_equal(others, 0.0)
     body, camera = session.scene.body, session.scene.camera
     truth = reference_posture("front")
     truth[0] = body.placement.lateral_m
-    found = keypoints_m(Estimate("tracking", posture, offset_m=place).placed(body), posture)
-    error_m = np.linalg.norm(found - keypoints_m(body, truth), axis=1)
+    found = pose(body, np.concatenate([posture, place])).keypoints_m
+    error_m = np.linalg.norm(found - pose(body.rigid, truth).keypoints_m, axis=1)
     assert error_m.mean() < 0.15
     assert camera.width == 320
 
@@ -308,7 +309,7 @@ def test_keypoints_markers_overlay_and_deviations_go_with_the_image(
     body, camera = session.scene.body, session.scene.camera
     posture, place, _ = np.split(np.array(state.position), [len(JOINT_NAMES), N_STATE])
     placed = Estimate("tracking", posture, offset_m=place).placed(body)
-    expected = camera.reference_to_optical(keypoints_m(placed, posture))
+    expected = camera.reference_to_optical(pose(placed.rigid, posture).keypoints_m)
     assert points.shape == (6, 3)
     np.testing.assert_allclose(points, expected, atol=0.1)
     kinds = {marker.ns: marker.type for marker in markers[-1].markers}
@@ -363,9 +364,9 @@ def test_joints_and_urdf_of_rep155_put_the_hands_at_the_keypoints(
     robot = yourdfpy.URDF.load(io.BytesIO(descriptions[-1].data.encode()))
     robot.update_cfg(dict(zip(human.name, human.position, strict=True)))
     assert all(name.endswith("_p1") for name in human.name)
-    for link, pose in (("l_shoulder", 0), ("l_elbow", 1), ("l_wrist", 2), ("r_wrist", 5)):
+    for link, number in (("l_shoulder", 0), ("l_elbow", 1), ("l_wrist", 2), ("r_wrist", 5)):
         place = robot.get_transform(f"{link}_p1", "test_optical")[:3, 3]
-        point = points[pose].position
+        point = points[number].position
         np.testing.assert_allclose(place, (point.x, point.y, point.z), atol=2e-3)
 
 

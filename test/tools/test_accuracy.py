@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.ergonomics.config import RulaConfig
@@ -38,7 +38,7 @@ def postures() -> np.ndarray:
 
 
 def session() -> Any:
-    points = session_camera().reference_to_optical(keypoints_m(BODY, postures()))
+    points = session_camera().reference_to_optical(pose(BODY.rigid, postures()).keypoints_m)
     return SimpleNamespace(
         name="made up",
         stamps_ns=np.arange(COUNT, dtype=np.int64) * 10**8,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import reference_posture
@@ -43,7 +43,7 @@ def write_results(path: Path, first: int = 0, seed: int = 0, later_ns: int = 0) 
     with result_bag(path, "camera") as bag:
         for i in range(first, IMAGES + 1):
             posture = wave(i / 5.0)
-            points = CAMERA.reference_to_optical(keypoints_m(BODY, posture))
+            points = CAMERA.reference_to_optical(pose(BODY.rigid, posture).keypoints_m)
             estimate = Estimate(TRACKING, posture, np.full(12, 0.1), points, 10, 0.9)
             frame = RecordedFrame(i * 10**8 + later_ns, i / 10, noise[i], noise[i])
             bag(frame, estimate if i < IMAGES else Estimate(LOST), tracker)
@@ -234,7 +234,7 @@ def test_a_robot_of_its_own_namespace_is_shown(tmp_path: Path) -> None:
 
 def test_errors_are_those_of_the_keypoints() -> None:
     scene = pytest.importorskip("cardbox_tracker.viewing.scene")
-    truth = CAMERA.reference_to_optical(keypoints_m(BODY, reference_posture("front")))
+    truth = CAMERA.reference_to_optical(pose(BODY.rigid, reference_posture("front")).keypoints_m)
     moved = truth + np.array([0.0, 0.0, 0.1])
     assert scene.errors_cm(moved, truth) == pytest.approx({"absolute": 10.0, "aligned": 0.0})
     moved[2, 1] += 0.06
@@ -246,7 +246,7 @@ def test_points_stand_where_the_urdf_has_the_person(pitch_rad: float) -> None:
     scene = pytest.importorskip("cardbox_tracker.viewing.scene")
     body = BODY.with_values(camera_pitch_rad=pitch_rad)
     camera = CAMERA.with_pitch(pitch_rad)
-    reference = keypoints_m(body, reference_posture("front"))
+    reference = pose(body.rigid, reference_posture("front")).keypoints_m
     level = scene.level_points(camera.reference_to_optical(reference), pitch_rad)
     # The reference frame faces the camera; the root of the URDF looks the same way as it.
     np.testing.assert_allclose(level, reference * (-1.0, -1.0, 1.0), atol=1e-12)

@@ -15,17 +15,11 @@ from math import sqrt
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import pose_arm, state_pose
+from cardbox_tracker.body.parts import HEIGHT, TOP_WIDTH, UPPER_ARM
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.bit_planes import Planes, value_at
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    HEIGHT,
-    TOP_WIDTH,
-    UPPER_ARM,
-    BodyTuple,
-    Floats,
-    body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import pose_arm, state_pose
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 
 # Points of the upper arm, including the elbow, and of the forearm, up to the fingertips.
 _POINTS = (3, 4)

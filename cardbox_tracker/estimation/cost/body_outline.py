@@ -9,8 +9,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from cardbox_tracker.compiling import inlined_allocation, inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.kinematics import (
+    PosedArm,
+    angles_in,
+    new_arm,
+    pose_arm,
+    side_of,
+    state_pose,
+    turn_arm,
+)
+from cardbox_tracker.body.parts import (
     BOTTOM,
     BOTTOM_WIDTH,
     DEPTH,
@@ -20,20 +28,9 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TOP_WIDTH,
     TORSO,
     UPPER_ARM,
-    Body,
-    BodyTuple,
-    Floats,
-    body_of,
 )
-from cardbox_tracker.estimation.cost.kinematics import (
-    PosedArm,
-    angles_in,
-    new_arm,
-    pose_arm,
-    side_of,
-    state_pose,
-    turn_arm,
-)
+from cardbox_tracker.compiling import inlined_allocation, inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import Body, BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.rasterisation import Workspace, new_workspace
 
 _TRUNK_PARTS, TRUNK_PATCHES, _LIMB_PATCHES = 4, 5, 2

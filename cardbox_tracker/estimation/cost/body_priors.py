@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import PITCH, ROLL, TORSO_X, TORSO_Z, YAW
-from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.kinematics import PosedArm, angles_in, new_arm, pose_arm, side_of
+from cardbox_tracker.body.parts import (
     BOTTOM,
     BOTTOM_WIDTH,
     DEPTH,
@@ -20,17 +19,10 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TOP_WIDTH,
     TORSO,
     WAIST,
-    BodyTuple,
-    Floats,
-    body_of,
 )
-from cardbox_tracker.estimation.cost.kinematics import (
-    PosedArm,
-    angles_in,
-    new_arm,
-    pose_arm,
-    side_of,
-)
+from cardbox_tracker.body.posture import PITCH, ROLL, TORSO_X, TORSO_Z, YAW
+from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.pose_prior import nats_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.body_outline import lid
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.kinematics import angles_in, side_of, torso_pose, turn_limb
+from cardbox_tracker.body.parts import (
     BOTTOM,
     BOTTOM_WIDTH,
     DEPTH,
@@ -29,6 +28,10 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TORSO,
     UPPER_ARM,
     WAIST,
+)
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.body_outline import lid
+from cardbox_tracker.estimation.cost.kernel_arguments import (
     Cardbox,
     CardboxTuple,
     Counts,
@@ -37,7 +40,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     IntrinsicsTuple,
     cardbox_of,
 )
-from cardbox_tracker.estimation.cost.kinematics import angles_in, side_of, torso_pose, turn_limb
 from cardbox_tracker.estimation.cost.rasterisation import Workspace, draw, new_workspace
 from cardbox_tracker.estimation.cost.row_sums import RowSums
 from cardbox_tracker.estimation.cost.union import cover_patches, sum_union
@@ -274,25 +276,3 @@ def polygon_costs(
                     work.corners[axis, c * count + p] = corners_m[i, p, c, axis]
         draw(work, Intrinsics(*camera), rows, width)
         costs[i] = base + sum_union(work, count, row_sums)[0]
-
-
-@kernel
-def keypoints(posture: Floats, cardbox: CardboxTuple, points: Floats) -> None:
-    """Write shoulder, elbow, hand of the left, then the right arm to ``points`` (6, 3).
-
-    The points are in the optical frame, metres.
-    """
-    model = cardbox_of(cardbox)
-    torso, hip = np.empty((3, 3)), np.empty(3)
-    upper_arm, forearm = np.empty((3, 3)), np.empty((3, 3))
-    torso_pose(posture, model.place, model.camera, torso, hip)
-    for arm in range(2):
-        side, angles = side_of(arm), angles_in(posture, arm)
-        turn_limb(torso, side * angles[0], angles[1], upper_arm)
-        turn_limb(upper_arm, side * angles[2], angles[3], forearm)
-        for j in range(3):
-            start = _joint(j, side, model.shoulder, torso, hip)
-            elbow = start - model.parts[UPPER_ARM, HEIGHT] * upper_arm[j, 2]
-            points[3 * arm, j] = start
-            points[3 * arm + 1, j] = elbow
-            points[3 * arm + 2, j] = elbow - model.parts[FOREARM, HEIGHT] * forearm[j, 2]

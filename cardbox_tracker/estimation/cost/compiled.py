@@ -13,15 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import shape_of
 from cardbox_tracker.body.posture import LEFT_ARM, N_JOINTS, TORSO
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import cardbox_kernels as kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    CardboxTuple,
-    intrinsics_of,
-    place_of,
-    shape_of,
-)
+from cardbox_tracker.estimation.cost.kernel_arguments import CardboxTuple, intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteObservation, SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, Silhouette, TorsoCosts
@@ -172,18 +168,3 @@ class CompiledObservation(SilhouetteObservation):
             areas,
         )
         return costs, areas
-
-
-class CompiledKeypoints:
-    """Compiled :func:`cardbox_tracker.body.kinematics.keypoints_m`, in the optical frame."""
-
-    def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Prepare for one body and one camera, and compile the kernel if necessary."""
-        self._cardbox = (*shape_of(body.sizes), place_of(body), intrinsics_of(camera))
-        self(np.zeros(N_JOINTS))
-
-    def __call__(self, posture: FloatArray) -> FloatArray:
-        """Return the keypoints (6, 3) of a posture (12,), metres in the optical frame."""
-        points = np.empty((6, 3))
-        kernels.keypoints(np.array(posture, dtype=np.float64), self._cardbox, points)
-        return points

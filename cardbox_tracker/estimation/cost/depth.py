@@ -15,10 +15,7 @@ import cv2
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.posture import N_STATE
-from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost import depth_kernels as kernels
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.parts import (
     BOTTOM_WIDTH,
     FOREARM,
     HEAD,
@@ -28,7 +25,10 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     WAIST,
     shape_of,
 )
-from cardbox_tracker.estimation.cost.kernel_arguments import TORSO as TORSO_PART
+from cardbox_tracker.body.parts import TORSO as TORSO_PART
+from cardbox_tracker.body.posture import N_STATE
+from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.estimation.cost import depth_kernels as kernels
 from cardbox_tracker.estimation.cost.terms import Frame, Posed, Term, TermObservation
 from cardbox_tracker.settings import Settings, setting
 from cardbox_tracker.vision.array_checks import ANY, check_array

@@ -18,8 +18,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
+from cardbox_tracker.body.kinematics import (
+    angles_in,
+    new_arm,
+    pose_arm,
+    side_of,
+    state_pose,
+    turn_arm,
+)
+from cardbox_tracker.body.parts import (
     BOTTOM,
     BOTTOM_WIDTH,
     DEPTH,
@@ -31,19 +38,14 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     TORSO,
     UPPER_ARM,
     WAIST,
+)
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
     BodyTuple,
     Drawn,
     Floats,
     Intrinsics,
     body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
-    angles_in,
-    new_arm,
-    pose_arm,
-    side_of,
-    state_pose,
-    turn_arm,
 )
 
 DepthMap = NDArray[np.float32]

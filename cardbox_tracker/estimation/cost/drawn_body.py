@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from cardbox_tracker.body.kinematics import girdle_of
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.parts import BOTTOM, FOREARM, HEAD, HEIGHT, NECK, WAIST, shape_of
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    BOTTOM,
-    FOREARM,
-    HEAD,
-    HEIGHT,
-    NECK,
-    WAIST,
-    BodyTuple,
-    intrinsics_of,
-    place_of,
-    shape_of,
-)
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
 
@@ -25,18 +14,14 @@ from cardbox_tracker.vision.camera import Camera
 _NECK_INTO_HEAD = 0.25
 
 
-def body_tuple(body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> BodyTuple:
+def body_tuple(
+    body: BodyModel, camera: Camera, config: WholeBodyCostConfig | None = None
+) -> BodyTuple:
     """Return the fields of :class:`~.kernel_arguments.Body` of a body before a camera."""
-    parts, shoulder = shape_of(body.sizes, config.neck_to_head)
-    girdle = np.array(
-        [
-            *shoulder,
-            config.clavicle * body.size("shoulder_breadth"),
-            config.lift_gain,
-            np.radians(config.lift_from_deg),
-        ]
-    )
-    return parts, _drawn_parts(parts, config), girdle, place_of(body), intrinsics_of(camera)
+    config = config or WholeBodyCostConfig()
+    parts, _ = shape_of(body.sizes, config.neck_to_head)
+    drawn = _drawn_parts(parts, config)
+    return parts, drawn, girdle_of(body), place_of(body), intrinsics_of(camera)
 
 
 def _drawn_parts(parts: FloatArray, config: WholeBodyCostConfig) -> FloatArray:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.cost import inner_cue_kernels as kernels
 from cardbox_tracker.estimation.cost.terms import Posed
@@ -28,8 +27,7 @@ def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]
 
 def forearm_of(person: BodyModel) -> tuple[float, float]:
     """Return length, including the fist, and width of a person's forearm, m."""
-    forearm = body_parts(person.sizes).forearm
-    return forearm.height_m, forearm.top_width_m
+    return person.size("forearm_length"), person.size("forearm_width")
 
 
 def zones_of(posed: Posed) -> FloatArray:

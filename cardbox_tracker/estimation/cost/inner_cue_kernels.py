@@ -7,19 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    BOTTOM,
-    FORWARD,
-    HEAD,
-    HEIGHT,
-    TOP_WIDTH,
-    TORSO,
-    WAIST,
-    BodyTuple,
-    body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
+from cardbox_tracker.body.kinematics import (
     angles_in,
     new_arm,
     pose_arm,
@@ -27,6 +15,9 @@ from cardbox_tracker.estimation.cost.kinematics import (
     state_pose,
     turn_arm,
 )
+from cardbox_tracker.body.parts import BOTTOM, FORWARD, HEAD, HEIGHT, TOP_WIDTH, TORSO, WAIST
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, body_of
 
 # Begin and end of the forearm's patch between elbow and fist, and its width in forearm widths; a
 # wider patch would sample pixels outside of the forearm.

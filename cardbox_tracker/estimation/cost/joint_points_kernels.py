@@ -15,21 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import N_STATE
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    BOTTOM,
-    FORWARD,
-    HEAD,
-    HEIGHT,
-    Body,
-    BodyTuple,
-    Drawn,
-    Floats,
-    Intrinsics,
-    body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
+from cardbox_tracker.body.kinematics import (
+    TWIST,
     PosedArm,
     angles_in,
     new_arm,
@@ -38,8 +25,18 @@ from cardbox_tracker.estimation.cost.kinematics import (
     state_pose,
     turn_arm,
 )
+from cardbox_tracker.body.parts import BOTTOM, FORWARD, HEAD, HEIGHT
+from cardbox_tracker.body.posture import N_STATE
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import (
+    Body,
+    BodyTuple,
+    Drawn,
+    Floats,
+    Intrinsics,
+    body_of,
+)
 from cardbox_tracker.estimation.cost.outline_motions import (
-    TWIST,
     moves,
     write_twists,
     write_velocity,

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.kinematics import TWIST
 from cardbox_tracker.body.posture import N_STATE
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import kernel
@@ -27,7 +28,7 @@ from cardbox_tracker.estimation.cost.distance_field import (
 )
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.cost.outline_distances import ABOVE_HIPS_PX, HALF_PX, comparing
-from cardbox_tracker.estimation.cost.outline_motions import TWIST, moves, segment_of, write_twists
+from cardbox_tracker.estimation.cost.outline_motions import moves, segment_of, write_twists
 from cardbox_tracker.estimation.cost.outline_points import (
     POINTS,
     distance_at,

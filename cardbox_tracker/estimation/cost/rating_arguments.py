@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import PosedArm, new_arm
 from cardbox_tracker.compiling import inlined_allocation
 from cardbox_tracker.estimation.cost.bit_masks import Masks, new_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
 from cardbox_tracker.estimation.cost.body_priors import Prior
 from cardbox_tracker.estimation.cost.kernel_arguments import Floats
-from cardbox_tracker.estimation.cost.kinematics import PosedArm, new_arm
 from cardbox_tracker.estimation.cost.rasterisation import Workspace, new_workspace
 
 

@@ -24,12 +24,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.kinematics import keypoints_of_states
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.detection.image_points import ImagePoints
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Drawn
-from cardbox_tracker.estimation.cost.kinematics import keypoints_of_states
 from cardbox_tracker.vision.camera import Camera
 
 Silhouette = NDArray[np.uint8]
@@ -92,7 +92,9 @@ class Posed:
     def keypoints_m(self) -> FloatArray:
         """Joints ordered as ``KEYPOINT_NAMES``, (N, 6, 3), metres in the camera's optical frame."""
         points = np.empty((len(self.states), 6, 3))
-        keypoints_of_states(self.states, self.arms_of, self.parts, self.body, points)
+        parts, _, girdle, place, lens = self.body
+        bones = parts, girdle, place, lens[4:]
+        keypoints_of_states(self.states, self.arms_of, self.parts, bones, points)
         return points
 
     @cached_property

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import MEASURED, BodyModel
 from cardbox_tracker.body.posture import (
     TORSO_X,
@@ -33,7 +34,6 @@ from cardbox_tracker.estimation.cost.bit_planes import (
 from cardbox_tracker.estimation.cost.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.kernel_arguments import Drawn, intrinsics_of, place_of
-from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.outline import Outline
 from cardbox_tracker.estimation.cost.pose_prior import load_gmm
 from cardbox_tracker.estimation.cost.rating_arguments import ObservedTuple, Points
@@ -83,9 +83,10 @@ class WholeBodyCost:
     """Ratings of states (N, 14) of one body before one camera with the present silhouette.
 
     Attributes:
+        person: the body.
         body: fields of :class:`~cardbox_tracker.estimation.cost.kernel_arguments.Body`.
         parts: measured parts of ``body``, (6, 6), metres.
-        girdle: girdle of ``body``, (5,).
+        girdle: girdle of ``body``, (3,).
         place: place of the hips of ``body``.
         view: camera of ``body``.
         size: width and height of the image, px.
@@ -101,7 +102,7 @@ class WholeBodyCost:
 
     def __init__(self, body: BodyModel, camera: Camera, config: WholeBodyCostConfig) -> None:
         """Prepare for one body and one camera, which includes the pitch."""
-        self._camera, self._config = camera, config
+        self.person, self._camera, self._config = body, camera, config
         self.body = body_tuple(body, camera, config)
         self.parts, _, self.girdle, self.place, self.view = self.body
         self.size = camera.width, camera.height
@@ -277,9 +278,7 @@ class WholeBodyCost:
 
     def keypoints(self, state: FloatArray) -> FloatArray:
         """Return the keypoints (6, 3) of a state (14,), metres in the optical frame."""
-        points = np.empty((6, 3))
-        keypoints(state, self.body, points)
-        return points
+        return pose(self.person, state, self.pitch_rad).keypoints_m
 
     def corners(self, state: FloatArray) -> FloatArray:
         """Return the drawn patches (13, 4, 3) of a state (14,), metres in the optical frame."""

@@ -22,10 +22,6 @@ class WholeBodyCostConfig:
         waist_extension_m: distance by which the drawn waist extends below the middle of the hips,
             m.
         fingers_m: distance by which the drawn forearm extends beyond the keypoint of the hand, m.
-        clavicle: radius of the circle on which the girdle lifts a shoulder joint, as a fraction of
-            the shoulder breadth.
-        lift_gain: lift on this circle, rad per rad of elevation.
-        lift_from_deg: elevation of the upper arm above which the shoulder is lifted, deg.
         below_hips_m: distance below the hips up to which rows of the image count, so that hanging
             hands count, m.
         legs: half width of the ignored columns below the hips, as a fraction of the waist's width.
@@ -52,11 +48,6 @@ class WholeBodyCostConfig:
     waist_extension_m: float = 0.35
     # The keypoint "hand" is the middle of a fist, but hands are mostly open.
     fingers_m: float = 0.05
-    # Clavicle and shoulder blade contribute about a third of an arm's elevation, and a part of it
-    # moves the joint; the gain was fitted to motion capture.
-    clavicle: float = 0.43
-    lift_gain: float = 0.18
-    lift_from_deg: float = 30.0
     below_hips_m: float = 0.35
     legs: float = 0.75
     weight: float = 0.012

@@ -11,6 +11,14 @@ The pixels are those of equation (2), with the outlines of
 
 from __future__ import annotations
 
+from cardbox_tracker.body.kinematics import (
+    angles_in,
+    new_arm,
+    pose_arm,
+    side_of,
+    state_pose,
+    turn_arm,
+)
 from cardbox_tracker.compiling import borrowing_kernel, inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.bit_masks import cover_masks, new_masks, sum_masks
 from cardbox_tracker.estimation.cost.bit_planes import Planes
@@ -28,14 +36,6 @@ from cardbox_tracker.estimation.cost.kernel_arguments import (
     Drawn,
     Floats,
     body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
-    angles_in,
-    new_arm,
-    pose_arm,
-    side_of,
-    state_pose,
-    turn_arm,
 )
 from cardbox_tracker.estimation.cost.rasterisation import draw, new_workspace
 from cardbox_tracker.estimation.cost.rating_arguments import (

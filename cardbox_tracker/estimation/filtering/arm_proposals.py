@@ -10,18 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.body.posture import ARM_ANGLES
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.bit_planes import Planes
-from cardbox_tracker.estimation.cost.kernel_arguments import (
-    FOREARM,
-    HEIGHT,
-    UPPER_ARM,
-    BodyTuple,
-    Floats,
-    body_of,
-)
-from cardbox_tracker.estimation.cost.kinematics import (
+from cardbox_tracker.body.kinematics import (
     angles_in,
     angles_of_arm,
     first_angle,
@@ -29,6 +18,11 @@ from cardbox_tracker.estimation.cost.kinematics import (
     side_of,
     state_pose,
 )
+from cardbox_tracker.body.parts import FOREARM, HEIGHT, UPPER_ARM
+from cardbox_tracker.body.posture import ARM_ANGLES
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.bit_planes import Planes
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.estimation.filtering.joint_moves import NumbersTuple
 from cardbox_tracker.estimation.filtering.mirroring import mirror
 from cardbox_tracker.estimation.filtering.state_choice import least_of

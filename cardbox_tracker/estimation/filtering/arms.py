@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import angles_of_arms
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.kinematics import angles_of_arms
 from cardbox_tracker.estimation.cost.pose_prior import sample_bank
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.filtering import arm_proposals

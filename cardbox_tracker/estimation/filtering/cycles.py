@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cardbox_tracker.body.cardbox import cardbox_patches
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.posture import TORSO_Y, clip_to_limits, reference_posture
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Silhouette, Term
 from cardbox_tracker.estimation.cost.view import View
@@ -52,8 +53,7 @@ class Cycles:
         self._config, self._term = config, silhouette
         body, camera = silhouette.body, silhouette.camera
         self.hierarchy = make_hierarchy(config, camera.width * camera.height, rng)
-        self._keypoints = CompiledKeypoints(body, camera)
-        self._posable = config.posable(body, camera)
+        self._posable = body_tuple(body, camera)
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
@@ -101,7 +101,8 @@ class Cycles:
         cost_px, iou = seen.overlap(posture)
         self._iou = iou
         is_poor = iou < self._config.lost_iou
-        keypoints_m = self._keypoints(posture)
+        body, camera = self._term.body.rigid, self._term.camera
+        keypoints_m = pose(body, posture, camera.pitch_rad).keypoints_m
         stddev = self.hierarchy.stddev()
         area = frame.foreground_px / self._person_px
         evidence = doubt.evidence_of_particles(iou, area, posture, stddev, self._posable)

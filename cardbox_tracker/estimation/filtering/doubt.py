@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.body.kinematics import keypoints
 from cardbox_tracker.body.posture import (
     LEFT_ARM,
     N_STATE,
@@ -38,9 +38,9 @@ from cardbox_tracker.body.posture import (
     YAW,
 )
 from cardbox_tracker.body.sizes import FloatArray
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.compiling import kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple
-from cardbox_tracker.estimation.cost.kinematics import keypoints
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, body_of
 
 BoolArray = NDArray[np.bool_]
 Values = Mapping[str, FloatArray]
@@ -284,13 +284,14 @@ def _spreads(
     of the state, which are taken as independent.
     """
     middle_m, moved_m, moved = np.empty((6, 3)), np.empty((6, 3)), state.copy()
-    keypoints(state, body, middle_m)
+    of = body_of(body)
+    keypoints(state, of, middle_m)
     spread_m[:] = 0.0
     for number in range(len(state)):
         if deviations[number] == 0.0:
             continue
         moved[number] = state[number] + _STEP
-        keypoints(moved, body, moved_m)
+        keypoints(moved, of, moved_m)
         moved[number] = state[number]
         for point in range(6):
             for axis in range(3):

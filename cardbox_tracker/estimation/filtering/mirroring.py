@@ -6,9 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from cardbox_tracker.compiling import inlined_kernel, kernel
-from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
-from cardbox_tracker.estimation.cost.kinematics import (
+from cardbox_tracker.body.kinematics import (
     angles_in,
     angles_of_arm,
     limb_directions,
@@ -16,6 +14,8 @@ from cardbox_tracker.estimation.cost.kinematics import (
     side_of,
     state_pose,
 )
+from cardbox_tracker.compiling import inlined_kernel, kernel
+from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
 
 
 @inlined_kernel

@@ -10,6 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cardbox_tracker.body.kinematics import (
+    angles_in,
+    angles_of_arm,
+    limb_directions,
+    side_of,
+    state_pose,
+)
 from cardbox_tracker.body.posture import (
     FIRST_ANGLES,
     N_STATE,
@@ -20,13 +27,6 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.compiling import kernel
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, Floats, body_of
-from cardbox_tracker.estimation.cost.kinematics import (
-    angles_in,
-    angles_of_arm,
-    limb_directions,
-    side_of,
-    state_pose,
-)
 from cardbox_tracker.estimation.filtering.joint_moves import (
     NoiseTuple,
     NumbersTuple,

@@ -11,6 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from cardbox_tracker.body.kinematics import keypoints
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.compiling import inlined_kernel, kernel
 from cardbox_tracker.estimation.cost.body_outline import (
@@ -19,7 +20,6 @@ from cardbox_tracker.estimation.cost.body_outline import (
     corners_of_body,
 )
 from cardbox_tracker.estimation.cost.kernel_arguments import BodyTuple, body_of
-from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 
 BoolArray = NDArray[np.bool_]
@@ -63,7 +63,7 @@ def are_hidden(cost: MultiViewCost, state: FloatArray) -> BoolArray:
 def _sees_enough(state: FloatArray, body: BodyTuple, size: tuple[int, int]) -> bool:
     """Return whether a camera with an image of ``size``, px, sees enough of a state (14,)."""
     points_m, corners_m = np.empty((6, 3)), np.empty((BODY_PATCHES, 4, 3))
-    keypoints(state, body, points_m)
+    keypoints(state, body_of(body), points_m)
     left, right = _SHOULDERS
     ahead_m = 0.5 * (points_m[left, 2] + points_m[right, 2])
     if ahead_m < NEAREST_TRACKED_M:
@@ -88,7 +88,7 @@ def _hide_fewer(
 ) -> None:
     """Clear ``hidden`` (6,) for keypoints of a state (14,) that a camera sees."""
     points_m, corners_m = np.empty((6, 3)), np.empty((BODY_PATCHES, 4, 3))
-    keypoints(state, body, points_m)
+    keypoints(state, body_of(body), points_m)
     corners_of_body(state, body, corners_m)
     lens = body_of(body).camera[:4]
     for number in range(len(points_m)):

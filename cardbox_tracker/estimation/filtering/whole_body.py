@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cardbox_tracker.body.parts import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.body.posture import (
     ARM_ANGLES,
     LEFT_ARM,
@@ -27,7 +28,6 @@ from cardbox_tracker.body.posture import (
 )
 from cardbox_tracker.body.sizes import FloatArray
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.cost.kernel_arguments import BOTTOM, HEIGHT, TORSO
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm
 from cardbox_tracker.estimation.cost.terms import Frame, Posed, Term

@@ -36,7 +36,7 @@ from cardbox_tracker.body.appearance import (
     bins_of,
     steps_of_levels,
 )
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import (
     ELBOW_ABDUCTION,
@@ -242,7 +242,8 @@ def part_labels(
     body: BodyModel, camera: Camera, posture: FloatArray, silhouette: Silhouette
 ) -> NDArray[np.int8]:
     """Return the part of each pixel (H, W), or -1 if it is not certain."""
-    frames = forward_kinematics(body, posture)
+    # The outline that gave the posture has rigid shoulders.
+    frames = pose(body.rigid, posture)
     labels = np.full(silhouette.shape, -1, np.int8)
     size = body.size
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
 from cardbox_tracker.body.posture import N_JOINTS
@@ -32,7 +32,7 @@ def at_height_of(silhouette: NDArray[np.uint8], body: BodyModel, camera: Camera)
     rows = np.flatnonzero(np.count_nonzero(silhouette, axis=1) > _SPECK_PX)
     if rows.size == 0 or rows[0] == 0:
         return body
-    head = forward_kinematics(body, np.zeros(N_JOINTS)).head
+    head = pose(body, np.zeros(N_JOINTS)).head
     crown_above_hip_m = (
         head[2] - body.placement.hip_height_m + body_parts(body.sizes).head.height_m / 2
     )

@@ -16,7 +16,7 @@ from collections.abc import Container
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import rotation_x, rotation_y, rotation_z
+from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
 
 FloatArray = NDArray[np.float64]

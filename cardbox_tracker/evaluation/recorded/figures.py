@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.parts import body_parts
-from cardbox_tracker.body.posture import JOINT_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.estimation.estimate import TRACKING
 from cardbox_tracker.estimation.filtering.doubt import FAR_M, HANDS
 from cardbox_tracker.evaluation.metrics import (

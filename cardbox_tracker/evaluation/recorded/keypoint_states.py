@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.body.keypoint_state import KeypointState
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.estimation.filtering.doubt import FAR_M
 
 FloatArray = NDArray[np.float64]

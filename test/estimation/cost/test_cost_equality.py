@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
-from cardbox_tracker.body.parts import BodyParts, Part, body_parts
+from cardbox_tracker.body.parts import BodyParts, Part, body_parts, shape_of
 from cardbox_tracker.body.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
 from cardbox_tracker.estimation.cost import kernel_arguments
 from cardbox_tracker.estimation.cost.cardbox_kernels import trunk_costs
-from cardbox_tracker.estimation.cost.compiled import CompiledKeypoints, CompiledSilhouette
-from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of, shape_of
+from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
+from cardbox_tracker.estimation.cost.kernel_arguments import intrinsics_of, place_of
 from cardbox_tracker.estimation.cost.row_sums import fill_row_sums
 from cardbox_tracker.estimation.cost.silhouette import SilhouetteTerm, rows_above_hips
 from cardbox_tracker.vision.camera import Camera
@@ -171,15 +170,6 @@ def test_the_model_itself_as_silhouette_leaves_no_pixel_over(case: Case) -> None
         seen = compiled.look(silhouette)
         assert seen.postures(posture[None]).tolist() == [0]
         assert seen.overlap(posture) == (0, 1.0 if silhouette.any() else 0.0)
-
-
-@settings(max_examples=60)
-@given(SMALL_CASES)
-def test_compiled_keypoints_are_those_of_the_kinematics(case: Case) -> None:
-    compiled = CompiledKeypoints(case.body, case.camera)
-    for posture in case.postures:
-        expected = case.camera.reference_to_optical(keypoints_m(case.body, posture))
-        np.testing.assert_allclose(compiled(posture), expected, atol=1e-12)
 
 
 @settings(max_examples=60)

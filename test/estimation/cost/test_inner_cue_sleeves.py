@@ -26,7 +26,7 @@ FOREARMS = 9, 10, 13, 14  # patches
 
 
 def sleeves() -> Sleeves:
-    return Sleeves(np.eye(5), ArmView.of(BODY, CAMERA, np.ones(2), False))
+    return Sleeves(np.eye(5), ArmView.of(BODY, CAMERA, np.ones(2)))
 
 
 def everywhere(nats: float) -> np.ndarray:

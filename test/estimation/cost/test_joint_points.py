@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture, state_limits
 from cardbox_tracker.detection.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
@@ -99,7 +99,7 @@ def test_joints_are_projected_where_the_model_has_them() -> None:
     there = BODY.with_values(
         distance_m=place.distance_m - STATE[12], hip_height_m=place.hip_height_m + STATE[13]
     )
-    frames = forward_kinematics(there, STATE[:12])
+    frames = pose(there.rigid, STATE[:12])
     for rows, points_m in (
         ([0, 1, 3, 4, 5, 7], keypoints_m),
         ([2, 6], wrists_m),

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import N_STATE, reference_posture
-from cardbox_tracker.estimation.cost.kinematics import keypoints
 from cardbox_tracker.estimation.cost.outline_distances import HALF_PX
 from cardbox_tracker.estimation.cost.outline_fit_kernels import INFORMATION, add_equations
-from cardbox_tracker.estimation.cost.outline_motions import TWIST, write_twists
 from cardbox_tracker.estimation.cost.outline_points import POINTS
 from cardbox_tracker.estimation.cost.view import OtherCamera, View
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -35,26 +31,6 @@ def difference(function, state: np.ndarray, value: int, step: float = 1e-5) -> n
         moved[value] += sign * step
         ends.append(function(moved))
     return (ends[0] - ends[1]) / (2.0 * step)
-
-
-def joints(state: np.ndarray) -> np.ndarray:
-    points = np.empty((6, 3))
-    keypoints(state, COST.body, points)
-    return points
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.lists(st.floats(-1.0, 1.0), min_size=N_STATE, max_size=N_STATE))
-def test_joints_move_as_their_twists_say(off: list[float]) -> None:
-    state = ARMS + off
-    twists, points = np.full((N_STATE, TWIST), np.nan), joints(state)
-    write_twists(state, COST.body, twists)
-    for value in range(N_STATE):
-        arm, angle = divmod(value - 4, 4)
-        moved = [3 * arm + k for k in _MOVES[angle]] if 4 <= value < 12 else list(range(6))
-        expected = difference(joints, state, value)
-        found = twists[value, :3] + np.cross(twists[value, 3:], points[moved])
-        np.testing.assert_allclose(found, expected[moved], atol=1e-5)
 
 
 def aside() -> View:

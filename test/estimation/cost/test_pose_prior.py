@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.estimation.cost import pose_prior
 from cardbox_tracker.estimation.cost.pose_prior import (
@@ -34,7 +34,7 @@ def directions(arms: np.ndarray) -> np.ndarray:
     """Unit vectors (N, 6) of left arms (N, 4)."""
     postures = np.zeros((len(arms), 12))
     postures[:, 4:8] = arms
-    arm = forward_kinematics(BodyModel(), postures).left
+    arm = pose(BodyModel().rigid, postures).left
     limbs = [arm.elbow - arm.shoulder, arm.hand - arm.elbow]
     return np.hstack([limb / np.linalg.norm(limb, axis=1, keepdims=True) for limb in limbs])
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture, state_limits
+from cardbox_tracker.body.skeleton import KeypointState
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.multi_view import MultiViewCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig

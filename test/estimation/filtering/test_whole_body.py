@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import arm_directions
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture, state_limits
+from cardbox_tracker.body.skeleton import arm_directions
 from cardbox_tracker.estimation.config import TrackerConfig, default_preset
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
@@ -30,7 +30,7 @@ CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
-STIFF = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig(lift_gain=0.0))
+STIFF = WholeBodyCost(BODY.rigid, CAMERA, WholeBodyCostConfig())
 
 
 def seen(posture: np.ndarray) -> np.ndarray:

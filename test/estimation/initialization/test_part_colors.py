@@ -8,7 +8,7 @@ import pytest
 
 from cardbox_tracker.body.appearance import FOREARM, HAND, HEAD, LEGS, TORSO, steps_of_levels
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.initialization.part_colors import (
@@ -93,7 +93,7 @@ def test_a_hand_at_the_lens_or_behind_it_is_no_error(depth_m: float) -> None:
     posture[[5, 9]] = np.radians(80.0)
 
     def hand_depth_m(body: BodyModel) -> float:
-        return float(CAMERA.reference_to_optical(keypoints_m(body, posture))[2, 2])
+        return float(CAMERA.reference_to_optical(pose(body.rigid, posture).keypoints_m)[2, 2])
 
     distance_m = 1.0 - hand_depth_m(BodyModel.of(distance_m=1.0)) + depth_m
     body = BodyModel.of(distance_m=distance_m)

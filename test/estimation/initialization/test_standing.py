@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.body.sizes import SIZE_NAMES
@@ -40,7 +40,7 @@ def test_the_crown_lies_on_the_upper_edge_of_the_topmost_row() -> None:
     silhouette[20:, 150:170] = 255
     body = BodyModel.of(distance_m=2.5)
     placed = at_height_of(silhouette, body, CAMERA)
-    head = forward_kinematics(placed, np.zeros(12)).head
+    head = pose(placed.rigid, np.zeros(12)).head
     # The edge at row 19.5 lies 100 px above the middle: tan is 100 / 250, whatever the pitch.
     assert head[2] + head_height_m(placed) / 2 == pytest.approx(0.4 * -head[0])
 
@@ -53,7 +53,7 @@ def test_the_crown_projects_to_the_row(pitch_rad: float, distance_m: float, row:
     placed = at_height_of(silhouette, body, CAMERA)
     if placed == body:  # higher or lower than a person can stand
         return
-    crown = forward_kinematics(placed, np.zeros(12)).head
+    crown = pose(placed.rigid, np.zeros(12)).head
     crown[2] += head_height_m(placed) / 2
     view = CAMERA.with_pitch(pitch_rad)
     assert view.project(view.reference_to_optical(crown))[1] == pytest.approx(row - 0.5)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_LIMITS
 from cardbox_tracker.evaluation.recorded.angles import joint_angles, limb_angles
@@ -25,7 +25,7 @@ def test_angles_come_back(seed: int, pitch_rad: float) -> None:
     low[flexions], high[flexions] = -1.0, 1.5
     postures = rng.uniform(low, high, (4, 12))
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad)
-    points = camera.reference_to_optical(keypoints_m(BODY, postures))
+    points = camera.reference_to_optical(pose(BODY.rigid, postures).keypoints_m)
     found = joint_angles(points, postures[:, 1:4], pitch_rad)
     np.testing.assert_allclose(found, postures[:, 1:], atol=1e-9)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.evaluation.recorded.figures import figures
 from cardbox_tracker.evaluation.recorded.session import RecordedSession
@@ -41,7 +41,7 @@ def session(postures: np.ndarray) -> RecordedSession:
         0.0,
         np.arange(N, dtype=np.int64) * 66_666_667,
         np.array(["low"] * 10 + ["high"] * 10),
-        CAMERA.reference_to_optical(keypoints_m(BODY, postures)),
+        CAMERA.reference_to_optical(pose(BODY.rigid, postures).keypoints_m),
         np.zeros((N, 3)),
         {"aligned": 7.0},
         11.0,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.errors import CardboxError
@@ -47,7 +47,7 @@ def postures() -> np.ndarray:
 
 @pytest.fixture
 def session(postures: np.ndarray) -> RecordedSession:
-    hips = forward_kinematics(BODY, postures).hip
+    hips = pose(BODY.rigid, postures).hip
     return RecordedSession(
         "hand_made",
         Path("bag"),
@@ -57,7 +57,7 @@ def session(postures: np.ndarray) -> RecordedSession:
         0.0,
         np.arange(N, dtype=np.int64) * 33_333_333,
         np.full(N, "dance"),
-        CAMERA.reference_to_optical(keypoints_m(BODY, postures)),
+        CAMERA.reference_to_optical(pose(BODY.rigid, postures).keypoints_m),
         np.full((N, 3), np.nan),
         {},
         None,

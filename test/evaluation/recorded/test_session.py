@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES
+from cardbox_tracker.body.skeleton import KEYPOINT_NAMES
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.evaluation.recorded.session import load_session
 

@@ -20,8 +20,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
-from cardbox_tracker.body.neck import NECK_NAMES  # noqa: E402
-from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES  # noqa: E402
+from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES  # noqa: E402
 from cardbox_tracker.description.link_transforms import LinkTransforms  # noqa: E402
 from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body  # noqa: E402
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402

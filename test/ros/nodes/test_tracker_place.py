@@ -20,10 +20,11 @@ from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, Image, JointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 
-from cardbox_tracker.body.kinematics import keypoints_m  # noqa: E402
+from cardbox_tracker.body.kinematics import pose  # noqa: E402
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
 from cardbox_tracker.body.model_file import save_body_model  # noqa: E402
-from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture  # noqa: E402
+from cardbox_tracker.body.posture import reference_posture  # noqa: E402
+from cardbox_tracker.body.skeleton import JOINT_NAMES  # noqa: E402
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, UNCERTAIN, Estimate  # noqa: E402
 from cardbox_tracker.estimation.tracker import Tracker  # noqa: E402
 from cardbox_tracker.ros.messages.conversions import (  # noqa: E402
@@ -44,7 +45,7 @@ WAIT_S = 30.0
 def found(state: str) -> Estimate:
     """Return an estimate 0.25 m nearer and 0.05 m lower than the measured person."""
     body = Estimate(state, offset_m=PLACE).placed(BODY)
-    points_m = CAMERA.reference_to_optical(keypoints_m(body, POSTURE))
+    points_m = CAMERA.reference_to_optical(pose(body.rigid, POSTURE).keypoints_m)
     return Estimate(
         *(state, POSTURE, np.full(12, 0.1), points_m, 812, 0.75),
         offset_m=PLACE,
