@@ -26,9 +26,11 @@ from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.filtering.doubt import (
     FAR_M,
+    HANDS,
     KINDS,
     LOST_FROM,
     UNCERTAIN_FROM,
+    WHOLE_UNCERTAIN_FROM,
     Source,
 )
 from cardbox_tracker.estimation.tracker import Tracker
@@ -73,7 +75,7 @@ class Collector:
     """Collects results whose truth is known."""
 
     def __init__(self, truth: Mapping[int, FloatArray], source: Source) -> None:
-        """Prepare for true keypoints (6, 3), metres, by stamp, and results that rest on a source."""
+        """Prepare for true keypoints (6, 3), metres, by stamp, and what results rest on."""
         self._truth, self._has_points = truth, source is Source.POINTS
         self._evidence: defaultdict[str, list[FloatArray]] = defaultdict(list)
         self._errors: list[FloatArray] = []
@@ -147,9 +149,9 @@ def row_of(name: str, samples: Samples, said: FloatArray) -> str:
     keypoints, wrong = said[:, :6], samples.aligned_m > FAR_M
     tracked = keypoints <= UNCERTAIN_FROM
     uncertain = ~tracked & (keypoints <= LOST_FROM)
-    is_tracking = (keypoints[:, [2, 5]] <= UNCERTAIN_FROM).all(axis=1) & (said[:, 6] <= 0.5)
+    is_tracking = tracked[:, HANDS].all(axis=1) & (said[:, 6] <= WHOLE_UNCERTAIN_FROM)
 
-    def share(of: NDArray[np.bool_], among: NDArray[np.bool_]) -> str:
+    def share(of: NDArray[Any], among: NDArray[Any]) -> str:
         return f"{100.0 * float(of[among].mean()):.1f}" if among.any() else ""
 
     everything = np.ones_like(tracked)
@@ -166,8 +168,8 @@ HEADER = """| source | images | `tracking` % | of these a joint > 30 cm % | join
 |---|---|---|---|---|---|---|---|---|"""
 
 
-def collect(folder: Path, seeds: Sequence[int], detector: Detector | None) -> dict[str, Any]:
-    """Return the samples of a session's source by :class:`Source`."""
+def collect(folder: Path, seeds: Sequence[int], detector: Detector | None) -> dict[Source, Samples]:
+    """Return the samples of a session by what they rest on."""
     session = load_session(folder)
     truth = dict(zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True))
     ways = [(Source.OUTLINE, "default", InputSelection())]

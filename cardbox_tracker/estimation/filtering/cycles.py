@@ -57,7 +57,7 @@ class Cycles:
         self._reference = reference_posture("front")
         self._reference[TORSO_Y] = body.placement.lateral_m
         model = render(cardbox_patches(body, self._reference), camera, silhouette.rows)
-        self._person_px = max(1, np.count_nonzero(model))
+        self._person_px = max(1, int(np.count_nonzero(model)))
         self._min_person_px = max(1, int(_PERSON_FRACTION * np.count_nonzero(model)))
         self._doubt = doubt.Doubt()
         self._started = False

@@ -211,8 +211,7 @@ def _timed(frames: Iterable[FrameSet], milliseconds: list[float]) -> Iterator[Fr
 
 def _seen(observation: Observation, inputs: InputSelection, is_open: bool) -> Observation:
     """Return the part of an observation that the tracker gets from an open or covered camera."""
-    return replace(
-        observation,
+    return observation.having(
         silhouette=observation.silhouette if is_open else None,
         points=observation.points if is_open else None,
         image=observation.image if inputs.has_images else None,
