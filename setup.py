@@ -105,6 +105,7 @@ setup(
     package_data={
         NAME: ["py.typed"],
         f"{NAME}.estimation.cost": ["*.json"],
+        f"{NAME}.estimation.filtering": ["*.json"],
         f"{NAME}.ros": ["*.csv"],
     },
     zip_safe=False,

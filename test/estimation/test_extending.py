@@ -16,19 +16,23 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import KEYPOINT_NAMES, keypoints_m
+from cardbox_tracker.body.kinematics import pose
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import TORSO_X, reference_posture, state_limits
 from cardbox_tracker.estimation.config import PRESETS
-from cardbox_tracker.estimation.cost.terms import ARMS, Frame, Silence
-from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.terms import ARM, TRUNK, WHOLE, Frame, Posed
+from cardbox_tracker.estimation.cost.view import OtherCamera
+from cardbox_tracker.estimation.observation import Observation
+from cardbox_tracker.estimation.tracked_camera import TrackedCamera
 from cardbox_tracker.estimation.tracker import Tracker
+from cardbox_tracker.vision.camera import Camera
+from cardbox_tracker.vision.extrinsics import Extrinsics
 from cardbox_tracker.vision.rasterisation import render
 
 ROOT = Path(__file__).parents[2]
 CODE = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(), re.DOTALL)
 FILES = {"clicked_points.py": CODE[0], "seated.py": CODE[2]}
-STAMP_NS = 7_000_000_000
 FRONT = reference_posture("front")
 
 
@@ -38,7 +42,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for name, code in FILES.items():
         (tmp_path / name).write_text(code)
     (tmp_path / "config").symlink_to(ROOT / "config")
-    (tmp_path / "points.csv").write_text(f"stamp_ns,joint,u,v\n{STAMP_NS},left_hand,180.0,50.0\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
@@ -63,68 +66,98 @@ def silhouette_of(tracker: Tracker, posture: np.ndarray = FRONT) -> np.ndarray:
     return render(cardbox_patches(tracker.body, posture), tracker.camera)
 
 
-def projected(tracker: Tracker, posture: np.ndarray) -> np.ndarray:
-    points_m = tracker.camera.reference_to_optical(keypoints_m(tracker.body, posture))
-    return tracker.camera.project(points_m)
+def with_arms(degrees: float) -> np.ndarray:
+    """A person who stands a little aside, with both arms raised sideways and bent."""
+    state = np.append(FRONT, [0.1, -0.05])
+    state[1:4] = 0.05, 0.1, 0.2
+    state[[4, 8]], state[[6, 10]] = np.radians(degrees), np.radians(20.0)
+    return state
 
 
-def frame(stamp_ns: int | None) -> Frame:
-    return Frame(np.zeros((240, 320), np.uint8), 200, 0, stamp_ns=stamp_ns)
+SECOND = OtherCamera(
+    Camera(320, 240, 350.0, 350.0, 161.0, 121.0),
+    Extrinsics.of_vectors(np.radians((5.0, -35.0, 4.0)), (1.3, 0.05, 0.4)),
+)
+
+
+def seen_by_both(body: BodyModel, camera: Camera, state: np.ndarray) -> list[np.ndarray]:
+    """Where the joints are in the images of both cameras, without the tracker's views."""
+    first_m = camera.reference_to_optical(pose(body, state).keypoints_m)
+    pose_of = SECOND.extrinsics
+    second_m = first_m @ pose_of.rotation.T + pose_of.translation_m
+    return [camera.project(first_m), SECOND.camera.project(second_m)]
+
+
+@pytest.mark.parametrize("degrees", [20.0, 86.0, 149.0])
+def test_clicked_points_cost_nothing_at_the_truth_in_any_camera(
+    folder: Path, degrees: float
+) -> None:
+    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
+    body, camera = tracker.body, tracker.camera
+    state = with_arms(degrees)
+    config = replace(tracker.config, terms=(clicked.ClickedPoints(weight=10.0),))
+    dark = np.zeros((240, 320), np.uint8)
+    for other, points_px in zip((None, SECOND), seen_by_both(body, camera, state), strict=True):
+        seen = TrackedCamera(body, camera, config, other)
+        seen.reset(config)
+        frame = seen.frame(Observation(dark, clicked=points_px), None, True)
+        there = seen.view.states(state) if seen.view else state
+        observation = seen.terms[0].observe(frame)
+        moved = there + np.eye(1, 14, 4)[0] * 0.1
+        posed = body_tuple(seen.view.body if seen.view else body, frame.camera)
+        for parts in (WHOLE, TRUNK, *ARM):
+            right, wrong = observation.rate(Posed(posed, np.array([there, moved]), parts, there))
+            assert right == pytest.approx(0.0, abs=1e-6)
+            # The angle turns the left arm, and raises its shoulder beyond some elevation.
+            assert (wrong > 10.0) == parts[1]
 
 
 def test_clicked_points_rate_by_hand(folder: Path) -> None:
     tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
-    hand = KEYPOINT_NAMES.index("left_hand")
-    at = projected(tracker, FRONT)[hand]
-    points = {STAMP_NS: {"left_hand": (at[0] + 3.0, at[1] + 4.0)}}
-    term = clicked.ClickedPoints(points, weight=10.0).build(tracker.body, tracker.camera)
-    seen = term.observe(frame(STAMP_NS))
-    # 5 px away, and 10 px for each of them; another arm has no point.
-    states = np.stack([FRONT, np.append(FRONT, [0.0, 0.0])[:12]])
-    assert seen.postures(states).tolist() == pytest.approx([50.0, 50.0])
-    rate = seen.arms_beside(FRONT[:4])
-    assert rate("left", FRONT[None, ARMS["left"]]).tolist() == pytest.approx([50.0])
-    assert rate("right", FRONT[None, ARMS["right"]]).tolist() == [0.0]
-    assert seen.torsos_beside(None)(np.zeros((3, 4))).tolist() == [0, 0, 0]
-    assert isinstance(term.observe(frame(STAMP_NS + 1)), Silence)
-    assert isinstance(term.observe(frame(None)), Silence)
+    state = with_arms(20.0)
+    at = Posed(body_tuple(tracker.body, tracker.camera), state[None])
+    points_px = np.full((6, 2), np.nan)
+    points_px[2] = at.keypoints_px[0, 2] + (3.0, 4.0)
+    term = clicked.ClickedPoints(weight=10.0).build(tracker.body, tracker.camera)
+    dark = np.zeros((240, 320), np.uint8)
+    frame = Frame(tracker.camera, {"silhouette": dark, "clicked": points_px}, 240, 0)
+    # 5 px away, and 10 px for each of them; no other joint has a point.
+    assert term.observe(frame).rate(at).tolist() == pytest.approx([50.0])
+    assert term.observe(Frame(tracker.camera, {"silhouette": dark}, 240, 0)) is None
 
 
-def test_clicked_points_are_where_the_body_is_placed(folder: Path) -> None:
-    """A state of torso_x and torso_z is rated as the whole-body filter draws it."""
+def test_two_cameras_follow_clicked_points(folder: Path) -> None:
+    """Outlines say little of a forearm before the belly; points say where the hand is."""
     tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
-    stiff = WholeBodyCostConfig(lift_gain=0.0)
-    state = np.append(FRONT, [0.2, -0.05])
-    cost = WholeBodyCost(tracker.body, tracker.camera, stiff)
-    points_px = tracker.camera.project(cost.keypoints(state))
-    points = {STAMP_NS: dict(zip(KEYPOINT_NAMES, map(tuple, points_px), strict=True))}
-    term = clicked.ClickedPoints(points, weight=1.0).build(tracker.body, tracker.camera)
-    seen = term.observe(frame(STAMP_NS))
-    assert seen.postures(state[None])[0] == pytest.approx(0.0, abs=1e-6)
-    arm = seen.arms_beside(state[[0, 1, 2, 3, 12, 13]])("left", state[None, 4:8])
-    assert arm[0] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_the_tracker_follows_clicked_points(folder: Path) -> None:
-    """An outline says little of a forearm before the belly; a point says where the hand is."""
-    tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
-    assert tracker.config.terms[-1].points_px == {STAMP_NS: {"left_hand": (180.0, 50.0)}}
-    posture = FRONT.copy()
-    posture[4:8] = np.radians((10, 25, -70, 40))
-    names = ("left_elbow", "left_hand")
-    hand = KEYPOINT_NAMES.index("left_hand")
-    wanted_px = projected(tracker, posture)
-    at = {name: tuple(wanted_px[KEYPOINT_NAMES.index(name)]) for name in names}
-    away_px = []
-    for points in ({}, {STAMP_NS + i: at for i in range(8)}):
-        config = replace(tracker.config, terms=(clicked.ClickedPoints(points),))
-        of = Tracker(tracker.body, tracker.camera, config)
-        for i in range(8):
-            estimate = of.track(silhouette_of(of, posture), stamp_ns=STAMP_NS + i)
+    body, camera = tracker.body, tracker.camera
+    state = np.append(FRONT, [0.0, 0.0])
+    state[4:8] = np.radians((10, 25, -70, 40))
+    wanted_m = camera.reference_to_optical(pose(body, state).keypoints_m)
+    points = seen_by_both(body, camera, state)
+    first = render(cardbox_patches(body, state[:12]), camera)
+    away_m = []
+    for given in (None, points):
+        config = replace(tracker.config, terms=(clicked.ClickedPoints(),) if given else ())
+        of = Tracker(body, camera, config, others=[SECOND])
+        for number in range(8):
+            one = Observation(first, stamp_ns=number, **({"clicked": points[0]} if given else {}))
+            second = Observation(np.zeros((240, 320), np.uint8))
+            if given:
+                second = second.having(clicked=points[1])
+            estimate = of.track([one, second])
         assert estimate.keypoints_m is not None
-        found_px = of.camera.project(estimate.keypoints_m)
-        away_px.append(float(np.linalg.norm(found_px[hand] - wanted_px[hand])))
-    assert away_px[1] < 5.0 < away_px[0], away_px
+        away_m.append(float(np.linalg.norm(estimate.keypoints_m[2] - wanted_m[2])))
+    assert away_m[1] < 0.05 < away_m[0], away_m
+
+
+def test_a_new_channel_is_one_line_and_unknown_ones_are_refused(folder: Path) -> None:
+    module_of("clicked_points")
+    with pytest.raises(ValueError, match=r"no channel 'clickt'; expected any of .*clicked"):
+        Observation(clickt=np.zeros((6, 2)))
+    tracker = made_by(CODE[1])
+    silhouette = silhouette_of(tracker)
+    with pytest.raises(ValueError, match=r"clicked of the first camera has the shape \(6,\)"):
+        tracker.track(Observation(silhouette, clicked=np.zeros(6)))
 
 
 def test_a_corrector_changes_the_result_and_not_the_search(folder: Path) -> None:

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.body.appearance import FOREARM, HAND, TORSO
-from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmGains, arms_in_image, forearm_of
+from cardbox_tracker.estimation.cost.inner_cue_arms import ArmGains, arms_in_image
 from cardbox_tracker.estimation.cost.terms import Posed
 
 # Weight of a nat over the area of a forearm; neighbouring pixels and successive images are alike.
@@ -41,18 +40,18 @@ class Sleeves:
         log_odds: logarithm of the odds of bare forearms against sleeves.
     """
 
-    def __init__(self, person: BodyModel, px_per_m: float) -> None:
-        """Prepare for a person with an appearance; the scale is that of the expected place.
+    def __init__(
+        self, histograms: FloatArray, forearm_m: tuple[float, float], px_per_m: float
+    ) -> None:
+        """Prepare for a person with ``histograms`` (5, bins).
 
-        Raises:
-            ValueError: the person has no appearance.
+        Args:
+            histograms: probability of each bin for each part.
+            forearm_m: length and width of the forearm.
+            px_per_m: scale at the expected place of the person.
         """
-        if person.appearance is None:
-            raise ValueError("sleeves need a person with an appearance")
-        self._histograms = person.appearance.histograms.copy()
-        self._forearm_m = forearm_of(person)
-        self._px_per_m = px_per_m
-        forearm_px = self._forearm_m[0] * self._forearm_m[1] * px_per_m**2
+        self._histograms, self._forearm_m, self._px_per_m = histograms.copy(), forearm_m, px_per_m
+        forearm_px = forearm_m[0] * forearm_m[1] * px_per_m**2
         self._weights = np.array([0.0, _WEIGHT / forearm_px])
         self.log_odds, self._told = _FIRST, 0.0
 

@@ -58,7 +58,8 @@ _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
-_LOCATED_EFFORT = 0.25
+_LOCATED_EFFORT = float(__import__('os').environ.get('X_EFFORT','0.25'))
+_VAR = __import__('os').environ.get('X_VAR','')
 # States that are fitted to such cues: number, number of similar ones, least distance of the others,
 # m; Gauss-Newton steps, and deviation of a value in a step, rad and m.
 _FITTED, _FITTED_STEPS, _FITTED_DAMPING = (6, 1, 0.1), 3, 0.25**-2
@@ -374,6 +375,13 @@ class WholeBodyFilter:
         """Return the state (14,) near ``state`` that fits all cues best."""
         cost, steps = self._cost, self._profile.outline_steps
         fitted = state
+        if self._cues and _VAR.startswith("joint"):
+            near = _NEAR._replace(mean=state)
+            if "wide" in _VAR:
+                near = Prior(state, _NEAR.inverse * 0.3)
+            cues = [*(cost.outlines(state) if frames[0].depth_m is None else ()), *self._cues]
+            (fitted,), _ = self.refine(state[None], cues, near, 4)
+            return fitted
         # A depth image determines the distance better than an outline.
         if frames[0].depth_m is None:
             near = _NEAR._replace(mean=state)
@@ -383,7 +391,8 @@ class WholeBodyFilter:
             self._correction = _KEPT * self._correction + (1.0 - _KEPT) * (outlined - state)
             fitted = np.clip(state + self._correction, *cost.limits.T)
         if self._cues:
-            (fitted,), _ = self.refine(fitted[None], self._cues, Prior(fitted, _LOCATED), 2)
+            located = _LOCATED * (0.5 if "half" in _VAR else 1.0)
+            (fitted,), _ = self.refine(fitted[None], self._cues, Prior(fitted, located), 2)
         return fitted
 
     def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:

@@ -10,19 +10,31 @@ import pytest
 
 from cardbox_tracker.body.appearance import PARTS, TORSO, UNSEEN, Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
-from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
+from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
 from cardbox_tracker.estimation.config import default_preset
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.inner_cue import (
     InnerCue,
     InnerCueObservation,
     InnerCueTerm,
     ratios_of,
 )
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView, torsos_of
-from cardbox_tracker.estimation.cost.terms import Frame, Silence
-from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
+from cardbox_tracker.estimation.cost.inner_cue_arms import (
+    ArmGains,
+    arms_in_image,
+    forearm_of,
+    zones_of,
+)
+from cardbox_tracker.estimation.cost.terms import (
+    ARM,
+    ARMS,
+    TRUNK,
+    Frame,
+    Posed,
+    TermObservation,
+)
 from cardbox_tracker.estimation.initialization.part_colors import learn_appearance
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
@@ -67,8 +79,32 @@ def measured(is_grey: bool = False) -> BodyModel:
     return BODY.with_values(appearance=learn_appearance(images, silhouettes, BODY, CAMERA))
 
 
+POSABLE = body_tuple(BODY.rigid, CAMERA)
+
+
+def states(postures: Any) -> np.ndarray:
+    """Postures (N, 12) or states (N, 14) as states."""
+    whole = np.zeros((len(postures), 14))
+    whole[:, : np.shape(postures)[1]] = postures
+    return whole
+
+
 def frame(image: Any, silhouette: np.ndarray, posture: Any = FRONT) -> Frame:
-    return Frame(silhouette, 240, int(np.count_nonzero(silhouette)), image, posture)
+    channels = {"silhouette": silhouette} | ({} if image is None else {"image": image})
+    before = None if posture is None else Posed(POSABLE, states([posture]))
+    return Frame(CAMERA, channels, 240, int(np.count_nonzero(silhouette)), before)
+
+
+def whole(seen: TermObservation, postures: Any) -> np.ndarray:
+    return seen.rate(Posed(POSABLE, states(postures)))
+
+
+def beside(seen: TermObservation, torso: Any, side: str, arms: Any) -> np.ndarray:
+    """Costs of arms beside a torso, (4,) or (6,) with the place."""
+    placed = np.zeros((len(arms), 14))
+    placed[:, :4], placed[:, 12 : 8 + len(torso)] = torso[:4], torso[4:]
+    placed[:, ARMS[side]] = arms
+    return seen.rate(Posed(POSABLE, placed, ARM[side == "right"]))
 
 
 @pytest.mark.parametrize("is_grey", [False, True])
@@ -82,10 +118,10 @@ def test_a_forearm_before_the_torso_is_found(is_grey: bool, gain: float) -> None
         observation = term.observe(frame(seen, silhouette, posture))
     wrong = posture.copy()
     wrong[6] = np.radians(-20)
-    costs = observation.arms_beside(posture[:4])("left", np.stack([posture, wrong])[:, 4:8])
+    costs = beside(observation, posture[:4], "left", np.stack([posture, wrong])[:, 4:8])
     assert costs[0] < costs[1] - 50
     assert costs[0] < 0
-    both = observation.postures(np.stack([posture, wrong]))
+    both = whole(observation, np.stack([posture, wrong]))
     assert both[0] < both[1] - 50
 
 
@@ -96,8 +132,8 @@ def flat_observation(hand: float, forearm: float) -> InnerCueObservation:
     maps = np.empty((2, 2000, 320), np.float32)  # beyond the image, so that no hand leaves it
     maps[0], maps[1] = hand, forearm
     away = np.array([[[-500.0, -500.0, 165.0], [-500.0, -400.0, 165.0]]])
-    view = ArmView.of(BODY, CAMERA, np.array([0.7, 0.7]), False)
-    return InnerCueObservation(view, maps, (0, 0), {"left": away, "right": away})
+    gains = ArmGains(maps, (0, 0), np.array([0.7, 0.7]), 330.0 / 2.0, forearm_of(BODY))
+    return InnerCueObservation(gains, (away, away))
 
 
 def test_a_gain_is_the_ratio_times_the_area_at_the_persons_place() -> None:
@@ -105,11 +141,11 @@ def test_a_gain_is_the_ratio_times_the_area_at_the_persons_place() -> None:
     px_per_m = 330.0 / 2.0
     hand_px = 0.09 * 0.075 * px_per_m**2
     forearm_px = 0.7 * BODY.size("forearm_width") * 0.72 * BODY.size("forearm_length") * px_per_m**2
-    cost = flat_observation(2.0, 0.0).arms_beside(np.zeros(4))("left", arm)
+    cost = beside(flat_observation(2.0, 0.0), np.zeros(4), "left", arm)
     assert cost[0] == pytest.approx(-0.7 * 2.0 * hand_px)
-    cost = flat_observation(0.0, -1.5).arms_beside(np.zeros(4))("right", arm)
+    cost = beside(flat_observation(0.0, -1.5), np.zeros(4), "right", arm)
     assert cost[0] == pytest.approx(0.7 * 1.5 * forearm_px)
-    both = flat_observation(2.0, -1.5).postures(np.zeros((1, 12)))
+    both = whole(flat_observation(2.0, -1.5), np.zeros((1, 12)))
     assert both[0] == pytest.approx(2 * 0.7 * (1.5 * forearm_px - 2.0 * hand_px))
 
 
@@ -117,22 +153,22 @@ def test_who_comes_nearer_gains_nothing_by_it() -> None:
     observation = flat_observation(2.0, 1.0)
     postures = np.zeros((3, 14))
     postures[:, 12] = (-0.5, 0.0, 0.5)
-    np.testing.assert_allclose(observation.postures(postures), observation.postures(postures)[0])
+    np.testing.assert_allclose(whole(observation, postures), whole(observation, postures)[0])
     torsos = [np.array([0, 0, 0, 0, x, 0.1]) for x in (0.0, 0.5)]
-    near, far = (observation.arms_beside(torso)("left", np.zeros((1, 4))) for torso in torsos)
+    near, far = (beside(observation, torso, "left", np.zeros((1, 4))) for torso in torsos)
     assert near == pytest.approx(far)
 
 
 def test_a_forearm_towards_the_camera_shows_less() -> None:
     observation = flat_observation(0.0, 1.0)
     arms = np.radians([[0.0, 0, 0, 0], [0, 0, 0, 85]])
-    hanging, forwards = observation.arms_beside(np.zeros(4))("left", arms)
+    hanging, forwards = beside(observation, np.zeros(4), "left", arms)
     assert hanging < 2.5 * forwards < 0
 
 
 def test_a_hand_behind_the_torso_shows_nothing() -> None:
     arms = np.radians([[0.0, -40, -50, 0], [30.0, -40, 0, 0]])
-    behind, aside = flat_observation(2.0, 2.0).arms_beside(np.zeros(4))("left", arms)
+    behind, aside = beside(flat_observation(2.0, 2.0), np.zeros(4), "left", arms)
     assert behind == 0.0
     assert aside < 0.0
 
@@ -141,9 +177,9 @@ def test_a_hand_under_the_other_forearm_gains_half() -> None:
     observation = flat_observation(1.0, 0.0)
     arm = np.zeros((1, 4))
     points, _ = observation.view.project(np.zeros((1, 6)), arm, "left")
-    free = observation.arms_beside(np.zeros(4))("left", arm)
+    free = beside(observation, np.zeros(4), "left", arm)
     observation.others["right"] = points
-    assert observation.arms_beside(np.zeros(4))("left", arm) == pytest.approx(free / 2)
+    assert beside(observation, np.zeros(4), "left", arm) == pytest.approx(free / 2)
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (0.3, -0.1)])
@@ -154,39 +190,21 @@ def test_arms_are_projected_as_the_kinematics_place_them(offset: tuple[float, fl
     moved = BODY.with_values(
         distance_m=2.0 - offset[0], hip_height_m=BODY.placement.hip_height_m + offset[1]
     )
-    optical = camera.reference_to_optical(keypoints_m(moved, postures[:, :12]))
-    view = ArmView.of(BODY, camera, np.ones(2), False)
-    for side, joints, first in (("left", slice(4, 8), 1), ("right", slice(8, 12), 4)):
-        points, _ = view.project(torsos_of(postures), postures[:, joints], side)
+    optical = camera.reference_to_optical(pose(moved, postures[:, :12]).keypoints_m)
+    posed = Posed(body_tuple(BODY, camera), postures)
+    for arm, first in ((0, 1), (1, 4)):
+        points, _ = arms_in_image(posed, arm)
         expected = camera.project(optical[:, first : first + 2])
         np.testing.assert_allclose(points[..., :2], expected, atol=1e-9)
         np.testing.assert_allclose(points[..., 2], 330.0 / optical[:, first : first + 2, 2])
-
-
-def test_shoulders_rise_with_the_arms_as_in_the_whole_body_filter() -> None:
-    """By the default clavicle and gain; hanging arms are where rigid shoulders have them."""
-    arms = np.radians([[0.0, 0, 0, 0], [90, 0, 0, 0]])
-    rigid, lifted = (
-        ArmView.of(BODY, CAMERA, np.ones(2), lifts).project(np.zeros((1, 6)), arms, "left")[0]
-        for lifts in (False, True)
-    )
-    np.testing.assert_array_equal(lifted[0], rigid[0])
-    girdle = WholeBodyCostConfig()
-    turn = girdle.lift_gain * np.radians(90 - girdle.lift_from_deg)
-    radius_px = girdle.clavicle * BODY.size("shoulder_breadth") * 330 / 2.0
-    moved = (lifted - rigid)[1]
-    np.testing.assert_allclose(moved[:, 0], -radius_px * (1 - np.cos(turn)))  # towards the neck
-    np.testing.assert_allclose(moved[:, 1], -radius_px * np.sin(turn))
 
 
 def test_zones_are_where_head_and_torso_are() -> None:
     posture = np.zeros(14)
     posture[[0, 12, 13]] = 0.2, 0.4, 0.1
     moved = BODY.with_values(distance_m=1.6, hip_height_m=BODY.placement.hip_height_m + 0.1)
-    frames = forward_kinematics(moved, posture[:12])
-    u, v, half_width, half_height, hips, top = ArmView.of(BODY, CAMERA, np.ones(2), False).zones(
-        posture
-    )
+    frames = pose(moved, posture[:12])
+    u, v, half_width, half_height, hips, top = zones_of(Posed(POSABLE, posture[None]))
 
     def pixel(point_m: Any) -> Any:
         return CAMERA.project(CAMERA.reference_to_optical(np.asarray(point_m)))
@@ -230,17 +248,11 @@ def test_ratios_are_logarithms_by_zone_cut_off_and_silent_for_what_looks_alike()
 def test_without_a_comparable_image_or_a_posture_it_says_nothing(image: Any, posture: Any) -> None:
     term = InnerCue().build(measured(), CAMERA)
     silhouette = drawn(FRONT)[1]
-    observation = term.observe(frame(image, silhouette, posture))
-    assert isinstance(observation, Silence)
-    assert not observation.postures(np.zeros((5, 12))).any()
-    assert observation.arms_beside(np.zeros(4))("left", np.zeros((3, 4))).tolist() == [0, 0, 0]
-    assert observation.torsos_beside(None)(np.zeros((2, 4))).tolist() == [0, 0]
+    assert term.observe(frame(image, silhouette, posture)) is None
 
 
 def test_a_person_whose_colours_are_unknown_is_tracked_without() -> None:
-    image, silhouette = drawn(FRONT)
-    term = InnerCue().build(BODY, CAMERA)
-    assert isinstance(term.observe(frame(image, silhouette)), Silence)
+    assert InnerCue().build(BODY, CAMERA) is None
     with pytest.raises(ValueError, match="no appearance"):
         InnerCueTerm(InnerCue(), BODY, CAMERA)
 
@@ -248,8 +260,7 @@ def test_a_person_whose_colours_are_unknown_is_tracked_without() -> None:
 def test_torsos_are_left_to_the_outline() -> None:
     image, silhouette = drawn(FRONT)
     observation = InnerCue().build(measured(), CAMERA).observe(frame(image, silhouette))
-    assert not isinstance(observation, Silence)
-    assert observation.torsos_beside(FRONT)(np.zeros((4, 4))).tolist() == [0, 0, 0, 0]
+    assert observation.rate(Posed(POSABLE, np.zeros((4, 14)), TRUNK)).tolist() == [0, 0, 0, 0]
 
 
 def test_parts_that_look_alike_say_nothing() -> None:
@@ -258,7 +269,7 @@ def test_parts_that_look_alike_say_nothing() -> None:
     image, silhouette = drawn(FRONT)
     term = InnerCue().build(BODY.with_values(appearance=same), CAMERA)
     observation = term.observe(frame(image, silhouette))
-    assert not observation.postures(np.stack([FRONT, before_the_torso()])).any()
+    assert not whole(observation, np.stack([FRONT, before_the_torso()])).any()
 
 
 def test_the_light_is_followed_and_forgotten_at_a_new_start() -> None:
@@ -282,7 +293,7 @@ def test_colours_learned_in_grey_serve_for_images_in_colour() -> None:
     image, silhouette = drawn(posture)
     body = measured(is_grey=True)
     costs = [
-        InnerCue().build(body, CAMERA).observe(frame(seen, silhouette)).postures(posture[None])
+        whole(InnerCue().build(body, CAMERA).observe(frame(seen, silhouette)), posture[None])
         for seen in (image, grey(image))
     ]
     assert costs[0] == costs[1] != 0
@@ -291,20 +302,20 @@ def test_colours_learned_in_grey_serve_for_images_in_colour() -> None:
 def test_an_image_out_of_a_message_is_read_only_and_not_contiguous() -> None:
     image, silhouette = drawn(FRONT)
     term = InnerCue().build(measured(), CAMERA)
-    expected = term.observe(frame(image, silhouette)).postures(FRONT[None])
+    expected = whole(term.observe(frame(image, silhouette)), FRONT[None])
     wide = np.zeros((240, 330, 3), np.uint8)
     wide[:, :320] = image
     wide.setflags(write=False)
     silhouette.setflags(write=False)
     again = InnerCue().build(measured(), CAMERA)
-    assert again.observe(frame(wide[:, :320], silhouette)).postures(FRONT[None]) == expected
+    assert whole(again.observe(frame(wide[:, :320], silhouette)), FRONT[None]) == expected
 
 
 def test_an_empty_silhouette_is_nobody() -> None:
     term = InnerCue().build(measured(), CAMERA)
     nobody = np.zeros((240, 320), np.uint8)
     observation = term.observe(frame(np.zeros((240, 320, 3), np.uint8), nobody))
-    assert not observation.postures(FRONT[None]).any()
+    assert not whole(observation, FRONT[None]).any()
 
 
 def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None:

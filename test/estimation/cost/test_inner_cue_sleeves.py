@@ -10,10 +10,11 @@ from cardbox_tracker.body.appearance import FOREARM, HAND, TORSO
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import PROPORTIONS, BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue, InnerCueTerm
-from cardbox_tracker.estimation.cost.inner_cue_arms import ArmView
+from cardbox_tracker.estimation.cost.inner_cue_arms import forearm_of
 from cardbox_tracker.estimation.cost.inner_cue_sleeves import Sleeves
-from cardbox_tracker.estimation.cost.terms import Frame
+from cardbox_tracker.estimation.cost.terms import Frame, Posed
 from cardbox_tracker.estimation.initialization.part_colors import seen_appearance
 from cardbox_tracker.vision.camera import Camera
 from cardbox_tracker.vision.rasterisation import render
@@ -26,7 +27,11 @@ FOREARMS = 9, 10, 13, 14  # patches
 
 
 def sleeves() -> Sleeves:
-    return Sleeves(np.eye(5), ArmView.of(BODY, CAMERA, np.ones(2)))
+    return Sleeves(np.eye(5), forearm_of(BODY), 330.0 / 2.0)
+
+
+def posed(posture: np.ndarray) -> Posed:
+    return Posed(body_tuple(BODY, CAMERA), np.append(posture, [0.0, 0.0])[None])
 
 
 def everywhere(nats: float) -> np.ndarray:
@@ -44,7 +49,7 @@ def test_forearms_are_a_mixture_of_skin_and_shirt() -> None:
 @pytest.mark.parametrize("nats", [2.0, -1.5])
 def test_an_image_adds_its_evidence(nats: float) -> None:
     worn = sleeves()
-    worn.see(everywhere(nats), (0, 0), np.zeros(12))
+    worn.see(everywhere(nats), (0, 0), posed(np.zeros(12)))
     # Two hanging forearms, whose patch has 0.7 of the width and 0.72 of the length.
     gained = 2 * 0.1 * (nats + 0.2) * 0.7 * 0.72
     assert worn.log_odds == pytest.approx(1.0 + gained)
@@ -54,7 +59,7 @@ def test_an_image_adds_its_evidence(nats: float) -> None:
 def test_the_chance_is_never_certain(nats: float) -> None:
     worn = sleeves()
     for _ in range(100):
-        worn.see(everywhere(nats), (0, 0), np.zeros(14))
+        worn.see(everywhere(nats), (0, 0), posed(np.zeros(12)))
     assert worn.log_odds == pytest.approx(np.sign(nats) * 3.0)
     assert 0.04 < worn.bare < 0.96
 
@@ -62,7 +67,7 @@ def test_the_chance_is_never_certain(nats: float) -> None:
 def test_colours_that_look_alike_are_no_evidence() -> None:
     worn = sleeves()
     before = worn.histograms
-    assert not worn.see(everywhere(0.0), (0, 0), np.zeros(12))
+    assert not worn.see(everywhere(0.0), (0, 0), posed(np.zeros(12)))
     np.testing.assert_array_equal(worn.histograms, before)
 
 
@@ -87,7 +92,8 @@ def test_forearms_of_a_person_are_recognized_within_a_few_seconds(is_bare: bool)
     term = InnerCue().build(body.with_values(appearance=seen), CAMERA)
     assert isinstance(term, InnerCueTerm)
     assert term._sleeves is not None
-    frame = Frame(silhouette, 240, int(np.count_nonzero(silhouette)), image, ARMS)
+    channels = {"silhouette": silhouette, "image": image}
+    frame = Frame(CAMERA, channels, 240, int(np.count_nonzero(silhouette)), posed(ARMS))
     for _ in range(45):
         term.observe(frame)
     assert term._sleeves.bare > 0.9 if is_bare else term._sleeves.bare < 0.1

@@ -22,7 +22,8 @@ from cardbox_tracker.estimation.cost.joint_points import (
     JointPointsObservation,
     JointPointsTerm,
 )
-from cardbox_tracker.estimation.cost.terms import Frame, Silence
+from cardbox_tracker.estimation.cost.kernel_arguments import Drawn
+from cardbox_tracker.estimation.cost.terms import ARM, TRUNK, WHOLE, Frame, Posed
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
 from cardbox_tracker.estimation.cost.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.vision.camera import Camera
@@ -48,7 +49,13 @@ STATE[4:12] += 0.2, 0.4, -0.6, 0.7, 0.1, 0.2, 0.3, 0.9
 def frame(
     points: ImagePoints | None, before: np.ndarray | None = None, stamp_ns: int | None = None
 ) -> Frame:
-    return Frame(NOTHING, 240, FOREGROUND_PX, posture=before, stamp_ns=stamp_ns, points=points)
+    channels = {"silhouette": NOTHING} | ({} if points is None else {"points": points})
+    posed = None if before is None else Posed(COST.body, before[None])
+    return Frame(CAMERA, channels, 240, FOREGROUND_PX, posed, stamp_ns=stamp_ns)
+
+
+def rated(seen: JointPointsObservation, states: np.ndarray, parts: Drawn = WHOLE) -> np.ndarray:
+    return seen.rate(Posed(COST.body, states, parts))
 
 
 def observed(
@@ -64,7 +71,7 @@ def observed(
 
 def cost_of(points: ImagePoints, stamp_ns: int | None = None) -> float:
     """Of STATE, in units of the weight."""
-    return float(observed(points, stamp_ns=stamp_ns).postures(STATE[None])[0]) / WEIGHT_PX
+    return float(rated(observed(points, stamp_ns=stamp_ns), STATE[None])[0]) / WEIGHT_PX
 
 
 def moved(points: ImagePoints, name: str, across_px: float, down_px: float = 0.0) -> ImagePoints:
@@ -76,6 +83,12 @@ def moved(points: ImagePoints, name: str, across_px: float, down_px: float = 0.0
 def only(points: ImagePoints, *names: str) -> ImagePoints:
     kept = np.isin(POINT_NAMES, names)
     return replace(points, scores=np.where(kept, points.scores, 0.0))
+
+
+def only_bone_of(seen: JointPointsObservation) -> JointPointsObservation:
+    """The same without points: what is left is the line between the shoulders."""
+    points, *others = seen.seen
+    return replace(seen, seen=(0.0 * points, *others))
 
 
 def exchanged(points: ImagePoints) -> ImagePoints:
@@ -174,7 +187,7 @@ def test_deviations_grow_with_the_age(detected: Detect, late_s: float) -> None:
 def test_points_older_than_a_second_are_not_used(detected: Detect) -> None:
     term = JointPoints().build(BODY, CAMERA)
     points = detected(BODY, CAMERA, STATE, stamp_ns=5 * SEC)
-    assert isinstance(term.observe(frame(points, STATE, 7 * SEC)), Silence)
+    assert term.observe(frame(points, STATE, 7 * SEC)) is None
 
 
 def given_in_space(bones_m: np.ndarray) -> np.ndarray:
@@ -218,11 +231,11 @@ def test_bones_are_compared_along_the_horizontal_line_of_sight(
     points = detected(GUESSED, CAMERA, STATE, 1.0, 5 * SEC)
     points = replace(points, spatial_m=given_in_space(joints_m))
     stamp_ns = 5 * SEC + round(age_s * SEC)
-    found = observed(points, body=GUESSED, stamp_ns=stamp_ns).postures(STATE[None])[0] / WEIGHT_PX
+    found = rated(observed(points, body=GUESSED, stamp_ns=stamp_ns), STATE[None])[0] / WEIGHT_PX
     assert found == pytest.approx(expected_of_bones(joints_m, points, age_s), rel=1e-6)
     assert found > 1.0
     # Of people who were measured, the outlines determine the depth.
-    assert observed(points, stamp_ns=stamp_ns).postures(STATE[None])[0] == pytest.approx(0.0)
+    assert rated(observed(points, stamp_ns=stamp_ns), STATE[None])[0] == pytest.approx(0.0)
 
 
 def test_what_is_not_finite_in_space_costs_nothing(detected: Detect) -> None:
@@ -230,10 +243,10 @@ def test_what_is_not_finite_in_space_costs_nothing(detected: Detect) -> None:
     for value in (np.nan, np.inf, -np.inf, 1e300):
         wrong = replace(points, spatial_m=np.full((len(POINT_NAMES), 3), value))
         seen = observed(wrong, body=GUESSED)
-        assert seen.postures(STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
+        assert rated(seen, STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
     # All points at the same place have no direction.
     same = replace(points, spatial_m=np.zeros((len(POINT_NAMES), 3)))
-    assert observed(same, body=GUESSED).postures(STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
+    assert rated(observed(same, body=GUESSED), STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
 
 
 SHARES = arrays(np.float64, (3, 14), elements=st.floats(0.0, 1.0))
@@ -257,19 +270,10 @@ def test_a_cost_is_between_0_and_the_limit(
     if points.is_empty:
         return
     seen = observed(points, body=GUESSED, stamp_ns=5 * SEC + age_ns)
-    found, _, bones, _ = seen.evidence
+    found, _, bones, _ = seen.seen
     most = WEIGHT_PX * 16.0 * (found[:, 2].sum() + bones[:, 1].sum()) + 1e-9
-    of_arms = [
-        seen.arms_beside(states[0, [0, 1, 2, 3, 12, 13]])(side, states[:, 4:8])
-        for side in ("left", "right")
-    ]
-    for costs in (
-        seen.postures(states),
-        seen.postures(states[:, :12]),
-        seen.torsos_beside(None)(states[:, [0, 1, 2, 3, 12, 13]]),
-        seen.torsos_beside(states[0, :12])(states[:, :4]),
-        *of_arms,
-    ):
+    for parts in (WHOLE, TRUNK, *ARM):
+        costs = rated(seen, states, parts)
         assert costs.shape == (3,)
         assert ((costs >= 0.0) & (costs <= most)).all()
 
@@ -285,20 +289,42 @@ def test_trunk_and_arms_add_up_to_the_body(
     points = replace(points, px=points.px + noise_px)
     seen = observed(points, body=GUESSED)
     shoulders = observed(only(points, "left_shoulder", "right_shoulder"), body=GUESSED)
-    for state in states:
-        torso = state[[0, 1, 2, 3, 12, 13]]
-        rate = seen.arms_beside(torso)
-        total = rate("left", state[None, 4:8]) + rate("right", state[None, 8:12])
-        total += seen.torsos_beside(state)(torso[None])
-        # The shoulders count in all three.
-        total -= shoulders.postures(state[None])
-        np.testing.assert_allclose(total, seen.postures(state[None]), rtol=1e-9, atol=1e-9)
+    total = sum(rated(seen, states, parts) for parts in (TRUNK, *ARM))
+    # The shoulders count for the trunk and for their arms.
+    total -= rated(shoulders, states, TRUNK)
+    total += rated(only_bone_of(shoulders), states, TRUNK)
+    np.testing.assert_allclose(total, rated(seen, states), rtol=1e-9, atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(shares=SHARES, noise_px=arrays(np.float64, (17, 2), elements=st.floats(-30, 30)))
+def test_twice_the_residuals_times_their_jacobian_is_the_gradient_of_the_cost(
+    detected: Detect, shares: np.ndarray, noise_px: np.ndarray
+) -> None:
+    low, high = STATE_LIMITS.T
+    states = low + shares * (high - low)
+    # Nearer than this, the projection is cut off.
+    states[:, 12] = np.minimum(states[:, 12], 0.8)
+    points = detected(GUESSED, CAMERA, STATE)
+    joints_m = np.random.default_rng(0).normal(0.0, 0.3, (6, 3))
+    points = replace(points, px=points.px + noise_px, spatial_m=given_in_space(joints_m))
+    seen = observed(points, body=GUESSED)
+
+    def costs(at: np.ndarray) -> np.ndarray:
+        return seen.residuals(Posed(COST.body, at)).costs
+
+    found = seen.residuals(Posed(COST.body, states))
+    gradient = 2.0 * np.einsum("nr,nrd->nd", found.values, found.jacobian)
+    for number in range(14):
+        step = np.eye(14)[number] * 1e-6
+        slope = (costs(states + step) - costs(states - step)) / 2e-6
+        np.testing.assert_allclose(gradient[:, number], slope, rtol=1e-3, atol=1e-2)
 
 
 def test_without_points_nothing_is_rated() -> None:
     term = JointPoints().build(BODY, CAMERA)
     for points in (None, ImagePoints.of({})):
-        assert isinstance(term.observe(frame(points, STATE)), Silence)
+        assert term.observe(frame(points, STATE)) is None
 
 
 def test_points_of_an_earlier_frame_count_less_and_less(detected: Detect) -> None:
@@ -308,11 +334,11 @@ def test_points_of_an_earlier_frame_count_less_and_less(detected: Detect) -> Non
     for given_points in (points, *[None] * 14):
         seen = term.observe(frame(given_points, STATE))
         assert isinstance(seen, JointPointsObservation)
-        costs.append(float(seen.postures(STATE[None])[0]))
+        costs.append(float(rated(seen, STATE[None])[0]))
     assert (np.diff(costs) < 0.0).all()
     assert costs[-1] < 0.02 * costs[0]
     # An interval is 1/15 s; after a second they are forgotten.
-    assert [isinstance(term.observe(frame(None, STATE)), Silence) for _ in range(2)] == [
+    assert [term.observe(frame(None, STATE)) is None for _ in range(2)] == [
         False,
         True,
     ]
@@ -321,16 +347,16 @@ def test_points_of_an_earlier_frame_count_less_and_less(detected: Detect) -> Non
 def test_at_a_new_start_the_points_before_are_forgotten(detected: Detect) -> None:
     term = JointPoints().build(BODY, CAMERA)
     term.observe(frame(detected(BODY, CAMERA, STATE), STATE))
-    assert isinstance(term.observe(frame(None)), Silence)
+    assert term.observe(frame(None)) is None
 
 
 def test_left_and_right_are_exchanged_if_they_only_fit_so(detected: Detect) -> None:
     points = detected(BODY, CAMERA, STATE)
     wrong = exchanged(points)
     assert cost_of(wrong) > 50.0
-    assert observed(wrong, STATE).postures(STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
+    assert rated(observed(wrong, STATE), STATE[None])[0] == pytest.approx(0.0, abs=1e-9)
     # Without a posture before, nobody knows.
-    assert observed(wrong).postures(STATE[None])[0] > 50.0 * WEIGHT_PX
+    assert rated(observed(wrong), STATE[None])[0] > 50.0 * WEIGHT_PX
 
 
 def test_points_in_space_are_exchanged_with_the_others(detected: Detect) -> None:
@@ -338,7 +364,7 @@ def test_points_in_space_are_exchanged_with_the_others(detected: Detect) -> None
     points = replace(detected(GUESSED, CAMERA, STATE, 1.0), spatial_m=given_in_space(joints_m))
     other_m = given_in_space(joints_m[[3, 4, 5, 0, 1, 2]])
     wrong = replace(exchanged(points), spatial_m=other_m)
-    right, same = (observed(one, STATE, GUESSED).postures(STATE[None]) for one in (points, wrong))
+    right, same = (rated(observed(one, STATE, GUESSED), STATE[None]) for one in (points, wrong))
     np.testing.assert_allclose(same, right)
 
 
@@ -347,7 +373,7 @@ def test_hands_that_move_far_are_not_exchanged(detected: Detect) -> None:
     now = STATE.copy()
     now[8:12] = np.radians((120.0, 0.0, 0.0, 0.0))
     seen = observed(detected(BODY, CAMERA, now), STATE)
-    assert seen.postures(now[None])[0] == pytest.approx(0.0, abs=1e-9)
+    assert rated(seen, now[None])[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_points_of_somebody_else_are_not_used_unless_this_lasts(detected: Detect) -> None:
@@ -355,7 +381,7 @@ def test_points_of_somebody_else_are_not_used_unless_this_lasts(detected: Detect
     aside = detected(BODY, CAMERA, STATE)
     aside = replace(aside, px=aside.px + np.array([90.0, 0.0]))  # 0.7 m
     seen = [term.observe(frame(aside, STATE)) for _ in range(11)]
-    assert [isinstance(one, Silence) for one in seen] == [True] * 10 + [False]
+    assert [one is None for one in seen] == [True] * 10 + [False]
 
 
 def test_one_frame_of_the_person_begins_the_count_anew(detected: Detect) -> None:
@@ -366,12 +392,12 @@ def test_one_frame_of_the_person_begins_the_count_anew(detected: Detect) -> None
         seen = term.observe(frame(points, STATE))
     # The person's own points, of nine frames ago.
     assert isinstance(seen, JointPointsObservation)
-    np.testing.assert_array_equal(seen.evidence[0][1, :2], own.px[POINT_INDEX["left_elbow"]])
+    np.testing.assert_array_equal(seen.seen[0][1, :2], own.px[POINT_INDEX["left_elbow"]])
 
 
 def test_a_jump_of_one_joint_is_no_other_person(detected: Detect) -> None:
     points = moved(detected(BODY, CAMERA, STATE), "left_wrist", 200.0)
-    assert observed(points, STATE).postures(STATE[None])[0] == pytest.approx(0.9 * 16.0 * WEIGHT_PX)
+    assert rated(observed(points, STATE), STATE[None])[0] == pytest.approx(0.9 * 16.0 * WEIGHT_PX)
 
 
 def test_points_that_stay_exchanged_show_the_persons_back(detected: Detect) -> None:

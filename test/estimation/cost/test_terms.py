@@ -1,77 +1,77 @@
-"""Several terms as one: costs add up, whatever is asked; frames with other foreground."""
+"""Posed bodies, frames, and what a term says unless it overrides it."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
-from numpy.typing import NDArray
+import pytest
 
-from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.estimation.cost.terms import ArmCosts, Frame, SumOfTerms, TorsoCosts
+from cardbox_tracker.body.kinematics import pose
+from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.estimation.cost.drawn_body import body_tuple
+from cardbox_tracker.estimation.cost.terms import (
+    ARM,
+    TRUNK,
+    WHOLE,
+    Frame,
+    Posed,
+    TermObservation,
+)
+from cardbox_tracker.vision.camera import Camera
 
-Array = NDArray[np.float64]
-
-
-class Scaled:
-    """Costs that show who was asked for what."""
-
-    def __init__(self, factor: float) -> None:
-        self.factor = factor
-
-    def torsos_beside(self, arms: Array | None) -> TorsoCosts:
-        extra = 0.0 if arms is None else arms[4]
-        return lambda torsos: self.factor * (torsos[:, 0] + extra)
-
-    def arms_beside(self, torso: Array) -> ArmCosts:
-        sign = {"left": 1.0, "right": -1.0}
-        return lambda side, arms: self.factor * (sign[side] * arms[:, 1] + torso[2])
-
-    def postures(self, postures: Array) -> Array:
-        return self.factor * postures[:, 11]
+PITCH = 0.2
+CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5, PITCH)
+BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, camera_pitch_rad=PITCH)
+POSABLE = body_tuple(BODY, CAMERA)
+STATES = np.zeros((3, 14))
+STATES[:, [4, 8]] = np.radians([[20.0, 30.0], [86.0, 100.0], [149.0, 160.0]])
+STATES[:, 12:] = 0.2, -0.05
 
 
-POSTURES = np.arange(36.0).reshape(3, 12)
+def test_joints_are_those_of_pose_in_the_image_of_the_camera() -> None:
+    posed = Posed(POSABLE, STATES)
+    expected_m = CAMERA.reference_to_optical(pose(BODY, STATES).keypoints_m)
+    np.testing.assert_allclose(posed.keypoints_m, expected_m, atol=1e-12)
+    np.testing.assert_allclose(posed.keypoints_px, CAMERA.project(expected_m), atol=1e-9)
 
 
-def test_costs_add_up() -> None:
-    total = SumOfTerms((Scaled(1.0), Scaled(10.0), Scaled(100.0)))
-    for arms, extra in ((None, 0.0), (POSTURES[0], 4.0)):
-        costs = total.torsos_beside(arms)(POSTURES[:, :4])
-        assert costs.tolist() == [111 * (v + extra) for v in (0, 12, 24)]
-    rate = total.arms_beside(POSTURES[0, :4])
-    assert rate("left", POSTURES[:, 4:8]).tolist() == [111 * (v + 2) for v in (5, 17, 29)]
-    assert rate("right", POSTURES[:, 8:]).tolist() == [111 * (2 - v) for v in (9, 21, 33)]
-    assert total.postures(POSTURES).tolist() == [111 * v for v in (11, 23, 35)]
+@pytest.mark.parametrize(
+    ("parts", "known"),
+    [
+        (WHOLE, [0, 1, 2, 3, 4, 5]),
+        (TRUNK, [0, 3]),
+        (ARM[0], [0, 1, 2]),
+        (ARM[1], [3, 4, 5]),
+    ],
+)
+def test_joints_of_parts_that_do_not_count_are_nan(
+    parts: tuple[bool, bool, bool], known: list[int]
+) -> None:
+    points_m = Posed(POSABLE, STATES, parts).keypoints_m
+    assert np.flatnonzero(np.isfinite(points_m).all(axis=(0, 2))).tolist() == known
+    whole_m = Posed(POSABLE, STATES).keypoints_m
+    np.testing.assert_array_equal(points_m[:, known], whole_m[:, known])
 
 
-def test_a_single_term_is_itself() -> None:
-    alone, term = SumOfTerms((Scaled(3.0),)), Scaled(3.0)
-    expected = term.torsos_beside(None)(POSTURES[:, :4])
-    np.testing.assert_array_equal(alone.torsos_beside(None)(POSTURES[:, :4]), expected)
-    np.testing.assert_array_equal(alone.postures(POSTURES), term.postures(POSTURES))
+def test_shoulders_of_a_trunk_rise_with_the_arms_of_another_state() -> None:
+    trunks = Posed(POSABLE, STATES, TRUNK, lifted=STATES[2])
+    expected = STATES.copy()
+    expected[:, 4:12] = STATES[2, 4:12]
+    np.testing.assert_allclose(
+        trunks.keypoints_m[:, [0, 3]], Posed(POSABLE, expected).keypoints_m[:, [0, 3]], atol=1e-12
+    )
 
 
-def test_particles_are_not_written_to() -> None:
-    total = SumOfTerms((Scaled(1.0), Scaled(2.0)))
-    before = POSTURES.copy()
-    total.postures(POSTURES)
-    total.torsos_beside(None)(POSTURES[:, :4])
-    np.testing.assert_array_equal(POSTURES, before)
+def test_a_frame_has_what_its_channels_have() -> None:
+    silhouette, depth_m = np.zeros((240, 320), np.uint8), np.ones((240, 320), np.float32)
+    frame = Frame(CAMERA, {"silhouette": silhouette, "depth_m": depth_m, "mine": 7}, 200, 5)
+    assert frame.silhouette is silhouette and frame.depth_m is depth_m and frame["mine"] == 7
+    assert frame.image is None and frame.points is None and frame["yours"] is None
+    other = frame.changed(foreground_px=9)
+    assert (other.foreground_px, other.rows, other["mine"]) == (9, 200, 7)
 
 
-def test_a_frame_with_other_foreground_is_the_same_but_for_that() -> None:
-    image = np.zeros((4, 6), np.uint8)
-    points = ImagePoints(np.zeros((len(POINT_NAMES), 2)), np.ones(len(POINT_NAMES)))
-    depth_m = np.ones((4, 6), np.float32)
-    frame = Frame(image, 3, 7, image + 1, np.zeros(14), depth_m, 0.04, 123, points)
-    other = frame.with_foreground(5)
-    assert other.foreground_px == 5
-    for name in (field.name for field in fields(Frame) if field.name != "foreground_px"):
-        assert getattr(other, name) is getattr(frame, name)
-        assert getattr(frame, name) is not field_default(name)
-
-
-def field_default(name: str) -> object:
-    """The default of a field of frames, which would hide that it is left out."""
-    return next(field.default for field in fields(Frame) if field.name == name)
+def test_an_observation_says_nothing_unless_it_overrides() -> None:
+    nothing, posed = TermObservation(), Posed(POSABLE, STATES)
+    assert nothing.rate(posed).tolist() == [0.0, 0.0, 0.0]
+    assert nothing.residuals(posed) is None
+    assert not nothing.evidence(posed) and not nothing.locates
