@@ -18,8 +18,10 @@ from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed
 
 FOV = GivenCamera(fov_deg=60.0)
-IMAGES = "Images of rare kinds are read as what they show, or refused in words"
-VIDEOS = "A video that is damaged, or that lies about sizes and times, is read or refused in words"
+IMAGES = "Images of rare kinds are read as what they show, or refused with a reason"
+VIDEOS = (
+    "A video that is damaged, or that lies about sizes and times, is read or refused with a reason"
+)
 
 
 def encoded(extension: str, image: np.ndarray, *options: int) -> bytes:

@@ -15,7 +15,7 @@ from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.hand import HandFollower
 from cardbox_tracker.retargeting.robot import load_robot, parse_robot
 
-PROMISE = "A URDF of any size, depth or content is read or refused in words"
+PROMISE = "A URDF of any size, depth or content is read or refused with a reason"
 
 
 def chain(count: int, kind: str = "revolute", more: str = "") -> str:
