@@ -125,7 +125,7 @@ def test_yaml(text: str) -> None:
 
 
 @pytest.mark.promise(
-    "A damaged body model, in a file or on a topic, is read or refused with a reason"
+    "A damaged body model is read or refused with a reason"
 )
 @given(damaged_text(MODEL))
 @example(MODEL.replace("sizes:", "sizes: !!timestamp x\nold:"))
