@@ -79,8 +79,8 @@ def markdown_text() -> str:
         f"<!-- {_GENERATED} -->",
         "",
         "Set them in `config/<node>.yaml`, with `--ros-args -p name:=value`, or, where live, with",
-        '`ros2 param set`; "live" says when a change takes effect. A wrong value is refused with the',
-        "reason, and the old one stays. A whole number is taken for a float.",
+        '`ros2 param set`; "live" says when a change takes effect. A wrong value is refused with',
+        "the reason, and the old one stays. A whole number is taken for a float.",
         "[Topics](topics.md) says how to override the QoS of topics.",
     ]
     described: dict[tuple[str, str], str] = {}

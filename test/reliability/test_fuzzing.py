@@ -124,9 +124,7 @@ def test_yaml(text: str) -> None:
         parse_small_yaml(text)
 
 
-@pytest.mark.promise(
-    "A damaged body model is read or refused with a reason"
-)
+@pytest.mark.promise("A damaged body model is read or refused with a reason")
 @given(damaged_text(MODEL))
 @example(MODEL.replace("sizes:", "sizes: !!timestamp x\nold:"))
 @example(MODEL.replace("format:", "format: !!bool x\nold:"))
