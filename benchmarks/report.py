@@ -38,7 +38,7 @@ def report(results: Mapping[str, Any]) -> str:
         f"`{COMMAND}` made this page on {results['cpu']} with {results['cores']} cores; "
         f"{versions}; commit {results['commit']}. "
         "[benchmarks.json](benchmarks.json) has all numbers.",
-        "The first four tables were measured on one core, on "
+        "The first three tables were measured on one core, on "
         f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
         "compared trackers take turns of ten images. p95 is the 95th percentile.",
         "## One image",
@@ -51,23 +51,15 @@ def report(results: Mapping[str, Any]) -> str:
         "as long as the paper's settings, and the volumetric model of 42 planes "
         f"{results['ratio_volumetric']:.1f} times as long as the cardbox model of 15. The process "
         f"holds {results['rss_mb']:.0f} MB.",
-        "## Stages",
-        "The paper's settings, and the silhouette:",
-        _stages(results["stages"]),
-        "Parts of a frame with the preset `default`:",
+        "## Parts of a frame with the preset `default`",
         _stages(results["default_stages"]),
-        "## Resolution",
+        "## Resolution and particles",
         f"Twice the width and height take {results['ratio_double_resolution']:.2f} times as long.",
         _table(
             ("image", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
-        "## Particles",
         f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
-        _table(
-            ("particles in all filters", "median"),
-            [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
-        ),
         *_ratios(results.get("ratios")),
         *_nodes(results["nodes"]),
         *_way(results["way"]),
