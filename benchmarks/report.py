@@ -38,7 +38,7 @@ def report(results: Mapping[str, Any]) -> str:
         f"`{COMMAND}` made this page on {results['cpu']} with {results['cores']} cores; "
         f"{versions}; commit {results['commit']}. "
         "[benchmarks.json](benchmarks.json) has all numbers.",
-        "The first four tables were measured on one core, on "
+        "The first three tables were measured on one core, on "
         f"{results['measured_frames']} images (320x240) of a synthetic person who waves. The "
         "compared trackers take turns of ten images. p95 is the 95th percentile.",
         "## One image",
@@ -46,38 +46,27 @@ def report(results: Mapping[str, Any]) -> str:
             ("600 particles unless the preset says otherwise", "median", "p95"),
             [(_FRAMES[name], *_ms(times)) for name, times in results["frames"].items()],
         ),
-        f"The compiled cost makes an image {results['ratio_opencv']:.0f} times faster than "
-        "`fillConvexPoly`, XOR and `countNonZero` do. Drawn by the same compiled code, the "
-        f"volumetric model of 42 planes takes {results['ratio_volumetric']:.1f} times as long as "
-        f"the cardbox model of 15. The process holds {results['rss_mb']:.0f} MB.",
-        f"The preset `default` takes {results['ratio_default']:.1f} times as long as the paper's "
-        "settings.",
-        "## Stages",
-        "The paper's settings, and the silhouette:",
-        _stages(results["stages"]),
-        "Parts of a frame with the preset `default`:",
+        f"The compiled cost is {results['ratio_opencv']:.0f} times faster than `fillConvexPoly`, "
+        f"XOR and `countNonZero`. The preset `default` takes {results['ratio_default']:.1f} times "
+        "as long as the paper's settings, and the volumetric model of 42 planes "
+        f"{results['ratio_volumetric']:.1f} times as long as the cardbox model of 15. The process "
+        f"holds {results['rss_mb']:.0f} MB.",
+        "## Parts of a frame with the preset `default`",
         _stages(results["default_stages"]),
-        "## Resolution",
-        "The time of a particle grows with the rows of its outline, not with its area: twice the "
-        f"width and height take {results['ratio_double_resolution']:.2f} times as long.",
+        "## Resolution and particles",
+        f"Twice the width and height take {results['ratio_double_resolution']:.2f} times as long.",
         _table(
             ("image", "median", "p95"),
             [(name, *_ms(times)) for name, times in results["resolutions"].items()],
         ),
-        "## Particles",
         f"One core manages {results['particles_at_30hz']:,} particles per image at 30 Hz.",
-        _table(
-            ("particles in all filters", "median"),
-            [(count, f"{median_ms:.2f} ms") for count, median_ms in results["particles"].items()],
-        ),
         *_ratios(results.get("ratios")),
         *_nodes(results["nodes"]),
         *_way(results["way"]),
-        "A live node waits between images; meanwhile the processor slows down and its caches lose "
-        "the node's data. Image to posture, preset `default`, takes "
-        f"{results['after_pauses']['without_ms']:.1f} ms if images follow each other without a "
-        f"pause, and {results['after_pauses']['with_ms']:.1f} ms after a pause of a thirtieth of a "
-        "second, on the same core. The rest of the latency is DDS and the waking of processes.",
+        "In the pauses of a live node the processor slows down and its caches cool. Image to "
+        "posture, preset `default`, takes "
+        f"{results['after_pauses']['without_ms']:.1f} ms without pauses and "
+        f"{results['after_pauses']['with_ms']:.1f} ms after each thirtieth of a second.",
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -127,11 +116,10 @@ def _ratios(ratios: Mapping[str, Any] | None) -> list[str]:
     ]
     return [
         "## Ratios",
-        f"`python -m benchmarks.ratios` measures this table (commit {ratios['commit']}): times "
-        "that took turns in one run, on one core except the last. The silhouettes are those of "
-        "colour images. A start lasts until all nodes of a process wait for their input, with "
-        "compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and numpy. "
-        "`python -m benchmarks.silhouette RECORDING` measures the silhouettes of a recording.",
+        f"`python -m benchmarks.ratios` (commit {ratios['commit']}) measures times in turns, on "
+        "one core except the last. A start lasts until all nodes of a process wait for their "
+        "input, with compiled code in the cache; `imports` are those of rclpy, numba, OpenCV and "
+        "numpy. `python -m benchmarks.silhouette RECORDING` measures a recording's silhouettes.",
         _table(("ratio", "median"), rows),
     ]
 
@@ -142,9 +130,8 @@ def _nodes(nodes: Mapping[str, Any] | None) -> list[str]:
     return [
         "## Nodes",
         "Time from the image's stamp until the callback of a Python subscriber has the JointState, "
-        "over DDS, preset `default`; in brackets until the message is in the subscriber's process. "
-        "The publisher runs on the same machine. Large images use "
-        "`config/fastdds_large_images.xml`. Processor time is in percent of one core.",
+        "over DDS on one machine, preset `default`; in brackets until the message is in its "
+        "process. Processor time is in percent of one core.",
         "### Each node a process of its own",
         *_streams(nodes),
         "### All nodes in one process (`cardbox_nodes`)",
@@ -168,8 +155,7 @@ def _way(ways: Mapping[str, Any] | None) -> list[str]:
     ]
     return [
         "### Where the milliseconds are",
-        "Grey images of 320x240 at 30 Hz; median and 95th percentile of each step. The last rows "
-        "add up the steps of each image: the estimation (silhouette and posture), the rest, all.",
+        "Grey images of 320x240 at 30 Hz; median and 95th percentile of each step.",
         _table(("step", *ways), rows),
         f"![Medians of the steps]({PICTURE_OF_WAY})",
     ]
@@ -180,9 +166,8 @@ def _beside_detector(measured: Mapping[str, Any] | None) -> list[str]:
         return []
     return [
         "### Beside the node `detector`",
-        "The tracker also takes the detector's [points](detectors.md) when they come. The networks "
-        "do not recognize the drawn person, so each image is searched as a whole, which takes "
-        "about two thirds of the time that a person takes who is followed.",
+        "The tracker takes the detector's [points](detectors.md) when they come. The networks do "
+        "not recognize the drawn person; an image takes two thirds of the time of a person then.",
         *_streams(measured),
     ]
 

@@ -41,9 +41,8 @@ def _head(results: Results) -> Iterator[str]:
         yield from _section(
             f"# Evaluation on the recorded session {session['name']}",
             f"Each strategy tracked its {session['images']} images {results['runs']} times with "
-            "the parameters of the paper's Table I. Background and body were learned from the "
-            f"session's first seconds (IoU of the references: {fits}). The true joints are those "
-            "of a realistic body, so shoulders and hands are not exactly the model's points.",
+            "the parameters of the paper's Table I (IoU of the references: "
+            f"{fits}). The true joints are those of a realistic body, not the model's points.",
         )
         return
     plan = results["plan"]
@@ -51,14 +50,11 @@ def _head(results: Results) -> Iterator[str]:
     yield from _section(
         "# Evaluation: the paper's experiments on synthetic sessions",
         f"{results['runs']} runs of each strategy on each motion (experiments 1 to 3) with the "
-        "parameters of the paper's Table I, preset `paper`. The synthetic person has rounded "
-        "parts instead of patches, and its true posture is known. Images have noise; silhouettes "
-        "come from the background model and sizes from the initialization. The side experiments "
-        f"have fewer runs: {plan['side_runs']} (survival rate, schemes), "
-        f"{plan['particle_runs']} (particles), {plan['model_runs']} (volumetric model).{quick}",
-        "The state `lost` is switched off, because it would leave out the images in which a "
-        "strategy is worst. Errors are means over runs and images; ± is one standard error over "
-        "the runs.",
+        "parameters of the paper's Table I, preset `paper`, on a synthetic person with rounded "
+        f"parts. Fewer runs: {plan['side_runs']} (survival rate, schemes), "
+        f"{plan['particle_runs']} (particles), {plan['model_runs']} (volumetric model).{quick} The "
+        "state `lost` is switched off. Errors are means over runs and images; ± is one standard "
+        "error over the runs.",
     )
 
 
@@ -71,8 +67,8 @@ def _main(results: Results) -> Iterator[str]:
         ([m, s.upper(), *(_cm(c["error_m"][n]) for n in KEYPOINT_NAMES)] for m, s, c in cells),
     )
     yield from _section(
-        "MPJPE is the mean of the six; PA-MPJPE is the error after the best translation, rotation "
-        "and scale; then the error along each axis of the camera, cm:"
+        "MPJPE is the mean of the six, PA-MPJPE the error after the best translation, rotation "
+        "and scale, cm:"
     )
     yield from _table(
         ["motion", "", "MPJPE", "PA-MPJPE", *AXES],
@@ -82,16 +78,6 @@ def _main(results: Results) -> Iterator[str]:
             for m, s, c in cells
         ),
     )
-    angles = list(cells[0][2]["joint_angle_error_deg"])
-    if angles:
-        yield from _section("Mean joint-angle error, degrees:")
-        yield from _table(
-            ["angle", *(f"{m} {s.upper()}" for m, s, _ in cells)],
-            (
-                [f"`{angle}`", *(f"{c['joint_angle_error_deg'][angle]:.1f}" for *_, c in cells)]
-                for angle in angles
-            ),
-        )
     yield from _section(*(f"![3D error of each joint, {m}](error_{m}.png)" for m in motions))
     yield from _section("## 2. 2D error", "Mean cost of the system's output, pixels:")
     yield from _table(
@@ -105,14 +91,6 @@ def _main(results: Results) -> Iterator[str]:
     yield from _section(
         "![cost of each image](cost.png)",
         "## 3. Reproducibility",
-        "Standard deviation over the runs, averaged over the images, rad (m for `torso_y`); "
-        "bold where DRS is not below SRS:",
-    )
-    yield from _table(
-        ["joint", *(f"{m} {s.upper()}" for m, s, _ in cells)],
-        ([f"`{name}`", *_deviations(results, motions, name)] for name in JOINT_NAMES),
-    )
-    yield from _section(
         "One elbow angle, mean (solid) and one standard deviation to each side (dashed):",
         "![an elbow angle and its standard deviation](reproducibility.png)",
         "DRS is below SRS in so many of the joints and motions:",
@@ -143,19 +121,11 @@ def _below(
     return [text, count, *(f"{values.mean():.{digits}f}" for values in (drs, srs))]
 
 
-def _deviations(results: Results, motions: Sequence[str], name: str) -> Iterator[str]:
-    for m in motions:
-        drs, srs = (results[m][s]["std_dof"][name] for s in ("drs", "srs"))
-        yield f"{drs:.3f}" if drs < srs else f"**{drs:.3f}**"
-        yield f"{srs:.3f}"
-
-
 def _survival(results: Results) -> Iterator[str]:
     yield from _section(
         "## 4. Survival rate",
-        "The same e in all three filters. Slow: every image; fast: each third one, the same "
-        "motion three times as fast; very fast: each sixth. MPJPE in cm and cost in px, means "
-        "over the motions:",
+        "The same e in all three filters. Slow: every image; fast: each third one; very fast: each "
+        "sixth. MPJPE in cm and cost in px, means over the motions:",
     )
     speeds = list(results)
     yield from _table(
@@ -187,9 +157,8 @@ def _particles(results: Results) -> Iterator[str]:
 def _models(results: Results, timing: Results) -> Iterator[str]:
     yield from _section(
         "## 6. Cardbox against the volumetric model",
-        "OpenCV draws both from the same sizes, DRS, Table I; each part of the volumetric model "
-        "is a box that spans the patches of the cardbox, all faces drawn. The sizes were found "
-        "with the cardbox model, which favours it in the errors.",
+        "OpenCV draws both from the same sizes, DRS, Table I; a part of the volumetric model is a "
+        "box that spans the patches. Sizes were found with the cardbox model, which favours it.",
     )
     yield from _table(
         ["model", "planes", "us a particle", "MPJPE", "cost"],
@@ -199,9 +168,8 @@ def _models(results: Results, timing: Results) -> Iterator[str]:
         ),
     )
     yield from _section(
-        f"The tracker's compiled cost takes {timing['particle_us']['compiled']:.1f} us for the "
-        f"same posture, and an image with 600 particles {timing['frame_ms']:.1f} ms on one core "
-        "while the other cores are busy."
+        f"The compiled cost takes {timing['particle_us']['compiled']:.1f} us for the same posture, "
+        f"and an image with 600 particles {timing['frame_ms']:.1f} ms on one core."
     )
 
 
@@ -221,10 +189,9 @@ def _initialization(results: Results, timing: Results) -> Iterator[str]:
     fits = ", ".join(f"{n} {v:.2f}" for n, v in results["mean_iou"].items())
     yield from _section(
         "## 8. Initialization",
-        f"{results['bodies']} random people (1.55 to 1.9 m), each measured once with a seed of "
-        f"its own, and one person measured with {results['seeds']} seeds. The angles of the held "
-        f"postures miss by {results['posture_miss_deg']:g} degrees (standard deviation). Rounds "
-        f"in both passes together: {rounds}; IoU: {fits}. One search takes "
+        f"{results['bodies']} random people (1.55 to 1.9 m), measured once, and one person "
+        f"measured with {results['seeds']} seeds. The held postures miss by "
+        f"{results['posture_miss_deg']:g} degrees. Rounds: {rounds}; IoU: {fits}. One search takes "
         f"{search['median_s']:.2f} s (median; 95 % within {search['p95_s']:.2f} s). All in cm:",
     )
     yield from _table(
@@ -241,8 +208,8 @@ def _initialization(results: Results, timing: Results) -> Iterator[str]:
         ),
     )
     yield from _section(
-        "The straight edges of the patches, such as the depth of the head, have no exact "
-        "counterpart in images of a rounded person, which is part of the bias.",
+        "The straight edges of the patches have no exact counterpart in images of a rounded "
+        "person, which is part of the bias.",
         "![initialization](initialization.png)",
     )
 
@@ -250,10 +217,9 @@ def _initialization(results: Results, timing: Results) -> Iterator[str]:
 def _schemes(results: Results, variants: Results) -> Iterator[str]:
     yield from _section(
         "## 9. Standard resampling schemes, and the presets",
-        "Everything else as in Table I. The elite is the best particle, kept unchanged. MPJPE in "
-        "cm, cost in px, standard deviation over the runs in rad (mean of the 11 angles); means "
-        "over the motions. All but DRS draw from weights exp(-W^2 / (2 sigma_gamma^2)); Table I's "
-        "sigma_gamma of 8000 and 4000 pixels makes them nearly equal. DRS selects by rank.",
+        "Everything else as in Table I; the elite is the best particle, kept unchanged. MPJPE in "
+        "cm, cost in px, standard deviation over the runs in rad. All but DRS draw from weights "
+        "exp(-W^2 / (2 sigma_gamma^2)), which Table I's sigma_gamma makes nearly equal.",
     )
     yield from _table(
         ["scheme", "elite", "MPJPE", "cost", "std. dev."],
@@ -279,8 +245,7 @@ def _recorded(found: Mapping[str, Results]) -> Iterator[str]:
         return
     yield from _section(
         "## Recorded sessions",
-        "A realistic skinned body, compressed images; MPJPE in cm and cost in px. Each has a "
-        "report of its own.",
+        "A realistic skinned body, compressed images; MPJPE in cm and cost in px.",
     )
     yield from _table(
         ["session", "motion", "runs", "DRS MPJPE", "DRS cost", "SRS MPJPE", "SRS cost"],

@@ -41,7 +41,7 @@ def used(module: Path, **environment: str) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-@pytest.mark.promise("A damaged cache of compiled code ends no program")
+@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
 @pytest.mark.parametrize("ending", [".nbi", ".nbc"])
 def test_a_file_that_was_cut_off_is_made_again(ending: str, module: Path) -> None:
     assert used(module) == ("42\n", "")
@@ -147,7 +147,7 @@ def test_a_folder_of_our_own_is_used_where_numba_has_none(nowhere: Path) -> None
     assert sum(again.stats.cache_hits.values()) == 1
 
 
-@pytest.mark.promise("No cache of compiled code is used that others may write to")
+@pytest.mark.promise("No compiled code is run that is damaged or that others may have written")
 @pytest.mark.parametrize("planted", ["open to all", "a link", "somebody else's", "a file"])
 def test_a_folder_that_somebody_planted_is_not_used(
     planted: str, nowhere: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

@@ -93,7 +93,7 @@ def test_a_folder_in_place_of_a_file_is_refused(
     assert os.listdir(tmp_path) == ["folder"]
 
 
-@pytest.mark.promise("An output that is a link replaces the file it points to")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_a_link_is_followed_and_stays(tmp_path: Path) -> None:
     (tmp_path / "results").mkdir()
     target, link = tmp_path / "results" / "today.csv", tmp_path / "latest.csv"
@@ -115,7 +115,7 @@ def test_links_in_a_circle_are_refused(tmp_path: Path) -> None:
             use(first)
 
 
-@pytest.mark.promise("An output that is a pipe or a device is written to, not replaced")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     fifo, read = tmp_path / "table.csv", []
     os.mkfifo(fifo)
@@ -129,7 +129,7 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["table.csv"]
 
 
-@pytest.mark.promise("An output that is a pipe or a device is written to, not replaced")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_devices_stay_devices() -> None:
     check_writable("/dev/null")
     with atomic_path("/dev/null") as path:
@@ -162,7 +162,7 @@ def test_standard_output_gets_it_in_its_turn(name: str, tmp_path: Path) -> None:
         assert (text, done.stderr) == ("ready\nrow\nwritten\n", "")
 
 
-@pytest.mark.promise("No file that somebody planted is opened for writing")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_nothing_that_was_planted_is_opened(tmp_path: Path) -> None:
     """Whoever may write to the folder cannot know the temporary name before it is taken."""
     names = set()
@@ -191,7 +191,7 @@ def test_the_replaced_files_permissions_are_kept(tmp_path: Path) -> None:
     assert stat.S_IMODE(target.stat().st_mode) == 0o600
 
 
-@pytest.mark.promise("What a killed run left is removed by the next, and nothing else")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_what_a_killed_writer_left_is_removed_and_a_living_ones_is_not(tmp_path: Path) -> None:
     target = tmp_path / "person.csv"
     command = [sys.executable, "-c", WRITE, str(target), "wait"]

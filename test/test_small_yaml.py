@@ -79,7 +79,7 @@ def test_as_many_keys_as_fit_are_read() -> None:
     assert len(parse_small_yaml("".join(f"k{number:05d}: \n" for number in range(keys)))) == keys
 
 
-@pytest.mark.promise("YAML that stands for gigabytes is refused in little memory")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_what_is_refused_needs_little_memory() -> None:
     large = "x" * 50_000_000
     tracemalloc.start()
@@ -94,7 +94,7 @@ def test_what_is_refused_needs_little_memory() -> None:
         tracemalloc.stop()
 
 
-@pytest.mark.promise("No pipe or endless device holds up the reading of a file")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_a_pipe_is_not_waited_for_and_a_device_not_read(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)

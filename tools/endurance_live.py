@@ -81,12 +81,12 @@ def hour(record: Record, seconds: float) -> None:
                 {
                     "images sent": line.sent,
                     "images received by `background`": background["received"],
-                    "images left out on the way, and told": background["told"],
-                    "images left out in silence": background["silent"],
+                    "images left out on the way and reported": background["told"],
+                    "images left out without a report": background["silent"],
                     "silhouettes sent by `background`": background["published"],
                     "silhouettes received by `tracker`": tracker["received"],
-                    "silhouettes left out on the way, and told, with those images": tracker["told"],
-                    "silhouettes left out in silence": tracker["silent"],
+                    "silhouettes left out and reported, with those images": tracker["told"],
+                    "silhouettes left out without a report": tracker["silent"],
                     "images with the person": len(shown),
                     "of these with a posture": len(line.answered & set(shown)),
                     "postures of an empty room": len(line.answered - set(shown)),
@@ -133,9 +133,9 @@ def eight(record: Record, seconds: float) -> None:
                     "images sent": sum(one["sent"] for one in told),
                     "images received": sum(one["received"] for one in told),
                     "images answered": sum(states.values()),
-                    "images left out, and told": sum(one["told"] for one in told),
-                    "images left out in silence": sum(one["silent"] for one in told),
-                    "most in silence at one tracker": max(one["silent"] for one in told),
+                    "images left out and reported": sum(one["told"] for one in told),
+                    "images left out without a report": sum(one["silent"] for one in told),
+                    "most without a report at one tracker": max(one["silent"] for one in told),
                     "trackers that warn that they are slow": sum(
                         any("results come" in text for text in cameras.warnings(f"{one}/tracker"))
                         for one in names

@@ -79,29 +79,32 @@ def markdown_text() -> str:
         f"<!-- {_GENERATED} -->",
         "",
         "Set them in `config/<node>.yaml`, with `--ros-args -p name:=value`, or, where live, with",
-        '`ros2 param set`; the column "live" says when a change takes effect, or "no" where a',
-        "parameter can only be given at the start. A wrong value is refused with the reason, and",
-        "the old one stays. A whole number is taken for a float. Every topic's QoS can be",
-        "overridden at the start with",
-        "`qos_overrides.<topic>.<publisher|subscription>.<reliability|depth|history|durability>`.",
+        '`ros2 param set`; "live" says when a change takes effect. A wrong value is refused with',
+        "the reason, and the old one stays. A whole number is taken for a float.",
+        "[Topics](topics.md) says how to override the QoS of topics.",
     ]
+    described: dict[tuple[str, str], str] = {}
     for node, kind in NODES.items():
         lines += ["", f"## {node}", "", f"{kind.__doc__}", ""]
-        lines += ["| name | type | default | unit | allowed | live | what it does |"]
-        lines += ["|---|---|---|---|---|---|---|"]
+        lines += ["| name | default | allowed | live | effect |", "|---|---|---|---|---|"]
         types = kind.types()
         for name, spec in kind.specs().items():
-            live = "no" if spec.read_only else spec.effect
-            description = spec.description
+            first = described.setdefault((name, spec.description), node)
+            description = spec.description if first == node else f"as of `{first}`"
             if spec.was:
                 description += f" (was `{spec.was}`, which works in this version too)"
-            allowed = spec.range_text.replace("|", "\\|")
-            default = yaml_value(default_of(kind, name))
-            lines.append(
-                f"| `{name}` | {type_name(types[name])} | `{default}` | {spec.unit} "
-                f"| {allowed} | {live} | {description} |"
-            )
+            value = default_of(kind, name)
+            default = f"`{yaml_value(value)}`"
+            if value == []:
+                default += f" ({type_name(types[name])})"
+            live = "no" if spec.read_only else spec.effect
+            lines.append(f"| `{name}` | {default} | {_allowed(spec)} | {live} | {description} |")
     return "\n".join([*lines, *_settings_section()]) + "\n"
+
+
+def _allowed(spec: Any) -> str:
+    """Return the allowed values of a parameter or setting with their unit."""
+    return f"{spec.range_text.replace(' | ', ', ')} {spec.unit}".strip()
 
 
 def _settings_section() -> list[str]:
@@ -115,19 +118,15 @@ def _settings_section() -> list[str]:
         "`torso`, `arm`, `strategy`, `cycles`, `average` and `torso_beside_arms` are of the preset",
         "`paper`, `whole_body` of the preset `default`; those of the other preset are refused.",
         "",
-        "| name | type | default | unit | allowed | what it does |",
-        "|---|---|---|---|---|---|",
+        "| name | default | allowed | effect |",
+        "|---|---|---|---|",
     ]
     return lines + list(_settings_rows(TrackerConfig(terms=(InnerCue(), Depth()))))
 
 
 def _settings_rows(settings: Any) -> Iterator[str]:
     for name, value, spec in settings_below(settings):
-        allowed = spec.range_text.replace("|", "\\|")
-        yield (
-            f"| `{name}` | {type(value).__name__} | `{yaml_value(value)}` | {spec.unit} "
-            f"| {allowed} | {spec.description} |"
-        )
+        yield f"| `{name}` | `{yaml_value(value)}` | {_allowed(spec)} | {spec.description} |"
 
 
 def files() -> dict[str, str]:

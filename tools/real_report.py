@@ -88,7 +88,7 @@ VARIANTS = (
     Variant("fitted, the detector's masks and points", "detector", points=True),
 )
 SHOWN = VARIANTS[3]
-"""The variant that is reported by clip and drawn."""
+"""The variant that is drawn."""
 
 
 @dataclass(frozen=True)
@@ -172,16 +172,6 @@ def _iou(cost: WholeBodyCost, estimate: Estimate, mask: Image) -> float:
     return iou_of(cost.silhouette_px, rated.areas_px[0], rated.costs_px[0])
 
 
-def silhouette_iou(frames: Frames, silhouettes: str) -> FloatArray:
-    """Return the overlap (N,) of silhouettes and MediaPipe's masks."""
-    found = []
-    for i, mask in enumerate(frames.masks):
-        seen = _silhouette(frames, Variant("", silhouettes), i)
-        union = np.count_nonzero(seen | mask)
-        found.append(np.count_nonzero(seen & mask) / union if union else np.nan)
-    return np.array(found)
-
-
 def cells(runs: list[Run], chosen: NDArray[np.bool_]) -> list[str]:
     """Return the figures of the chosen frames (N,), as means over the runs."""
     errors = np.concatenate([run.errors_px[chosen] for run in runs])
@@ -213,20 +203,6 @@ def report(
     yield "|---|" + "---|" * 6
     for variant, runs in results.items():
         yield f"| {variant.name} | " + " | ".join(cells(runs, everything)) + " |"
-    yield ""
-    yield "By clip, of the row in bold:"
-    yield ""
-    ious = {kind: silhouette_iou(frames, kind) for kind in ("ours", "region")}
-    yield f"| clip | {_HEADER} | silhouette's IoU | of its largest region |"
-    yield "|---|" + "---|" * 8
-    for clip in clips:
-        chosen = frames.clips == clip
-        line = [*cells(results[SHOWN], chosen)]
-        line += [f"{np.nanmean(values[chosen]):.2f}" for values in ious.values()]
-        yield f"| {clip} | " + " | ".join(line) + " |"
-    line = [*cells(results[SHOWN], everything)]
-    line += [f"{np.nanmean(values):.2f}" for values in ious.values()]
-    yield "| **all** | " + " | ".join(line) + " |"
     yield ""
 
 

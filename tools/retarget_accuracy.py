@@ -3,8 +3,8 @@
 python -m tools.retarget_accuracy SESSION...
 
 Each session is a folder with ``bag/`` and ``ground_truth.json``. The robot is
-``config/example_arm.urdf``, once for each arm of the person. The table replaces that between the
-marks in ``docs/retargeting.md``.
+``config/example_arm.urdf``, once for each arm of the person. The table of the means replaces that
+between the marks in ``docs/retargeting.md``; the errors of each session are printed.
 """
 
 from __future__ import annotations
@@ -174,8 +174,7 @@ def main(args: list[str] | None = None) -> int:
     for folder in given.sessions:
         session = load_session(folder)
         found.append(hand_errors(session, preset, given.seed, robot, configs))
-        rows.append(row(session.name, found[-1][0]))
-        print(rows[-1], flush=True)
+        print(row(session.name, found[-1][0]), flush=True)
     for config, errors in zip(configs, zip(*found, strict=True), strict=True):
         name = f"**mean**, `max_stddev_rad` {config.max_stddev_rad:g}"
         rows.append(row(name, mean_of(errors)))

@@ -2,8 +2,8 @@
 
 python -m tools.rula_accuracy SESSION...
 
-Each session is a folder with ``bag/`` and ``ground_truth.json``. The table replaces that between
-the marks in the document.
+Each session is a folder with ``bag/`` and ``ground_truth.json``. The table of the means replaces
+that between the marks in the document; the errors of each session are printed.
 """
 
 from __future__ import annotations
@@ -182,8 +182,7 @@ def main(args: list[str] | None = None) -> int:
         for task, way in found:
             found[task, way].append(errors[task][way])
         for task in TASKS:
-            rows.append(row(session.name, task, "particles", errors[task]["particles"]))
-            print(rows[-1], flush=True)
+            print(row(session.name, task, "particles", errors[task]["particles"]), flush=True)
     rows += [row("**mean**", *which, mean_of(errors)) for which, errors in found.items()]
     text = DOCUMENT.read_text(encoding="utf-8")
     table = "\n".join(rows)

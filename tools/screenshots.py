@@ -1,8 +1,8 @@
 """Write the images of the documents: ``python -m tools.screenshots --output docs/images``.
 
 The tool records a synthetic session, measures its person and tracks it, without ROS; the same seed
-gives the same images. ``tracking.jpg`` has a moment of each motion, ``steps.jpg`` an image, its
-silhouette and the model over it, ``guidance.jpg`` the guidance while a person is measured.
+gives the same images. ``steps.jpg`` has an image, its silhouette and the model over it,
+``guidance.jpg`` the guidance while a person is measured.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from cardbox_tracker.files import atomic_path
 from cardbox_tracker.progress import progress_bar
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording
-from cardbox_tracker.recordings.silhouettes import RecordedFrame, SilhouetteSource, TimeSpan
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.simulation.motions import Segment, timeline
 from cardbox_tracker.simulation.session import synthesize_session
 
 _SCALE = 2
 _QUALITY = 82
 _WIDTH_PX = 1200
-# The moment of each motion that is shown, as a fraction of its length.
-_MOMENTS = {"wave": 0.53, "bend": 0.63, "bow": 0.45}
+# The moment that is shown, as a fraction of the motion's length.
+_SHOWN = ("wave", 0.53)
 # Reference, seconds before it is held, and seconds of the count-down. The person is on the way to
 # the posture or in it, so that the outline has several colours.
 _GUIDED = (("front", -0.3, 1), ("side", 0.9, 3), ("arms", 0.45, 2))
@@ -74,30 +74,16 @@ def _shots(
 ) -> dict[str, ImageArray]:
     spans = {name: _inside(segments[name]) for name in REFERENCE_NAMES}
     result = initialize_from_recording(source, spans, InitializationConfig(2.0, seed=seed))
-    moments = {
-        motion: segments[motion].start_s
-        + part * (segments[motion].end_s - segments[motion].start_s)
-        for motion, part in _MOMENTS.items()
-    }
-    overlays: dict[str, ImageArray] = {}
-    frames: dict[str, RecordedFrame] = {}
-    rng = np.random.default_rng(seed)
-    tracker = Tracker(result.body, source.camera, PRESETS["default"](), rng)
-    span = segments["neutral"].start_s, max(moments.values()) + 1.0
-    for frame in source.frames(*span):
+    motion, part = _SHOWN
+    shown_s = segments[motion].start_s + part * (segments[motion].end_s - segments[motion].start_s)
+    tracker = Tracker(result.body, source.camera, PRESETS["default"](), np.random.default_rng(seed))
+    for frame in source.frames(segments["neutral"].start_s, shown_s + 1.0):
         estimate = tracker.track(frame.silhouette, frame.image, frame.stamp_ns)
-        for motion, time_s in moments.items():
-            if motion not in overlays and frame.time_s >= time_s - 1e-6:
-                frames[motion] = frame
-                overlays[motion] = draw_overlay(
-                    frame.picture, result.body, tracker.camera, estimate, _SCALE
-                )
-    steps = [frames["wave"].brightness, frames["wave"].silhouette]
-    return {
-        "tracking": _row([overlays[motion] for motion in _MOMENTS]),
-        "steps": _row([*map(_large, steps), overlays["wave"]]),
-        "guidance": _guidance(source, segments),
-    }
+        if frame.time_s >= shown_s - 1e-6:
+            break
+    overlay = draw_overlay(frame.picture, result.body, tracker.camera, estimate, _SCALE)
+    steps = _row([_large(frame.brightness), _large(frame.silhouette), overlay])
+    return {"steps": steps, "guidance": _guidance(source, segments)}
 
 
 def _guidance(source: SilhouetteSource, segments: Mapping[str, Segment]) -> ImageArray:

@@ -32,12 +32,13 @@ def _row(entry: Entry) -> str:
 
 
 def document(text: str) -> str:
-    """Return the document ``text`` with the present tables.
+    """Return the document ``text`` with the present tables, without ``/diagnostics`` of all nodes.
 
     Raises:
         CardboxError: it lacks the marks of a table.
     """
-    for label, found in groupby(entries(), _label):
+    shown = (entry for entry in entries() if entry.name != "/diagnostics")
+    for label, found in groupby(shown, _label):
         head = _SERVICES if "services" in label else _TOPICS
         table = "\n".join([*head, *map(_row, found)])
         text = replaced(text, table, f"<!-- {label}:begin -->", f"<!-- {label}:end -->")

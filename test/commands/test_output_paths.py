@@ -16,7 +16,7 @@ from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.recordings.bag_writer import BagWriter
 
 
-@pytest.mark.promise("No command writes what it reads")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_an_input_is_refused_by_whatever_name(tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     recording = tmp_path / "bag" / "bag.mcap"
@@ -87,7 +87,7 @@ sys.exit(main.main(["synthesize", "--output", sys.argv[1]]))
 """
 
 
-@pytest.mark.promise("SIGINT, SIGTERM and SIGHUP leave nothing half written")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
     command = [sys.executable, "-c", SLOW, str(tmp_path)]

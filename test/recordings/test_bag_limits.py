@@ -69,7 +69,7 @@ def test_what_is_compressed_comes_back(name: str, frames: int) -> None:
     assert unpack(pack(data) * frames, frames * len(data)) == data * frames
 
 
-@pytest.mark.promise("A small recording does not unpack to gigabytes")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 @pytest.mark.parametrize("name", CODECS)
 def test_a_chunk_that_holds_more_than_it_says_is_not_unpacked(name: str) -> None:
     pack, unpack = CODECS[name]
@@ -85,7 +85,7 @@ def test_a_chunk_that_holds_more_than_it_says_is_not_unpacked(name: str) -> None
         tracemalloc.stop()
 
 
-@pytest.mark.promise("A small recording does not unpack to gigabytes")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 @pytest.mark.parametrize("size", [2 * bag_limits.MOST_BYTES, 2**63])
 def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Path) -> None:
     file = mcap_of(record(tmp_path / "bag"))
@@ -100,7 +100,7 @@ def test_a_chunk_that_says_it_holds_gigabytes_is_refused(size: int, tmp_path: Pa
             pytest.fail("it was opened")
 
 
-@pytest.mark.promise("A small recording does not unpack to gigabytes")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_the_stated_size_is_the_limit_while_messages_are_read(tmp_path: Path) -> None:
     file = mcap_of(record(tmp_path / "bag"))
     data = bytearray(file.read_bytes())
@@ -115,7 +115,7 @@ def test_the_stated_size_is_the_limit_while_messages_are_read(tmp_path: Path) ->
         list(bag.messages())
 
 
-@pytest.mark.promise("A small recording does not unpack to gigabytes")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_many_chunks_that_are_large_together_are_refused(tmp_path: Path) -> None:
     chunk = struct.pack("<BQQQQIIQ", 0x06, 40, 0, 0, bag_limits.MOST_BYTES // 3, 0, 0, 0)
     (tmp_path / "bag.mcap").write_bytes(b"\x89MCAP0\r\n" + chunk * 4)
@@ -168,7 +168,7 @@ def folder_with_metadata_pipe(path: Path) -> Path:
     return pipe(path / "metadata.yaml").parent
 
 
-@pytest.mark.promise("No pipe or endless device holds up the reading of a file")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 @pytest.mark.parametrize("make", [pipe, folder_with_pipes, folder_with_metadata_pipe])
 def test_a_pipe_is_not_waited_for(make: Callable[[Path], Path], tmp_path: Path) -> None:
     path = make(tmp_path / "bag")
@@ -185,7 +185,7 @@ def test_a_pipe_is_not_waited_for(make: Callable[[Path], Path], tmp_path: Path) 
     assert told and ("pipe" in told[0] or "is not a file" in told[0])
 
 
-@pytest.mark.promise("Broken images of a recording are left out, counted and named")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 def test_broken_images_are_left_out_counted_and_named(tmp_path: Path) -> None:
     with BagReader(record(tmp_path / "bag", broken=(6, 9))) as bag:
         source = SilhouetteSource(bag, TimeSpan(0.0, 0.5))

@@ -18,8 +18,7 @@ from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.vision.encodings import decode_as_sent, decode_compressed
 
 FOV = GivenCamera(fov_deg=60.0)
-IMAGES = "Images of rare kinds are read as what they show, or refused in words"
-VIDEOS = "A video that is damaged, or that lies about sizes and times, is read or refused in words"
+READ = "Any damaged or hostile input is read or refused with a reason"
 
 
 def encoded(extension: str, image: np.ndarray, *options: int) -> bytes:
@@ -52,7 +51,7 @@ KINDS: dict[str, Callable[[np.ndarray], bytes]] = {
 }
 
 
-@pytest.mark.promise(IMAGES)
+@pytest.mark.promise(READ)
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_image_shows_what_it_shows(kind: str) -> None:
     shape = (5, 7) if kind == "odd" else (48, 64)
@@ -66,7 +65,7 @@ def test_an_image_shows_what_it_shows(kind: str) -> None:
     assert max(error[:, : edge - 2].max(), error[:, edge + 2 :].max()) <= 12
 
 
-@pytest.mark.promise(IMAGES)
+@pytest.mark.promise(READ)
 @pytest.mark.parametrize("size", [(1, 1), (7, 5), (1, 65_000)])
 @pytest.mark.parametrize("extension", [".jpg", ".png"])
 def test_odd_sizes_are_read(extension: str, size: tuple[int, int], tmp_path: Path) -> None:
@@ -77,7 +76,7 @@ def test_odd_sizes_are_read(extension: str, size: tuple[int, int], tmp_path: Pat
         assert image.as_sent.shape == (size[1], size[0], 3)
 
 
-@pytest.mark.promise(IMAGES)
+@pytest.mark.promise(READ)
 def test_why_no_image_of_a_folder_can_be_read_is_told(tmp_path: Path) -> None:
     (tmp_path / "1.png").write_bytes(encoded(".png", np.zeros((6000, 8000), np.uint8)))
     with (
@@ -87,7 +86,7 @@ def test_why_no_image_of_a_folder_can_be_read_is_told(tmp_path: Path) -> None:
         pass
 
 
-@pytest.mark.promise(IMAGES)
+@pytest.mark.promise(READ)
 @pytest.mark.parametrize("big", [False, True])
 @pytest.mark.parametrize("padding", [0, 1, 13])
 def test_padded_rows_in_either_byte_order(padding: int, big: bool) -> None:
@@ -122,7 +121,7 @@ def in_box(data: bytearray, box: bytes, offset: int, value: int) -> None:
     struct.pack_into(">I", data, data.index(box) + offset, value)
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 @pytest.mark.parametrize(
     ("box", "offset", "value", "count"),
     [
@@ -149,7 +148,7 @@ def test_numbers_of_a_video_that_cannot_be(
         assert count in (None, len(stamps))
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 def test_images_of_a_video_that_claim_a_huge_size_are_refused(tmp_path: Path) -> None:
     data = film(tmp_path / "film.avi", 3)
     at = -1
@@ -160,7 +159,7 @@ def test_images_of_a_video_that_claim_a_huge_size_are_refused(tmp_path: Path) ->
         read(tmp_path / "film.avi")
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 @pytest.mark.parametrize("suffix", [".mp4", ".avi"])
 @pytest.mark.parametrize("seed", range(10))
 def test_a_damaged_video(tmp_path: Path, suffix: str, seed: int) -> None:
@@ -175,13 +174,13 @@ def test_a_damaged_video(tmp_path: Path, suffix: str, seed: int) -> None:
         assert 0 < len(str(error)) < 2000
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 def test_an_8k_video_is_read(tmp_path: Path) -> None:
     film(tmp_path / "film.mp4", 2, 7680, 4320)
     assert len(read(tmp_path / "film.mp4")) == 2
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 def test_the_images_of_a_variable_rate_have_their_own_times(tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     data = film(path, 12)
@@ -203,7 +202,7 @@ def test_the_images_of_a_variable_rate_have_their_own_times(tmp_path: Path) -> N
     np.testing.assert_allclose(np.array(read(path)) / 1e9, expected, atol=1e-3)
 
 
-@pytest.mark.promise(VIDEOS)
+@pytest.mark.promise(READ)
 def test_a_video_of_16_bit_is_read_as_8(tmp_path: Path) -> None:
     path = tmp_path / "film.mkv"
     code = cv2.VideoWriter.fourcc(*"FFV1")

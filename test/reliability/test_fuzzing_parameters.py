@@ -46,7 +46,7 @@ def parameters(ros_domains: Iterator[int]) -> Iterator[dict[str, tuple[Any, Any]
     context.try_shutdown()
 
 
-@pytest.mark.promise("Any value of any parameter is taken or refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @given(st.lists(st.tuples(NAMES, VALUES), min_size=1, max_size=3))
 def test_parameters(
     parameters: dict[str, tuple[Any, Any]], given: list[tuple[tuple[str, str], Any]]

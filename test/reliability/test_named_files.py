@@ -81,7 +81,7 @@ def noise(path: Path) -> None:
     path.write_bytes(np.random.default_rng(0).bytes(5000))
 
 
-@pytest.mark.promise("Of every file that a user names, only a regular one of some size is read")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("make", [pipe, endless, huge, Path.mkdir, circle, noise, Path.touch])
 @pytest.mark.parametrize("kind", READERS)

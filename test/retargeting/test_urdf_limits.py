@@ -15,7 +15,7 @@ from cardbox_tracker.retargeting.config import RetargetConfig
 from cardbox_tracker.retargeting.hand import HandFollower
 from cardbox_tracker.retargeting.robot import load_robot, parse_robot
 
-PROMISE = "A URDF of any size, depth or content is read or refused in words"
+PROMISE = "Any damaged or hostile input is read or refused with a reason"
 
 
 def chain(count: int, kind: str = "revolute", more: str = "") -> str:
@@ -55,7 +55,7 @@ def test_what_is_too_large_is_refused_at_once(name: str, monkeypatch: pytest.Mon
         parse_robot(text, "arm.urdf")
 
 
-@pytest.mark.promise("No pipe or endless device holds up the reading of a file")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_only_a_file_of_some_size_is_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("/dev/zero")

@@ -27,7 +27,7 @@ def nodes(tmp_path: Path) -> Iterator[InsideNodes]:
 QUICK = [name for name in FAULTS if name != "200 images a second"]
 
 
-@pytest.mark.promise("After any fault of the stream the posture is right within a second")
+@pytest.mark.promise("After any fault or crash the posture is right within a second")
 @pytest.mark.parametrize("fault", QUICK)
 def test_tracking_goes_on_after_a_fault(nodes: InsideNodes, fault: str) -> None:
     sent = run_of(FAULTS[fault])
@@ -37,7 +37,7 @@ def test_tracking_goes_on_after_a_fault(nodes: InsideNodes, fault: str) -> None:
     assert verdict.is_good, verdict
 
 
-@pytest.mark.promise("After a crash the posture is right within a second of the restart")
+@pytest.mark.promise("After any fault or crash the posture is right within a second")
 def test_tracking_goes_on_after_both_nodes_were_killed(nodes: InsideNodes) -> None:
     sent = run_of(lambda images, _: [])
     nodes.send_all(sent[0])

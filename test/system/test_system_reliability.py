@@ -209,7 +209,7 @@ def judged(live: Live, name: str, fault: Callable[..., list[Sent]], during: Any 
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("After any fault of the stream the running nodes track again within a second")
+@pytest.mark.promise("After any fault or crash the posture is right within a second")
 def test_faults_of_the_stream(live: Live) -> None:
     verdicts = [judged(live, name, fault) for name, fault in FAULTS.items()]
     print(*verdicts, sep="\n")
@@ -221,7 +221,7 @@ READY = {"background": "background read", "tracker": "tracking starts", "initial
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("After kill -9 of a node tracking goes on within a second of its restart")
+@pytest.mark.promise("After any fault or crash the posture is right within a second")
 @pytest.mark.parametrize("name", SERVICES)
 def test_a_killed_node(live: Live, name: str) -> None:
     def restart(images: list[Sent]) -> list[Sent]:
@@ -253,7 +253,7 @@ rclpy.spin(node)
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("A subscriber that hangs holds up nobody")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_a_frozen_subscriber(live: Live) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(live.graph.domain)}
     frozen = subprocess.Popen([sys.executable, "-c", FROZEN], env=environment)
@@ -277,7 +277,7 @@ def test_a_frozen_subscriber(live: Live) -> None:
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("Services in the wrong order and twice at once are answered, tracking goes on")
+@pytest.mark.promise("Signals and requests at any time are answered, without a traceback")
 def test_services_in_the_wrong_order(live: Live) -> None:
     names = [f"initializer/capture_{name}" for name in ("arms", "side", "side")]
     names += ["initializer/initialize", "initializer/initialize", "tracker/reset", "tracker/reset"]
@@ -300,7 +300,7 @@ def test_services_in_the_wrong_order(live: Live) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.promise("Resets, parameters, models and images at once: all is answered, none crashes")
+@pytest.mark.promise("Signals and requests at any time are answered, without a traceback")
 @pytest.mark.parametrize("live", LAYOUTS, indirect=True)
 def test_all_at_once(live: Live) -> None:
     chance = random.Random(0)
@@ -361,7 +361,7 @@ def test_all_at_once(live: Live) -> None:
 
 @LONG
 @pytest.mark.slow
-@pytest.mark.promise("Images at 60 Hz through the nodes: memory, files, threads and latency stay")
+@pytest.mark.promise("Memory, files, threads and latency stay in long runs")
 @pytest.mark.parametrize("live", LAYOUTS, indirect=True)
 def test_nodes_for_long(live: Live, request: pytest.FixtureRequest) -> None:
     seconds = max(20.0, 600.0 * SHARE)
@@ -401,7 +401,7 @@ def test_nodes_for_long(live: Live, request: pytest.FixtureRequest) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.promise("Images through the core: memory, files, threads and latency stay")
+@pytest.mark.promise("Memory, files, threads and latency stay in long runs")
 def test_the_core_for_long(request: pytest.FixtureRequest) -> None:
     person = Person()
     silhouettes = [person.silhouette(1.0 + i / 15) for i in range(120)]

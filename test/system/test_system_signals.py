@@ -57,7 +57,7 @@ def end_early(name: str, arguments: list[str], number: int, stage: str) -> tuple
     return process.returncode, said
 
 
-@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
+@pytest.mark.promise("Signals and requests at any time are answered, without a traceback")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -69,7 +69,7 @@ def test_a_node_that_is_starting_ends(name: str, number: int, stage: str) -> Non
     assert code == 0 or (name in ("camera", "play_bag", "retarget") and code in (1, -number))
 
 
-@pytest.mark.promise("Ctrl-C and SIGTERM end a program at any time, without a traceback")
+@pytest.mark.promise("Signals and requests at any time are answered, without a traceback")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("stage", ["", "numpy"])
 def test_a_command_that_is_starting_ends(number: int, stage: str, tmp_path: Path) -> None:

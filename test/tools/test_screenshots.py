@@ -13,7 +13,7 @@ from cardbox_tracker.drawing.overlay import OUTLINE_BGR
 from cardbox_tracker.errors import CardboxError
 from tools.screenshots import write_screenshots
 
-NAMES = ["guidance", "steps", "tracking"]
+NAMES = ["guidance", "steps"]
 COMMITTED = Path(__file__).parents[2] / "docs" / "images"
 
 
@@ -35,7 +35,7 @@ def near(image: np.ndarray, colour: tuple[int, int, int]) -> int:
 def test_every_image_is_made_and_shows_what_it_is_about(images: dict[str, Path]) -> None:
     assert sorted(images) == NAMES
     shown = {name: cv2.imread(str(path)) for name, path in images.items()}
-    assert near(shown["tracking"], OUTLINE_BGR) > 1000
+    assert near(shown["steps"], OUTLINE_BGR) > 1000
     for colour in FIT_BGR.values():
         assert near(shown["guidance"], colour) > 1000
     white = shown["steps"][:, shown["steps"].shape[1] // 3 : 2 * shown["steps"].shape[1] // 3]

@@ -67,7 +67,7 @@ def test_what_is_no_depth_is_refused(encoding: str, pixels: np.ndarray | None) -
         unpack_depth(data, encoding)
 
 
-@pytest.mark.promise("An image that is too large is refused before it is decoded")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 @pytest.mark.parametrize(("width", "height"), [(20_000, 15_000), (60_000, 60_000), (2**31, 1)])
 @pytest.mark.parametrize("kind", ["16UC1", "32FC1"])
 def test_a_depth_image_too_large_is_refused_before_memory_is_taken(
@@ -100,7 +100,7 @@ def test_broken_bytes_are_refused(data: bytes, is_begun: bool) -> None:
         unpack_depth(begun + data, "16UC1; compressedDepth png")
 
 
-@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+@pytest.mark.promise("Depth in another unit or of another view is refused with a reason")
 @pytest.mark.parametrize("packing", ["32FC1", "32FC1; compressedDepth png"])
 def test_millimetres_for_metres_are_told(packing: str) -> None:
     depth = np.full((4, 6), 2300.0, np.float32)
@@ -115,7 +115,7 @@ def test_millimetres_for_metres_are_told(packing: str) -> None:
         depth_from_image(message)
 
 
-@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+@pytest.mark.promise("Depth in another unit or of another view is refused with a reason")
 def test_depth_of_32_bit_that_is_labelled_as_16_is_told() -> None:
     message = raw_depth(np.full((4, 6), 2.3))
     message.encoding = "16UC1"
@@ -128,7 +128,7 @@ def test_depth_of_32_bit_that_is_labelled_as_16_is_told() -> None:
     np.testing.assert_allclose(depth_from_image(message), np.full((4, 6), 2.3))
 
 
-@pytest.mark.promise("Depth of another view than the camera's is refused in words")
+@pytest.mark.promise("Depth in another unit or of another view is refused with a reason")
 @pytest.mark.parametrize(
     ("size", "is_same"),
     [((640, 480), True), ((160, 120), True), ((640, 360), False), ((1280, 1024), False)],

@@ -92,7 +92,7 @@ def chain_of(step: np.ndarray) -> str:
     return f"cam0: {{}}\ncam1: {{T_cn_cnm1: {step.tolist()}}}\n".replace("nan", ".nan")
 
 
-@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
@@ -176,7 +176,7 @@ def test_sources_have_an_order_and_have_to_agree() -> None:
         choose([None, None, None], "left", "right")
 
 
-@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize("source", ["P", "/tf_static", "file"])
 def test_cameras_in_millimetres_are_told(source: str) -> None:
     there = Extrinsics(np.eye(3), np.array([-120.0, 0.0, 0.0]), source)
@@ -185,7 +185,7 @@ def test_cameras_in_millimetres_are_told(source: str) -> None:
         choose(found, "left", "right")
 
 
-@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize(
     ("part", "values"),
     [
@@ -207,7 +207,7 @@ def test_a_transform_that_is_not_rigid_is_left_out(
     assert of_transforms(found, "left", "third") is None
 
 
-@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.timeout(30)
 def test_cycles_of_transforms_end(rng: np.random.Generator) -> None:
     pose = random_pose(rng)

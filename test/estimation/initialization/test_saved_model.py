@@ -15,7 +15,7 @@ from cardbox_tracker.estimation.initialization.saved_model import SavedModel
 BODY = BodyModel.of(distance_m=2.3)
 
 
-@pytest.mark.promise("A model_file that cannot be used is told when the node starts")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize(
     ("name", "words"),
     [

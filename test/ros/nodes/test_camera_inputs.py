@@ -201,7 +201,7 @@ def test_packed_depth_is_read_too() -> None:
     assert "/depth/camera_info" in watching.node.callbacks
 
 
-@pytest.mark.promise("Depth in another unit than its encoding has is refused in words")
+@pytest.mark.promise("Depth in another unit or of another view is refused with a reason")
 def test_depth_in_millimetres_is_told_and_not_used(watching: Watching) -> None:
     for number, depth_m in enumerate((2.0, 2000.0, 2.0), 1):
         watching.show_depth(number * S, np.full((48, 64), depth_m))
@@ -285,7 +285,7 @@ def test_silence_and_other_clocks_are_said(
     assert values["right rate (Hz)"] == "2.0"
 
 
-CLOCKS = "Cameras with different clocks, or that come and go, are told; the others go on"
+CLOCKS = "Cameras that disagree, or that come and go, are reported"
 
 
 @pytest.mark.promise(CLOCKS)

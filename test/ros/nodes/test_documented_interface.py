@@ -34,6 +34,7 @@ from cardbox_tracker.ros.nodes.retarget_node import RetargetNode  # noqa: E402
 from cardbox_tracker.ros.nodes.rula_node import RulaNode  # noqa: E402
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode  # noqa: E402
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode  # noqa: E402
+from cardbox_tracker.ros.runtime.interface import SERVICE, entries  # noqa: E402
 from cardbox_tracker.simulation.session import session_camera  # noqa: E402
 
 ROOT = Path(__file__).parents[3]
@@ -67,13 +68,10 @@ class Topic(NamedTuple):
 
 def table(node: str) -> tuple[set[Topic], set[str]]:
     """Return the documented topics and services of a node by full name."""
-    text = (ROOT / "docs" / "topics.md").read_text(encoding="utf-8")
-    section = text.split(f"\n## {node}\n")[1].split("\n## ")[0]
-    rows = re.findall(r"(?m)^\| `(\S+)` \| (in|out) \| (\S+) \| ([^|]+) \|", section)
-    services = re.findall(r"(?m)^\| `(\S+)` \| std_srvs/Trigger \|", section)
+    found = entries(node)
     return (
-        {Topic(full(name), direction, kind, qos.strip()) for name, direction, kind, qos in rows},
-        {full(name) for name in services},
+        {Topic(full(e.name), e.direction, e.type, e.qos) for e in found if e.direction != SERVICE},
+        {full(e.name) for e in found if e.direction == SERVICE},
     )
 
 

@@ -52,7 +52,7 @@ def test_a_home_folder_is_known_to_every_node(
         make(context=context, parameter_overrides=overrides, enable_rosout=False)
 
 
-@pytest.mark.promise("A measurement that cannot be saved costs no second posing")
+@pytest.mark.promise("Outputs are written whole or not at all, never over inputs")
 def test_a_folder_that_is_gone_costs_no_second_posing(
     context: Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

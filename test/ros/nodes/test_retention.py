@@ -27,7 +27,7 @@ def kept_bytes(images: RecentImages) -> int:
     return sum(len(image.data) for image in images)
 
 
-@pytest.mark.promise("No input fills the memory")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_huge_silhouettes_and_images_do_not_pile_up() -> None:
     references = ReferenceCapture("silhouette")
     pairing = ImagePairing(lambda *_: None)

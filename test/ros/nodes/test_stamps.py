@@ -74,7 +74,7 @@ def fed(
     node.destroy_node()
 
 
-@pytest.mark.promise("Stamps that are zero or repeat do not restart tracking")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 def test_images_without_stamps_are_tracked_in_one_go(fed: Fed) -> None:
     fed.show(*[0] * 10)
     assert (len(fed.trackers), fed.starts) == (10, 1)
@@ -82,7 +82,7 @@ def test_images_without_stamps_are_tracked_in_one_go(fed: Fed) -> None:
     assert any("the images have no stamp" in value.value for value in status.values)
 
 
-@pytest.mark.promise("Stamps that are zero or repeat do not restart tracking")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 def test_an_image_that_comes_twice_is_used_once(fed: Fed) -> None:
     fed.show(*[stamp for i in range(1, 6) for stamp in (i * S // 10, i * S // 10)])
     assert (len(fed.trackers), fed.starts) == (5, 1)

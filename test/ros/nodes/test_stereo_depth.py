@@ -91,7 +91,7 @@ def test_what_is_no_rectified_pair_is_said(bus: Any) -> None:
         assert text in status.message
 
 
-@pytest.mark.promise("Images of a stereo pair that are swapped are told")
+@pytest.mark.promise("Cameras that disagree, or that come and go, are reported")
 @pytest.mark.parametrize("swapped", [False, True])
 def test_swapped_images_are_told(bus: Any, swapped: bool) -> None:
     give_infos(bus)

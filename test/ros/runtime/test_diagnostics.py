@@ -146,7 +146,7 @@ def clocked(
     return diagnostics, logged, now
 
 
-@pytest.mark.promise("A node whose input has ceased says so")
+@pytest.mark.promise("Whatever the stamps, each image has one place in the order")
 def test_a_node_whose_input_has_ceased_says_so_once_and_when_it_is_back(
     make_node: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

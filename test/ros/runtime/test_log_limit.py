@@ -15,7 +15,7 @@ class Clock:
         return self.now_s
 
 
-@pytest.mark.promise("No input fills the log")
+@pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
 def test_ever_different_texts_of_one_kind_are_soon_quiet() -> None:
     clock = Clock()
     limit = LogLimit(clock)

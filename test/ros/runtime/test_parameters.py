@@ -517,7 +517,7 @@ def test_yaml_floats_stay_floats(value: float) -> None:
     assert isinstance(yaml.safe_load(parameter_docs.yaml_value(value)), float)
 
 
-@pytest.mark.promise("No parameter makes the tracker deaf")
+@pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")
 @pytest.mark.parametrize(
     ("values", "words"),
     [
