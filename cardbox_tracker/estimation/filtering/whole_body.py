@@ -377,6 +377,8 @@ class WholeBodyFilter:
         fitted = state
         if self._cues and _VAR.startswith("joint"):
             near = _NEAR._replace(mean=state)
+            if "tight" in _VAR:
+                near = Prior(state, _LOCATED)
             if "wide" in _VAR:
                 near = Prior(state, _NEAR.inverse * 0.3)
             cues = [*(cost.outlines(state) if frames[0].depth_m is None else ()), *self._cues]

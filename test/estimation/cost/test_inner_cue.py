@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -176,10 +177,10 @@ def test_a_hand_behind_the_torso_shows_nothing() -> None:
 def test_a_hand_under_the_other_forearm_gains_half() -> None:
     observation = flat_observation(1.0, 0.0)
     arm = np.zeros((1, 4))
-    points, _ = observation.view.project(np.zeros((1, 6)), arm, "left")
+    points, _ = arms_in_image(Posed(POSABLE, np.zeros((1, 14))), 0)
     free = beside(observation, np.zeros(4), "left", arm)
-    observation.others["right"] = points
-    assert beside(observation, np.zeros(4), "left", arm) == pytest.approx(free / 2)
+    covered = replace(observation, before=(observation.before[0], points))
+    assert beside(covered, np.zeros(4), "left", arm) == pytest.approx(free / 2)
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (0.3, -0.1)])
@@ -325,7 +326,7 @@ def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None
     high[4:8] = np.radians((-10, 30, -110, 40))
     way = [(FRONT, low, share) for share in np.linspace(0.0, 1.0, 15)]
     way += [(low, high, share) for share in np.linspace(0.0, 1.0, 15)] + [(low, high, 1.0)] * 5
-    truth = CAMERA.project(CAMERA.reference_to_optical(keypoints_m(body, high)))
+    truth = CAMERA.project(CAMERA.reference_to_optical(pose(body, high).keypoints_m))
     away_px = {}
     for with_image in (True, False):
         tracker = Tracker(body, CAMERA, default_preset(), np.random.default_rng(0))
