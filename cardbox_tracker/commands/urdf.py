@@ -28,6 +28,6 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the body model cannot be read.
     """
     from cardbox_tracker.body.model_file import load_body_model
-    from cardbox_tracker.description.urdf import urdf_from_body
+    from cardbox_tracker.body.urdf import urdf_from_body
 
     print(urdf_from_body(load_body_model(options.model), torso_place=options.torso_place))
