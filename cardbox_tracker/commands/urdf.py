@@ -16,8 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-torso-place",
         dest="torso_place",
         action="store_false",
-        help="leave out the joints torso_x, torso_z, neck_yaw and neck_pitch, for joint states "
-        "without them",
+        help="leave out the joints of place, neck and clavicles, for joint states without them",
     )
 
 

@@ -65,7 +65,7 @@ def silhouette_of(tracker: Tracker, posture: np.ndarray = FRONT) -> np.ndarray:
 
 
 def projected(tracker: Tracker, posture: np.ndarray) -> np.ndarray:
-    points_m = tracker.camera.reference_to_optical(pose(tracker.body.rigid, posture).keypoints_m)
+    points_m = pose(tracker.body, posture, tracker.camera.pitch_rad).keypoints_m
     return tracker.camera.project(points_m)
 
 
@@ -91,12 +91,13 @@ def test_clicked_points_rate_by_hand(folder: Path) -> None:
     assert isinstance(term.observe(frame(None)), Silence)
 
 
-def test_clicked_points_are_where_the_body_is_placed(folder: Path) -> None:
+@pytest.mark.parametrize("raised_deg", [20.0, 86.0, 149.0])
+def test_clicked_points_are_where_the_body_is_placed(folder: Path, raised_deg: float) -> None:
     """A state of torso_x and torso_z is rated as the whole-body filter draws it."""
     tracker, clicked = made_by(CODE[1]), module_of("clicked_points")
-    stiff = WholeBodyCostConfig(lift_gain=0.0)
     state = np.append(FRONT, [0.2, -0.05])
-    cost = WholeBodyCost(tracker.body, tracker.camera, stiff)
+    state[[4, 8]] = np.radians(raised_deg)
+    cost = WholeBodyCost(tracker.body, tracker.camera, WholeBodyCostConfig())
     points_px = tracker.camera.project(cost.keypoints(state))
     points = {STAMP_NS: dict(zip(KEYPOINT_NAMES, map(tuple, points_px), strict=True))}
     term = clicked.ClickedPoints(points, weight=1.0).build(tracker.body, tracker.camera)

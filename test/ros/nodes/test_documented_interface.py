@@ -20,7 +20,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
-from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES  # noqa: E402
+from cardbox_tracker.body.skeleton import JOINT_NAMES, JOINT_STATE_NAMES  # noqa: E402
 from cardbox_tracker.body.urdf import (  # noqa: E402
     ROOT_LINK,
     LinkTransforms,
@@ -57,7 +57,7 @@ ARM = {
 }
 # rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+ALL_NAMES = JOINT_STATE_NAMES
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 
