@@ -87,11 +87,10 @@ __all__ = [
 ]
 
 _MODULES = {
-    "body.kinematics": ("KEYPOINT_NAMES",),
     "body.model": ("BodyModel",),
     "body.model_file": ("load_body_model", "save_body_model"),
     "body.proportions": ("body_from_proportions",),
-    "body.posture": ("JOINT_NAMES",),
+    "body.skeleton": ("JOINT_NAMES", "KEYPOINT_NAMES"),
     "errors": (
         "BackgroundFileError",
         "BagError",

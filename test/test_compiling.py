@@ -188,7 +188,7 @@ def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) ->
     code = (
         "import sys\nfrom cardbox_tracker.commands.main import main\n"
         f"try: main([{command!r}, '--help'])\nexcept SystemExit: pass\n"
-        "import cardbox_tracker.description.urdf, cardbox_tracker.body.model_file\n"
+        "import cardbox_tracker.body.urdf, cardbox_tracker.body.model_file\n"
         "assert 'numba' not in sys.modules"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -21,7 +21,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         *("processes", "progress", "settings", "small_yaml"),
     ),
     ("body",),
-    ("vision", "description"),
+    ("vision",),
     ("detection",),
     ("estimation",),
     ("ergonomics", "exporting", "retargeting"),
@@ -126,8 +126,8 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
     for name, text in (
         ("body/low.py", "def late():\n    from cardbox_tracker.ros import high\n"),
         ("ros/high.py", "import cardbox_tracker.body.low\n"),
-        ("vision/a.py", "from cardbox_tracker.description import b\n"),
-        ("description/b.py", ""),
+        ("ergonomics/a.py", "from cardbox_tracker.exporting import b\n"),
+        ("exporting/b.py", ""),
         ("estimation/cost/c.py", "from cardbox_tracker.estimation.filtering.d import x\n"),
         ("estimation/filtering/d.py", "x = 1\n"),
     ):
@@ -136,8 +136,8 @@ def test_an_upward_import_would_be_found(tmp_path: Path) -> None:
         path.write_text(text)
     assert upward(tmp_path) == [
         "body.low -> ros.high",
+        "ergonomics.a -> exporting.b",
         "estimation.cost.c -> estimation.filtering.d",
-        "vision.a -> description.b",
     ]
     known = modules(tmp_path)
     with pytest.raises(CycleError):

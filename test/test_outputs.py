@@ -57,10 +57,13 @@ PLACED = replace(
     keypoints_m=POINTS_M + np.array([0.0, 0.05, -0.25]),
     offset_m=np.array([0.25, -0.05]),
     offset_stddev_m=np.array([0.03, 0.01]),
+    clavicles_m=np.array([0.02, 0.03]),
+    clavicles_stddev_m=np.array([0.002, 0.003]),
 )
 SEEN = replace(PLACED, neck=np.array([0.4, -0.1]), neck_stddev=np.array([0.1, 0.2]))
 BODY_NAMES = (*JOINT_NAMES, "torso_x", "torso_z")
-ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch")
+CLAVICLES = ("left_clavicle_elevation", "right_clavicle_elevation")
+ALL_NAMES = (*BODY_NAMES, "neck_yaw", "neck_pitch", *CLAVICLES)
 TOPICS = [
     *("tracking_state", "keypoint_states", "joint_states", "joint_states_stddev"),
     *("keypoints", "markers"),
@@ -83,9 +86,9 @@ def test_a_posture_is_all_topics_in_their_order() -> None:
     assert state == Text(TRACKING)
     assert keypoints.names[:4] == ("left_shoulder", "left_elbow", "left_hand", "right_shoulder")
     assert (keypoints.states, keypoints.chances.tolist()) == (STATES, CHANCES.tolist())
-    assert (joints.names, deviations.names) == (ALL_NAMES, BODY_NAMES)
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.0, 0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0, 0.0])
+    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES))
+    np.testing.assert_array_equal(joints.values, [*POSTURE, *[0.0] * 6])
+    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.0] * 4)
     assert points.points_m.shape == (6, 3)
     patches, skeleton = markers.shapes
     assert (patches.namespace, patches.kind, patches.points_m.shape) == ("patches", 11, (90, 3))
@@ -103,18 +106,18 @@ def test_joints_have_the_place_after_the_posture() -> None:
     joints, deviations = joint_values(PLACED), joint_deviations(PLACED)
     assert joints is not None
     assert deviations is not None
-    assert (joints.names, deviations.names) == (ALL_NAMES, BODY_NAMES)
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.0, 0.0])
-    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.03, 0.01])
+    assert (joints.names, deviations.names) == (ALL_NAMES, (*BODY_NAMES, *CLAVICLES))
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.0, 0.0, 0.02, 0.03])
+    np.testing.assert_array_equal(deviations.values, [0.1] * 12 + [0.03, 0.01, 0.002, 0.003])
 
 
-def test_the_neck_is_last_and_has_deviations_if_it_was_seen() -> None:
+def test_the_neck_follows_and_has_deviations_if_it_was_seen() -> None:
     joints, deviations = joint_values(SEEN), joint_deviations(SEEN)
     assert joints is not None
     assert deviations is not None
     assert joints.names == deviations.names == ALL_NAMES
-    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.4, -0.1])
-    np.testing.assert_array_equal(deviations.values[-2:], (0.1, 0.2))
+    np.testing.assert_array_equal(joints.values, [*POSTURE, 0.25, -0.05, 0.4, -0.1, 0.02, 0.03])
+    np.testing.assert_array_equal(deviations.values[-4:], (0.1, 0.2, 0.002, 0.003))
     np.testing.assert_array_equal(cast(Any, neck_from(joints)), (0.4, -0.1))
     assert neck_from(JointValues(BODY_NAMES, np.zeros(14))) is None
 
@@ -186,10 +189,12 @@ def test_joints_have_velocities_from_the_second_image_on_by_hand() -> None:
     moved = replace(SEEN, posture=POSTURE + np.arange(12) / 100)
     found = velocities_of(stream, 1.1, moved, TRACKER)
     # The neck appears only now.
-    np.testing.assert_allclose(found, [*np.arange(12) / 10, 2.5, -0.5, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(
+        found, [*np.arange(12) / 10, 2.5, -0.5, 0.0, 0.0, 0.2, 0.3], atol=1e-12
+    )
     turned = replace(moved, neck=np.array([0.5, -0.1]))
     found = velocities_of(stream, 1.3, turned, TRACKER)
-    np.testing.assert_allclose(found, [*[0.0] * 14, 0.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found, [*[0.0] * 14, 0.5, 0.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_velocities_begin_anew_after_a_gap_another_tracker_or_a_jump_of_the_stamps() -> None:

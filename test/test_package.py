@@ -22,7 +22,7 @@ import cardbox_tracker
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "cardbox_tracker"
 CORE = (
-    *("body", "vision", "detection", "estimation", "description", "ergonomics", "retargeting"),
+    *("body", "vision", "detection", "estimation", "ergonomics", "retargeting"),
     *("drawing", "exporting"),
 )
 CORE_FILES = sorted(path for folder in CORE for path in (SOURCES / folder).rglob("*.py"))

@@ -16,8 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-torso-place",
         dest="torso_place",
         action="store_false",
-        help="leave out the joints torso_x, torso_z, neck_yaw and neck_pitch, for joint states "
-        "without them",
+        help="leave out the joints of place, neck and clavicles, for joint states without them",
     )
 
 
@@ -28,6 +27,6 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the body model cannot be read.
     """
     from cardbox_tracker.body.model_file import load_body_model
-    from cardbox_tracker.description.urdf import urdf_from_body
+    from cardbox_tracker.body.urdf import urdf_from_body
 
     print(urdf_from_body(load_body_model(options.model), torso_place=options.torso_place))

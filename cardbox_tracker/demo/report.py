@@ -10,11 +10,13 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.skeleton import JOINT_NAMES
 from cardbox_tracker.demo.result import DemoResult
 from cardbox_tracker.drawing.overlay import draw_overlay
 from cardbox_tracker.drawing.video import video_file
+from cardbox_tracker.estimation.config import PRESETS
 from cardbox_tracker.estimation.cost.compiled import CompiledSilhouette
 from cardbox_tracker.estimation.estimate import TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.evaluation.truth import tracking_error
@@ -63,7 +65,8 @@ def write_report(
         path.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     save_body_model(result.body, output / "body.yaml")
     plot_joint_states(result, tracked, output / "joint_states.png")
-    write_overlay(result, camera, estimates, session, output / "overlay.mp4")
+    body = PRESETS[preset]().with_shoulders(result.body)
+    write_overlay(result, body, camera, estimates, session, output / "overlay.mp4")
     print_table(report, output)
     return report
 
@@ -114,6 +117,7 @@ def plot_joint_states(result: DemoResult, stamps: list[int], path: Path) -> None
 
 def write_overlay(
     result: DemoResult,
+    body: BodyModel,
     camera: Camera,
     estimates: dict[int, Estimate],
     session: Path,
@@ -128,7 +132,7 @@ def write_overlay(
             if image.stamp_ns >= result.start_ns:
                 small = pipeline.prepare(image.as_sent)
                 estimate = estimates.get(image.stamp_ns, nothing)
-                write(draw_overlay(small, result.body, camera, estimate, _VIDEO_SCALE))
+                write(draw_overlay(small, body, camera, estimate, _VIDEO_SCALE))
 
 
 def print_table(report: dict[str, object], output: Path) -> None:

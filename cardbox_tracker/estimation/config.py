@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.cost.depth import Depth
 from cardbox_tracker.estimation.cost.inner_cue import InnerCue
@@ -146,6 +147,10 @@ class TrackerConfig(Settings):
         fewest = min(self.torso.particles, self.arm.particles)
         if self.average > fewest:
             raise ValueError(f"average is {self.average}; expected 1 to {fewest}, the particles")
+
+    def with_shoulders(self, body: BodyModel) -> BodyModel:
+        """Return ``body`` with the shoulders that the filter gives it: rigid ones in the paper."""
+        return body if self.filter == "whole_body" else body.rigid
 
     def with_depth(self) -> TrackerConfig:
         """Return these settings with the term for depth images."""

@@ -107,7 +107,7 @@ class Tracker:
 
     def _use(self, body: BodyModel, silhouette: SilhouetteTerm) -> None:
         """Track ``body`` from the next frame on."""
-        self.body = body if self.config.filter == "whole_body" else body.rigid
+        self.body = self.config.with_shoulders(body)
         self._silhouette = silhouette
         self._cameras = [
             TrackedCamera(self.body, self.camera, self.config, other)

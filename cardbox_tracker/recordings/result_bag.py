@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import dumps_body_model
-from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.body.urdf import urdf_from_body
 from cardbox_tracker.drawing.overlay import draw_overlay, readable_scale
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES
-from cardbox_tracker.description.urdf import ROOT_LINK
+from cardbox_tracker.body.skeleton import CLAVICLE_NAMES, JOINT_NAMES, NECK_NAMES, PLACE_NAMES
+from cardbox_tracker.body.urdf import ROOT_LINK
 from cardbox_tracker.viewing.library import rerun
 
 IMAGE, JOINTS, ERROR, STATE = "image", "joints", "error", "state"
@@ -23,8 +23,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "torso": tuple(name for name in JOINT_NAMES[1:] if name.startswith("torso")),
     "head": NECK_NAMES,
     "place": ("torso_y", *PLACE_NAMES),
+    "shoulders": CLAVICLE_NAMES,
 }
-"""Joints by plot: angles in degrees, the place in metres."""
+"""Joints by plot: angles in degrees, place and rise of the shoulders in metres."""
 
 
 SPREAD = "within_two_deviations"

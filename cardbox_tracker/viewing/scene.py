@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import KeypointState
-from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.body.skeleton import UNITS, KeypointState
+from cardbox_tracker.body.urdf import urdf_from_body
 from cardbox_tracker.errors import CardboxError, cut
 from cardbox_tracker.evaluation.metrics import beside_shoulders
 from cardbox_tracker.outputs import JointValues
@@ -206,10 +206,9 @@ class Scene:
 
 
 def _shown(joints: JointValues) -> Mapping[str, float]:
-    """Return angles in degrees, and places in metres, by name."""
-    place = ("torso_x", "torso_y", "torso_z")
+    """Return angles in degrees, and lengths in metres, by name."""
     return {
-        name: value if name in place else float(np.degrees(value))
+        name: value if UNITS.get(name) == "m" else float(np.degrees(value))
         for name, value in zip(joints.names, joints.values.tolist(), strict=True)
     }
 

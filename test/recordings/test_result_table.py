@@ -54,6 +54,11 @@ HEADER = (
     *("right_shoulder_chance", "right_elbow_chance", "right_hand_chance"),
 )
 NECK = ("neck_yaw", "neck_pitch", "neck_yaw_stddev_rad", "neck_pitch_stddev_rad")
+CLAVICLES = (
+    *("left_clavicle_elevation", "right_clavicle_elevation"),
+    *("left_clavicle_elevation_stddev_m", "right_clavicle_elevation_stddev_m"),
+)
+WHOLE = HEADER + NECK + CLAVICLES
 POINTS_M = np.arange(18).reshape(6, 3) / 4
 FOUND = Estimate("tracking", np.arange(12) / 10, np.arange(12) / 100, POINTS_M, 812, 0.87654)
 PLACED = replace(FOUND, offset_m=np.array([0.25, -0.05]), offset_stddev_m=np.array([0.03, 0.01]))
@@ -62,8 +67,8 @@ STAMP_NS, STAMP = 1_700_000_000_000_000_005, Decimal("1700000000.000000005")
 
 
 def test_scripts_find_the_columns_that_they_know() -> None:
-    assert columns() == HEADER
-    assert columns(has_points=True) == HEADER + NECK
+    assert columns() == HEADER + CLAVICLES
+    assert columns(has_points=True) == WHOLE
 
 
 def test_each_column_has_its_unit() -> None:
@@ -71,21 +76,21 @@ def test_each_column_has_its_unit() -> None:
     expected = {"stamp": "s", "torso_y": "m", "torso_yaw": "rad", "left_hand_x": "m", "cost": "px"}
     assert {name: found[name] for name in expected} == expected
     for name, unit in found.items():
-        later = name not in FIXED + NECK
+        later = name not in FIXED + NECK + CLAVICLES
         assert not (later and unit) or name.endswith(f"_{unit}")
 
 
 @pytest.mark.parametrize("state", ["no_person", "lost"])
 def test_a_row_without_an_estimate_by_hand(state: str) -> None:
     row = row_of(STAMP_NS, 2.5, Estimate(state), has_points=True)
-    cells = dict(zip(HEADER + NECK, row, strict=True))
+    cells = dict(zip(WHOLE, row, strict=True))
     known = {"stamp": STAMP, "state": state, "stamp_ns": STAMP_NS, "time_s": 2.5}
-    assert cells == dict.fromkeys(HEADER + NECK) | known
+    assert cells == dict.fromkeys(WHOLE) | known
 
 
 @pytest.mark.parametrize("state", ["tracking", "uncertain"])
 def test_a_row_by_hand(state: str) -> None:
-    row = dict(zip(HEADER, row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
+    row = dict(zip(columns(), row_of(42, 1.5, replace(PLACED, state=state)), strict=True))
     assert [row[name] for name in HEADER[:4]] == [Decimal("0.000000042"), state, 0.0, 0.1]
     assert (row["stamp_ns"], row["time_s"]) == (42, 1.5)
     assert (row["right_elbow_flexion"], row["right_elbow_flexion_stddev_rad"]) == (1.1, 0.11)
@@ -93,7 +98,7 @@ def test_a_row_by_hand(state: str) -> None:
     assert (row["cost"], row["iou"]) == (812, 0.87654)
     assert (row["torso_x"], row["torso_z"]) == (0.25, -0.05)
     assert (row["torso_x_stddev_m"], row["torso_z_stddev_m"]) == (0.03, 0.01)
-    still = dict(zip(HEADER, row_of(42, 1.5, FOUND), strict=True))
+    still = dict(zip(columns(), row_of(42, 1.5, FOUND), strict=True))
     assert (still["torso_x"], still["torso_x_stddev_m"]) == (0.0, 0.0)
     unsure = row_of(42, 1.5, replace(FOUND, posture_stddev=None))
     first = HEADER.index("torso_y_stddev_m")
@@ -103,16 +108,25 @@ def test_a_row_by_hand(state: str) -> None:
 def test_keypoints_have_states_and_chances() -> None:
     states = tuple(KeypointState(one) for one in ("tracked", "uncertain", "hidden") * 2)
     known = replace(PLACED, keypoint_states=states, keypoint_chances=np.arange(6) / 10)
-    row = dict(zip(HEADER, row_of(42, 1.5, known), strict=True))
+    row = dict(zip(columns(), row_of(42, 1.5, known), strict=True))
     assert (row["left_elbow_state"], row["right_hand_state"]) == ("uncertain", "hidden")
     assert (row["left_shoulder_chance"], row["right_hand_chance"]) == (0.0, 0.5)
     unknown = row_of(42, 1.5, PLACED)
-    assert unknown[HEADER.index("left_shoulder_state") :] == [None] * 12
+    first = HEADER.index("left_shoulder_state")
+    assert unknown[first : first + 12] == [None] * 12
 
 
 def test_the_neck_is_empty_while_the_face_is_not_seen() -> None:
-    assert row_of(42, 1.5, SEEN, has_points=True)[-4:] == [0.4, -0.1, 0.2, 0.3]
-    assert row_of(42, 1.5, PLACED, has_points=True)[-4:] == [None] * 4
+    assert row_of(42, 1.5, SEEN, has_points=True)[-8:-4] == [0.4, -0.1, 0.2, 0.3]
+    assert row_of(42, 1.5, PLACED, has_points=True)[-8:-4] == [None] * 4
+
+
+def test_the_clavicles_follow_all_other_columns() -> None:
+    raised = replace(
+        SEEN, clavicles_m=np.array([0.02, 0.0]), clavicles_stddev_m=np.array([0.003, 0.001])
+    )
+    for has_points in (False, True):
+        assert row_of(42, 1.5, raised, has_points)[-4:] == [0.02, 0.0, 0.003, 0.001]
 
 
 def write(path: Path) -> None:
@@ -129,7 +143,7 @@ def test_both_formats_have_the_same_content(tmp_path: Path) -> None:
     with (tmp_path / "a.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     table: Any = parquet.read_table(tmp_path / "a.parquet")
-    assert tuple(table.column_names) == tuple(rows[0]) == HEADER + NECK
+    assert tuple(table.column_names) == tuple(rows[0]) == WHOLE
     assert len(rows) == table.num_rows == 2
     assert [row["stamp"] for row in rows] == [f"{STAMP}", "1700000000.000000006"]
     assert table.schema.field("left_hand_x").metadata == {b"unit": b"m"}
@@ -157,4 +171,4 @@ def test_the_page_lists_all_columns_in_their_order() -> None:
     listed: list[str] = []
     for cell in re.findall(r"(?m)^\| (`.*?) \|", text):
         listed += re.findall(r"`([a-z_]+)`", cell)
-    assert tuple(listed) == HEADER + NECK
+    assert tuple(listed) == WHOLE

@@ -15,7 +15,7 @@ import pytest
 from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PLACE_NAMES
-from cardbox_tracker.description.link_transforms import LinkTransforms
+from cardbox_tracker.body.urdf import LinkTransforms
 from cardbox_tracker.errors import BagError, CardboxError
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.estimate import Estimate

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model_file import loads_body_model
 from cardbox_tracker.body.posture import N_STATE, reference_posture
-from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES
+from cardbox_tracker.body.skeleton import JOINT_NAMES, JOINT_STATE_NAMES
 from cardbox_tracker.estimation.estimate import Estimate
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
@@ -35,7 +35,7 @@ from cardbox_tracker.ros.messages.conversions import camera_info_message, image_
 from cardbox_tracker.ros.runtime import qos  # noqa: E402
 
 LEARN_IMAGES = 10
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+ALL_NAMES = JOINT_STATE_NAMES
 
 
 class Session:

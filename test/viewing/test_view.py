@@ -15,8 +15,8 @@ from cardbox_tracker.body.kinematics import pose
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.urdf import urdf_from_body
 from cardbox_tracker.commands.main import main
-from cardbox_tracker.description.urdf import urdf_from_body
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.bag_reader import BagReader

@@ -109,9 +109,7 @@ class InnerCueTerm:
         self._weights = np.array([config.hand, config.forearm])
         self._sleeves: Sleeves | None = None
         if body.source != MEASURED:
-            self._sleeves = Sleeves(
-                body.appearance.histograms, self._forearm_m, self._px_per_m
-            )
+            self._sleeves = Sleeves(body.appearance.histograms, self._forearm_m, self._px_per_m)
             self._use(self._sleeves)
 
     def _use(self, sleeves: Sleeves) -> None:

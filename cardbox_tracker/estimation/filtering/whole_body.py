@@ -58,18 +58,16 @@ _SETTLED_FRAMES, _SETTLED_X_M, _YOUNG_X_M = 15, 0.25, 0.5
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
-_LOCATED_EFFORT = float(__import__('os').environ.get('X_EFFORT','0.25'))
-_VAR = __import__('os').environ.get('X_VAR','')
+_LOCATED_EFFORT = 0.25
 # States that are fitted to such cues: number, number of similar ones, least distance of the others,
 # m; Gauss-Newton steps, and deviation of a value in a step, rad and m.
 _FITTED, _FITTED_STEPS, _FITTED_DAMPING = (6, 1, 0.1), 3, 0.25**-2
 # The same for fits to outlines.
 _OUTLINED, _OUTLINED_STEPS = (3, 1, 0.1), 2
-# Deviations (14,) of the prior around the search's mean, angles in rad and places in m: the outline
+# Inverse variances (14,) of the prior around the search's mean, angles in rad and places in m: the outline
 # only moves it slightly, so that it does not become another posture with a similar outline.
-_NEAR = Prior(
-    np.zeros(14), (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
-)
+_NEAR = (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
+# The same for cues that tell where joints are, which mainly correct the depth of the arms.
 _LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
 _NONE = np.zeros(6)
 # Weight of the last correction by the outline in the next one, against jitter.
@@ -295,7 +293,7 @@ class WholeBodyFilter:
         rated = search.rated
         if search.profile.fits_outlines:
             chosen = rated.different(*_OUTLINED)
-            near = _NEAR._replace(mean=chosen)
+            near = Prior(chosen, _NEAR)
             rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
         if search.cues:
             chosen = rated.different(*_FITTED)
@@ -373,29 +371,19 @@ class WholeBodyFilter:
 
     def _refined(self, frames: Sequence[Frame], state: FloatArray) -> FloatArray:
         """Return the state (14,) near ``state`` that fits all cues best."""
-        cost, steps = self._cost, self._profile.outline_steps
-        fitted = state
-        if self._cues and _VAR.startswith("joint"):
-            near = _NEAR._replace(mean=state)
-            if "tight" in _VAR:
-                near = Prior(state, _LOCATED)
-            if "wide" in _VAR:
-                near = Prior(state, _NEAR.inverse * 0.3)
-            cues = [*(cost.outlines(state) if frames[0].depth_m is None else ()), *self._cues]
-            (fitted,), _ = self.refine(state[None], cues, near, 4)
-            return fitted
+        cost, steps = self._cost, self._profile.refining_steps
         # A depth image determines the distance better than an outline.
-        if frames[0].depth_m is None:
-            near = _NEAR._replace(mean=state)
-            (outlined,), _ = self.refine(state[None], cost.outlines(state), near, steps)
-            if self._correction is None:
-                self._correction = outlined - state
-            self._correction = _KEPT * self._correction + (1.0 - _KEPT) * (outlined - state)
-            fitted = np.clip(state + self._correction, *cost.limits.T)
+        outlines = cost.outlines(state) if frames[0].depth_m is None else []
         if self._cues:
-            located = _LOCATED * (0.5 if "half" in _VAR else 1.0)
-            (fitted,), _ = self.refine(fitted[None], self._cues, Prior(fitted, located), 2)
-        return fitted
+            near = Prior(state, _LOCATED)
+            (refined,), _ = self.refine(state[None], [*outlines, *self._cues], near, 2 * steps)
+            return refined
+        (refined,), _ = self.refine(state[None], outlines, Prior(state, _NEAR), steps)
+        # Outlines alone jitter.
+        before = refined - state if self._correction is None else self._correction
+        self._correction = _KEPT * before + (1.0 - _KEPT) * (refined - state)
+        smooth: FloatArray = np.clip(state + self._correction, *cost.limits.T)
+        return smooth
 
     def _corrected(self, frames: Sequence[Frame], fitted: FloatArray) -> FloatArray:
         """Return the state (14,) that the corrector makes of ``fitted``, within the limits."""

@@ -74,8 +74,8 @@ class SearchProfile:
         average: best states whose weighted mean is the result.
         spread: difference to the best rating, as a fraction of the silhouette's pixels, at which
             the weight of a state is 1/e.
-        outline_steps: Gauss-Newton steps of the fit of the result to the outlines; not used with
-            depth images.
+        refining_steps: Gauss-Newton steps that fit the result to the outlines; twice as many if
+            there are cues that tell where joints are.
         start_passes: searches in the first silhouette of a person.
         crosses: whether an upright person is proposed at the intersection of the lines of sight.
         fits_outlines: whether a few different states are fitted to the outlines before all joints
@@ -117,7 +117,7 @@ class SearchProfile:
     home_rate: float = 0.02
     average: int = 150
     spread: float = 0.02
-    outline_steps: int = 2
+    refining_steps: int = 2
     start_passes: int = 3
     crosses: bool = False
     fits_outlines: bool = False

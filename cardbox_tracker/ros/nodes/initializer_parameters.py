@@ -82,7 +82,7 @@ class InitializerParameters(NodeParameters):
     )
     torso_place_in_urdf: bool = parameter(
         True,
-        "robot_description has the joints torso_x, torso_z, neck_yaw and neck_pitch; must be the "
+        "robot_description has the joints of place, neck and clavicles, too; must be the "
         "same as the tracker's torso_place",
         effect=_NEXT_MEASUREMENT,
     )

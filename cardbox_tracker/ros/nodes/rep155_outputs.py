@@ -11,11 +11,11 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
-from cardbox_tracker.description.rep155 import Rep155Joints, head_joints, joint_names
-from cardbox_tracker.description.rep155_urdf import rep155_urdf
+from cardbox_tracker.body.rep155 import Rep155Joints, head_joints, joint_names
+from cardbox_tracker.body.urdf import rep155_urdf
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
-from cardbox_tracker.outputs import JointValues, neck_of, place_of
+from cardbox_tracker.outputs import JointValues, clavicles_of, neck_of, place_of
 from cardbox_tracker.ros.messages import results
 from cardbox_tracker.ros.messages.types import optional_class
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
@@ -63,6 +63,7 @@ class Rep155Outputs:
                 publisher.publish(String(data=urdf))
         values = self._convert(estimate.posture)
         if self._torso_place:
-            values = np.concatenate([values, place_of(estimate), head_joints(neck_of(estimate))])
+            others = place_of(estimate), head_joints(neck_of(estimate)), clavicles_of(estimate)
+            values = np.concatenate([values, *others])
         joints = JointValues(self._names, values)
         self._joints.publish(results.joint_state_message(header, joints))

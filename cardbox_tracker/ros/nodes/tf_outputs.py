@@ -10,8 +10,7 @@ from typing import Any
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 
-from cardbox_tracker.description.link_transforms import LinkTransform, LinkTransforms
-from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.body.urdf import LinkTransform, LinkTransforms, urdf_from_body
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker

@@ -131,8 +131,8 @@ class TrackerParameters(NodeParameters):
     )
     torso_place: bool = parameter(
         True,
-        "joint_states also has torso_x and torso_z, the person's position, and neck_yaw and "
-        "neck_pitch; must be the same as the initializer's torso_place_in_urdf",
+        "joint_states also has the joints of place, neck and clavicles; "
+        "must be the same as the initializer's torso_place_in_urdf",
         effect=AT_START,
     )
     use_image: bool = parameter(

@@ -20,9 +20,12 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from cardbox_tracker.body.model import BodyModel  # noqa: E402
-from cardbox_tracker.body.skeleton import JOINT_NAMES, NECK_NAMES, PLACE_NAMES  # noqa: E402
-from cardbox_tracker.description.link_transforms import LinkTransforms  # noqa: E402
-from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body  # noqa: E402
+from cardbox_tracker.body.skeleton import JOINT_NAMES, JOINT_STATE_NAMES  # noqa: E402
+from cardbox_tracker.body.urdf import (  # noqa: E402
+    ROOT_LINK,
+    LinkTransforms,
+    urdf_from_body,
+)
 from cardbox_tracker.recordings.bag_writer import BagWriter  # noqa: E402
 from cardbox_tracker.recordings.detector import PersonDetector  # noqa: E402
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode  # noqa: E402
@@ -55,7 +58,7 @@ ARM = {
 }
 # rclpy adds these to every node.
 OF_EVERY_NODE = ("/rosout", "/parameter_events")
-ALL_NAMES = (*JOINT_NAMES, *PLACE_NAMES, *NECK_NAMES)
+ALL_NAMES = JOINT_STATE_NAMES
 BAG_TOPIC = "/of_the_bag/camera_info"
 
 

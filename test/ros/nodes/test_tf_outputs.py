@@ -16,8 +16,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
-from cardbox_tracker.description.link_transforms import LinkTransforms
-from cardbox_tracker.description.urdf import urdf_from_body
+from cardbox_tracker.body.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.estimate import LOST, TRACKING, Estimate
 from cardbox_tracker.outputs import joint_values, positions_of

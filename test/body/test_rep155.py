@@ -20,14 +20,13 @@ from cardbox_tracker.body.posture import (
     place_limits,
     reference_posture,
 )
-from cardbox_tracker.body.skeleton import neck_rotation
-from cardbox_tracker.description.rep155 import (
-    REP155_JOINTS,
+from cardbox_tracker.body.rep155 import (
     Rep155Joints,
     head_joints,
     joint_names,
 )
-from cardbox_tracker.description.rep155_urdf import rep155_urdf
+from cardbox_tracker.body.skeleton import Group, joints_of, neck_rotation
+from cardbox_tracker.body.urdf import rep155_urdf
 from cardbox_tracker.estimation.estimate import TRACKING, Estimate
 from cardbox_tracker.vision.camera import Camera
 
@@ -61,7 +60,7 @@ def assert_agrees(
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=BODY.camera_pose.pitch_rad)
     body = Estimate(TRACKING, posture, offset_m=np.array(place)).placed(BODY)
     frames = pose(body.rigid, posture)
-    found = places(ROBOT, np.array([*values, *place, 0.0, 0.0]))
+    found = places(ROBOT, np.array([*values, *place, 0.0, 0.0, 0.0, 0.0]))
     expected = dict(zip(LINKS, pose(body.rigid, posture).keypoints_m, strict=True))
     for name, point in {**expected, "head": frames.head, "body": frames.hip}.items():
         optical = camera.reference_to_optical(point)
@@ -99,7 +98,7 @@ def test_the_head_turns_as_the_neck_does(neck: tuple[float, float]) -> None:
     """``p_head`` is positive upwards in the reference model."""
     posture, camera = np.zeros(12), Camera(320, 240, 300.0, 300.0, 159.5, 119.5, pitch_rad=0.15)
     posture[1:4] = (0.1, 0.3, -0.4)
-    values = [*Rep155Joints()(posture), 0.0, 0.0, *head_joints(np.array(neck))]
+    values = [*Rep155Joints()(posture), 0.0, 0.0, *head_joints(np.array(neck)), 0.0, 0.0]
     ROBOT.update_cfg(dict(zip(joint_names("p1"), values, strict=True)))
     frames = pose(BODY.rigid, posture)
     turned = frames.torso_rotation @ neck_rotation(np.array(neck))
@@ -126,7 +125,7 @@ def test_values_stay_within_the_limits_of_the_urdf(postures: list[np.ndarray]) -
 )
 def test_plain_movements_have_plain_angles(arm: slice, prefix: str) -> None:
     """Raised aside is p alone; forwards has y at 90 degrees; a forearm forwards is the elbow."""
-    index = {name: number for number, name in enumerate(REP155_JOINTS)}
+    index = {joint.rep155: number for number, joint in enumerate(joints_of(Group.POSTURE))}
     posture = reference_posture("front")
     posture[arm] = (0.8, 0.0, 0.0, 0.5)
     values = Rep155Joints()(posture)
@@ -144,8 +143,13 @@ def test_plain_movements_have_plain_angles(arm: slice, prefix: str) -> None:
 def test_the_torso_keeps_its_angles() -> None:
     posture = np.zeros(12)
     posture[:4] = (0.3, 0.1, 0.4, -0.2)
-    values = dict(zip(REP155_JOINTS, Rep155Joints()(posture), strict=True))
-    assert [values[n] for n in ("body", "r_waist", "waist", "y_waist")] == [0.3, 0.1, 0.4, -0.2]
+    values = dict(zip(joint_names("a", torso_place=False), Rep155Joints()(posture), strict=True))
+    assert [values[f"{n}_a"] for n in ("body", "r_waist", "waist", "y_waist")] == [
+        0.3,
+        0.1,
+        0.4,
+        -0.2,
+    ]
 
 
 @settings(max_examples=25)

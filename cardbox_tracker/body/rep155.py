@@ -20,51 +20,99 @@ The joint ``y_head`` is our ``neck_yaw``. ``p_head`` is our ``neck_pitch`` with 
 is positive if the face looks up. The reference model's third joint of the head, ``r_head``, is
 missing.
 
-Two further joints of ours, ``x_body`` and ``z_body``, lead to ``body``: they are ``torso_x`` and
-``torso_z``. Without them the frame ``body_<id>``, which others take for the person's place, would
-stay at the distance and height at which the person was measured.
+Further joints of ours are ``x_body`` and ``z_body``, which lead to ``body`` and are ``torso_x`` and
+``torso_z``, and ``l_clavicle`` and ``r_clavicle``, which raise the shoulders. Without the first two
+the frame ``body_<id>``, which others take for the person's place, would stay at the distance and
+height at which the person was measured.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 
+from cardbox_tracker.body.parts import BodyParts
 from cardbox_tracker.body.posture import LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.body.skeleton import rotation_x, rotation_y, rotation_z
-
-_TORSO_JOINTS = ("body", "r_waist", "waist", "y_waist")
-_ARM_JOINTS = ("y_shoulder", "p_shoulder", "r_shoulder", "elbow")
-REP155_JOINTS: tuple[str, ...] = (
-    *_TORSO_JOINTS,
-    *(f"l_{name}" for name in _ARM_JOINTS),
-    *(f"r_{name}" for name in _ARM_JOINTS),
+from cardbox_tracker.body.skeleton import (
+    FIXED,
+    NECK_LIMITS,
+    SKELETON,
+    Group,
+    Joint,
+    Offset,
+    Point,
+    X,
+    arm_rotations,
+    joints_of,
+    rotation_x,
+    rotation_z,
 )
-"""Joint names without the suffix ``_<id>``; the first four are d1..d4, in their order."""
-REP155_PLACE: tuple[str, ...] = ("x_body", "z_body")
-"""Joint names of ``torso_x`` and ``torso_z``, which follow the others."""
-REP155_HEAD: tuple[str, ...] = ("y_head", "p_head")
-"""Joint names of the head, which follow those of the place."""
 
-LOWEST_RAISE_RAD = -np.pi / 3
+LOWEST_RAISE_RAD = -math.pi / 3
 """Lowest p: an arm that swings further through rest gets its other pair of angles, rad."""
-LOWEST_BEND_RAD = -np.pi / 6
+LOWEST_BEND_RAD = -math.pi / 6
 """Lowest e of the elbow, which REP-155 bends in one direction only, rad."""
+_FULL = (-2 * math.pi, 2 * math.pi)
 
 # Nearer than this to the singular direction the other angle is kept.
 _MEANINGLESS_RAD = 1e-3
 
 
 def joint_names(body_id: str, torso_place: bool = True) -> list[str]:
-    """Return the names of the joints of ``body_id``: 12, or 16 with place and head."""
-    names = (*REP155_JOINTS, *REP155_PLACE, *REP155_HEAD) if torso_place else REP155_JOINTS
-    return [f"{name}_{body_id}" for name in names]
+    """Return the names of the joints of ``body_id``: 12, or 18 with place, head and clavicles."""
+    others = (Group.PLACE, Group.NECK, Group.CLAVICLES) if torso_place else ()
+    return [f"{joint.rep155}_{body_id}" for joint in joints_of(Group.POSTURE, *others)]
 
 
 def head_joints(neck: FloatArray) -> FloatArray:
-    """Return the values of ``REP155_HEAD``, (2,), of ``neck_yaw`` and ``neck_pitch``, rad."""
+    """Return ``y_head`` and ``p_head``, (2,), of ``neck_yaw`` and ``neck_pitch``, rad."""
     yaw, pitch = neck
     return np.array([yaw, -pitch])
+
+
+def rep155_skeleton() -> Iterator[Joint]:
+    """Yield the joints of the skeleton with the names, axes and limits of REP-155.
+
+    They have no ending. The parts of the upper body hang on ``torso``, a frame between the
+    shoulders.
+    """
+    names, joints = {joint.name: joint.rep155 for joint in SKELETON}, joints_of(Group.POSTURE)
+    _, (lowest, highest) = NECK_LIMITS.tolist()
+    changed: dict[str, dict[str, Any]] = {
+        "neck_pitch": {"axis": (0.0, -1.0, 0.0), "limits": (-highest, -lowest)}
+    }
+    for arm, letter, side in ((joints[LEFT_ARM], "l", 1.0), (joints[RIGHT_ARM], "r", -1.0)):
+        (first, second, third, fourth), elbow = (joint.name for joint in arm), arm[2].offset
+        raise_, bend = (LOWEST_RAISE_RAD, math.pi), (LOWEST_BEND_RAD, math.pi)
+        changed[first] = {"axis": (0.0, 0.0, -side), "limits": _FULL}
+        changed[second] = {"axis": (side, 0.0, 0.0), "limits": raise_}
+        changed[third] = {"axis": (0.0, 0.0, side), "limits": _FULL, "offset": arm[0].offset}
+        changed[third]["moves"] = f"{letter}_shoulder"
+        changed[fourth] = {"limits": bend, "offset": elbow}
+    fixed = Group.NOTHING, "r_waist", FIXED, X, (0.0, 0.0)
+    yield Joint("torso", *fixed, "torso", "torso", _shoulders)
+    for joint in SKELETON:
+        name = joint.rep155
+        row = joint._replace(name=name, parent=names.get(joint.parent, ""), moves=name)
+        if joint.parent == "torso_roll":
+            row = row._replace(parent="torso", offset=_from_shoulders(joint))
+        yield row._replace(**changed.get(joint.name, {}))
+
+
+def _shoulders(parts: BodyParts[float]) -> Point:
+    return 0.0, 0.0, parts.shoulder_height_m
+
+
+def _from_shoulders(joint: Joint) -> Offset:
+    def offset(parts: BodyParts[float]) -> Point:
+        x, y, z = joint.offset(parts)
+        return x, y, z - parts.shoulder_height_m
+
+    return offset
 
 
 class Rep155Joints:
@@ -75,14 +123,13 @@ class Rep155Joints:
         self._last = {1.0: np.zeros(4), -1.0: np.zeros(4)}
 
     def __call__(self, posture: FloatArray) -> FloatArray:
-        """Return the 12 values of ``REP155_JOINTS``, rad and metres, of a posture (12,)."""
+        """Return the values of the first 12 joints, rad and metres, of a posture (12,)."""
         return np.concatenate(
             [posture[TORSO], self._arm(posture[LEFT_ARM], 1.0), self._arm(posture[RIGHT_ARM], -1.0)]
         )
 
     def _arm(self, angles: FloatArray, side: float) -> FloatArray:
-        upper_arm = rotation_x(side * angles[0]) @ rotation_y(-angles[1])
-        forearm = upper_arm @ rotation_x(side * angles[2]) @ rotation_y(-angles[3])
+        upper_arm, forearm = arm_rotations(angles, side)
         last = self._last[side]
         # Directions of the limbs, mirrored to the left side.
         mirror = np.array([1.0, side, 1.0])

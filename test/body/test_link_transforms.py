@@ -10,9 +10,13 @@ import pytest
 
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.skeleton import JOINT_NAMES, PLACE_NAMES
-from cardbox_tracker.description.link_transforms import LinkTransform, LinkTransforms
-from cardbox_tracker.description.rep155_urdf import rep155_urdf
-from cardbox_tracker.description.urdf import ROOT_LINK, urdf_from_body
+from cardbox_tracker.body.urdf import (
+    ROOT_LINK,
+    LinkTransform,
+    LinkTransforms,
+    rep155_urdf,
+    urdf_from_body,
+)
 
 BODY = BodyModel.of(distance_m=2.3, hip_height_m=-0.4, camera_pitch_rad=0.2)
 
