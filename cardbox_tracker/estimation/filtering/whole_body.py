@@ -64,8 +64,8 @@ _LOCATED_EFFORT = 0.25
 _FITTED, _FITTED_STEPS, _FITTED_DAMPING = (6, 1, 0.1), 3, 0.25**-2
 # The same for fits to outlines.
 _OUTLINED, _OUTLINED_STEPS = (3, 1, 0.1), 2
-# Inverse variances (14,) of the prior around the search's mean, angles in rad and places in m: the outline
-# only moves it slightly, so that it does not become another posture with a similar outline.
+# Inverse variances (14,) of the prior around the search's mean, angles in rad and places in m: the
+# outline only moves it slightly, so that it does not become another posture of a similar outline.
 _NEAR = (0.7 * np.array([0.1, 0.1, 0.1, 0.2, *[0.2] * (2 * ARM_ANGLES), 0.1, 0.1])) ** -2
 # The same for cues that tell where joints are, which mainly correct the depth of the arms.
 _LOCATED = np.array([0.03, 0.05, 0.05, 0.08, *[0.2] * (2 * ARM_ANGLES), 0.05, 0.02]) ** -2
