@@ -17,7 +17,7 @@ import numpy as np
 from cardbox_tracker.body.neck import NECK_NAMES
 from cardbox_tracker.body.posture import JOINT_NAMES, PLACE_NAMES, TORSO_Y
 from cardbox_tracker.body.sizes import FloatArray
-from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
+from cardbox_tracker.description.markers import MarkerShape, marker_shapes
 from cardbox_tracker.estimation.estimate import Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.keypoint_status import KeypointStates, keypoint_states

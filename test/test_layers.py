@@ -21,18 +21,17 @@ LAYERS: tuple[tuple[str, ...], ...] = (
         *("processes", "progress", "settings", "small_yaml"),
     ),
     ("body",),
-    ("vision", "description"),
+    ("vision",),
+    ("description",),
     ("detection",),
     ("estimation",),
-    ("ergonomics", "exporting", "retargeting"),
-    ("drawing",),
     ("keypoint_status",),
     ("outputs",),
     ("tracking_report",),
     ("recordings",),
     ("simulation",),
     ("evaluation",),
-    ("viewing",),
+    ("applications",),
     ("ros",),
     ("demo",),
     ("commands",),
@@ -40,6 +39,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 )
 # The layers inside a folder; what is not named may use all of them.
 INSIDE: dict[str, tuple[tuple[str, ...], ...]] = {
+    "applications": (("drawing",), ("ergonomics", "exporting", "retargeting", "viewing")),
     "estimation": (("cost",), ("config", "filtering"), ("initialization",)),
     "ros": (("runtime", "messages"), ("nodes",)),
 }

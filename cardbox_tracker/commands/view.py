@@ -14,9 +14,9 @@ from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_input
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.viewing.feed import Feed
+    from cardbox_tracker.applications.viewing.scene import Scene
     from cardbox_tracker.evaluation.truth import TrueFrame
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.scene import Scene
 
 NAME = "view"
 HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
@@ -67,11 +67,11 @@ def run(options: argparse.Namespace) -> None:
         raise CardboxError(
             "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
         )
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.layout import columns, layout
-    from cardbox_tracker.viewing.library import recording
-    from cardbox_tracker.viewing.same_images import check_same_images
-    from cardbox_tracker.viewing.scene import Scene
+    from cardbox_tracker.applications.viewing.feed import Feed
+    from cardbox_tracker.applications.viewing.layout import columns, layout
+    from cardbox_tracker.applications.viewing.library import recording
+    from cardbox_tracker.applications.viewing.same_images import check_same_images
+    from cardbox_tracker.applications.viewing.scene import Scene
 
     first_ns = check_same_images(*results) if len(results) > 1 else None
     truth = None if options.live else _truth_of(options, results)
@@ -145,8 +145,8 @@ def _truth_of(
     Raises:
         CardboxError: the ground truth cannot be read, or is given for other images.
     """
+    from cardbox_tracker.applications.viewing.same_images import image_stamps
     from cardbox_tracker.evaluation.truth import load_ground_truth
-    from cardbox_tracker.viewing.same_images import image_stamps
 
     path = options.truth or _truth_beside(options.recording)
     if path is None:
@@ -164,9 +164,9 @@ def _truth_of(
 
 def _show_results(paths: Sequence[Path], feeds: Sequence[Feed]) -> list[int]:
     """Show the results in bags; return the number of images with a posture of each."""
+    from cardbox_tracker.applications.viewing.result_bag import show_together
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.viewing.result_bag import show_together
 
     if not paths:
         return []
@@ -178,7 +178,7 @@ def _show_results(paths: Sequence[Path], feeds: Sequence[Feed]) -> list[int]:
 
 def _track(options: argparse.Namespace, feed: Feed) -> int:
     """Track the recording and show it; return the number of images with a posture."""
-    from cardbox_tracker.viewing.tracking import ShownTracking
+    from cardbox_tracker.applications.viewing.tracking import ShownTracking
 
     shown = ShownTracking(feed)
     track_inputs(options, observers=(shown,))

@@ -7,11 +7,11 @@ from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
+from cardbox_tracker.applications.viewing.feed import Feed
+from cardbox_tracker.applications.viewing.scene import Scene
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.node import CardboxNode, run_node
-from cardbox_tracker.viewing.feed import Feed
-from cardbox_tracker.viewing.scene import Scene
 
 _ROBOT = "retarget"
 

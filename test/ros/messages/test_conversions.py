@@ -17,7 +17,7 @@ from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
-from cardbox_tracker.drawing.markers import MarkerShape, marker_shapes
+from cardbox_tracker.description.markers import MarkerShape, marker_shapes
 from cardbox_tracker.errors import CameraError, EncodingError, NotFiniteError
 from cardbox_tracker.keypoint_status import KeypointStates
 from cardbox_tracker.outputs import OUTPUTS, JointValues, Markers, Points, Text
