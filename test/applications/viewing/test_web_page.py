@@ -10,7 +10,7 @@ from urllib.request import urlopen
 
 import pytest
 
-from cardbox_tracker.applications.viewing.web_page import THIS_COMPUTER, web_page
+from cardbox_tracker.applications.viewing.viewer import THIS_COMPUTER, web_page
 
 
 class Files(BaseHTTPRequestHandler):
