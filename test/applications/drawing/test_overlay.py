@@ -1,4 +1,4 @@
-"""Overlays: the model is drawn where it is, and only if there is one."""
+"""Overlays: the model is drawn where it is, and only if there is one; heads can be hidden."""
 
 from __future__ import annotations
 
@@ -17,15 +17,19 @@ from cardbox_tracker.applications.drawing.overlay import (
     draw_message,
     draw_model,
     draw_overlay,
+    with_hidden_head,
 )
+from cardbox_tracker.body.cardbox import PATCH_NAMES, cardbox_patches
 from cardbox_tracker.body.keypoint_state import KeypointState
 from cardbox_tracker.body.kinematics import forward_kinematics, keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.body.posture import reference_posture
+from cardbox_tracker.body.proportions import body_from_proportions
 from cardbox_tracker.description.markers import marker_shapes
+from cardbox_tracker.detection.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.estimation.config import default_preset
 from cardbox_tracker.estimation.cost.whole_body import WholeBodyCost
-from cardbox_tracker.estimation.estimate import Estimate
+from cardbox_tracker.estimation.estimate import NO_PERSON, TRACKING, Estimate
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.vision.camera import Camera
 
@@ -165,16 +169,6 @@ def test_the_gaze_points_where_the_face_looks(yaw_rad: float, side: int) -> None
     assert not near(draw_overlay(GREY, BODY, CAMERA, FOUND), GAZE_BGR).any()
 
 
-def test_the_skeletons_marker_has_the_gaze_last() -> None:
-    plain = marker_shapes(BODY, CAMERA, FRONT)[1].points_m
-    looking = marker_shapes(BODY, CAMERA, FRONT, neck=np.array([0.5, 0.2]))[1].points_m
-    np.testing.assert_array_equal(looking[:-2], plain)
-    start, end = CAMERA.optical_to_reference(looking[-2:])
-    direction = (end - start) / np.linalg.norm(end - start)
-    expected = (np.cos(0.5) * np.cos(0.2), np.sin(0.5) * np.cos(0.2), -np.sin(0.2))
-    np.testing.assert_allclose(direction, expected, atol=1e-9)
-
-
 def test_bones_to_uncertain_hands_are_yellow_lost_ones_red_and_hidden_ones_dashed() -> None:
     camera = CAMERA.scaled(960, 720)
     grey = np.full((720, 960), 90, np.uint8)
@@ -191,3 +185,55 @@ def test_bones_to_uncertain_hands_are_yellow_lost_ones_red_and_hidden_ones_dashe
         states = tuple(state if i == 2 else KeypointState.TRACKED for i in range(6))
         overlay = draw_overlay(grey, BODY, camera, replace(FOUND, keypoint_states=states))
         assert least <= near(overlay, colour)[rows, columns].mean() <= most
+
+
+AVERAGE = body_from_proportions(1.75, 2.0)
+NEAR = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
+# Every pixel differs from its neighbours.
+NOISE = np.random.default_rng(0).integers(0, 256, (240, 320, 3), np.uint8)
+
+
+def hidden_by(estimate: Estimate, points: ImagePoints | None = None) -> np.ndarray:
+    """Return which pixels (H, W) of noise were changed."""
+    drawn = with_hidden_head(NOISE, AVERAGE, NEAR, estimate, points)
+    assert drawn.shape == NOISE.shape
+    return np.asarray((drawn != NOISE).any(axis=2))
+
+
+def head_px(posture: np.ndarray) -> np.ndarray:
+    """Return the pixels (n, 2) of the corners of the model's head."""
+    patches = cardbox_patches(AVERAGE, posture)[[PATCH_NAMES.index("head_frontal")]]
+    return NEAR.project(NEAR.reference_to_optical(patches)).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("pitch_rad", [0.0, 0.6])
+def test_the_head_becomes_coarse(pitch_rad: float) -> None:
+    posture = np.zeros(12)
+    posture[2] = pitch_rad
+    changed = hidden_by(Estimate(TRACKING, posture))
+    (left, top), (right, bottom) = head_px(posture).min(axis=0), head_px(posture).max(axis=0)
+    inside = changed[max(0, int(top)) : int(bottom), int(left) : int(right)]
+    assert inside.mean() > 0.95
+    assert not changed[200:].any()
+    assert changed.mean() < 0.25
+
+
+def test_few_colours_remain() -> None:
+    drawn = with_hidden_head(NOISE, AVERAGE, NEAR, Estimate(TRACKING, np.zeros(12)))
+    changed = (drawn != NOISE).any(axis=2)
+    assert len(np.unique(drawn[changed], axis=0)) <= 60
+    assert (np.random.default_rng(0).integers(0, 256, NOISE.shape, np.uint8) == NOISE).all()
+
+
+def test_the_points_of_a_face_are_hidden_too() -> None:
+    px = np.full((len(POINT_NAMES), 2), np.nan)
+    px[POINT_NAMES.index("nose")] = 290.0, 40.0
+    points = ImagePoints(px, np.where(np.isfinite(px[:, 0]), 0.9, 0.0))
+    near_the_point = np.s_[35:46, 285:296]
+    estimate = Estimate(TRACKING, np.zeros(12))
+    assert not hidden_by(estimate)[near_the_point].any()
+    assert hidden_by(estimate, points)[near_the_point].mean() > 0.95
+
+
+def test_an_unknown_head_hides_everything() -> None:
+    assert hidden_by(Estimate(NO_PERSON)).mean() > 0.95

@@ -17,6 +17,7 @@ from cardbox_tracker.applications.retargeting.robot import load_robot, parse_rob
 from cardbox_tracker.body.kinematics import arm_directions, rotation_x, rotation_y, rotation_z
 from cardbox_tracker.body.posture import JOINT_NAMES, RIGHT_ARM
 from cardbox_tracker.body.proportions import body_from_proportions
+from cardbox_tracker.errors import CardboxError
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = load_robot(CONFIG / "example_arm.urdf")
@@ -103,3 +104,24 @@ def test_a_posture_without_a_neck_has_an_unknown_one() -> None:
     whole = with_neck(np.ones(12), np.zeros(12), 0.5)
     assert whole[:12].tolist() == [1.0] * 12
     assert np.isnan(whole[12:]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("joints: []", "empty list"),
+        ("arms: 1", "'joints'"),
+        ("joints: [{from: left_elbow_flexion}]", "needs 'to'"),
+        ("joints: [{from: knee, to: a}]", "'knee'.* torso_y"),
+        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite number"),
+        (
+            "joints: [{from: left_elbow_flexion, to: a}, {from: torso_yaw, to: a}]",
+            "two rows",
+        ),
+    ],
+)
+def test_what_is_no_joint_map_is_told(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    with pytest.raises(CardboxError, match=expected):
+        load_joint_map(path)

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.retargeter import Limits, Retargeter, SafeMotion
-from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
+from cardbox_tracker.applications.retargeting.robot import load_robot
 from cardbox_tracker.body.posture import JOINT_NAMES, reference_posture
 from cardbox_tracker.body.proportions import body_from_proportions
-from cardbox_tracker.errors import CardboxError
 
 CONFIG = Path(__file__).parents[3] / "config"
 ROBOT = load_robot(CONFIG / "example_arm.urdf")
@@ -160,71 +159,3 @@ def test_after_holding_nothing_is_made_up_for() -> None:
     before = robot.update(0, "tracking", BODY, posture, SURE).positions
     assert robot.hold("no posture", 10**8).status == "frozen: no posture"
     assert (robot.update(10**9, "tracking", BODY, posture, SURE).positions == before).all()
-
-
-URDF = """<robot name="r">
-<link name="a"/><link name="b"/><link name="c"/>
-<joint name="turns" type="continuous"><parent link="a"/><child link="b"/></joint>
-<joint name="slides" type="prismatic"><parent link="b"/><child link="c"/>
-<limit lower="0.1" upper="0.4" velocity="0.2" effort="1"/></joint>
-</robot>"""
-
-
-def test_a_robot_is_read() -> None:
-    robot = parse_robot(URDF)
-    assert robot.links == ("a", "b", "c")
-    assert robot.last_link == "c"
-    assert robot.chain("b") == ("turns",)
-    lower, upper, speed = robot.limits_of(("slides", "turns"))
-    assert lower == pytest.approx([0.1, -math.pi])
-    assert upper == pytest.approx([0.4, math.pi])
-    assert speed.tolist() == [0.2, math.inf]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("<robot", "<robot xmlns:xacro='x'", "xacro FILE > robot.urdf"),
-        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
-        ("</robot>", "", "expected the URDF"),
-        ('upper="0.4"', 'upper="inf"', "slides.* 0.1 to inf"),
-        ('upper="0.4"', 'upper="0"', "slides.* 0.1 to 0.0"),
-        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
-        ('<parent link="b"/>', "", "slides has no parent"),
-        ('<child link="c"/>', '<child link="b"/>', "b has two parents"),
-        ('<parent link="a"/>', '<parent link="c"/>', "its own ancestor"),
-    ],
-)
-def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
-    with pytest.raises(CardboxError, match=expected):
-        parse_robot(URDF.replace(old, new))
-
-
-def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
-    with pytest.raises(CardboxError, match=r"joint 'wheel'; .*shoulder_roll"):
-        ROBOT.limits_of(("wheel",))
-    with pytest.raises(CardboxError, match=r"link 'foot'; .*base_link"):
-        ROBOT.chain("foot")
-    with pytest.raises(CardboxError, match="No such file"):
-        load_robot(tmp_path / "missing.urdf")
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("joints: []", "empty list"),
-        ("arms: 1", "'joints'"),
-        ("joints: [{from: left_elbow_flexion}]", "needs 'to'"),
-        ("joints: [{from: knee, to: a}]", "'knee'.* torso_y"),
-        ("joints: [{from: left_elbow_flexion, to: a, scale: .inf}]", "finite number"),
-        (
-            "joints: [{from: left_elbow_flexion, to: a}, {from: torso_yaw, to: a}]",
-            "two rows",
-        ),
-    ],
-)
-def test_what_is_no_joint_map_is_told(tmp_path: Path, text: str, expected: str) -> None:
-    path = tmp_path / "map.yaml"
-    path.write_text(text)
-    with pytest.raises(CardboxError, match=expected):
-        load_joint_map(path)

@@ -1,7 +1,8 @@
-"""A description that is too large is refused before a robot is built from it."""
+"""A robot is read from its URDF; what is damaged or too large is refused in words."""
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 from pathlib import Path
@@ -16,6 +17,54 @@ from cardbox_tracker.applications.retargeting.robot import load_robot, parse_rob
 from cardbox_tracker.errors import CardboxError
 
 PROMISE = "A URDF of any size, depth or content is read or refused in words"
+
+
+ROBOT = load_robot(Path(__file__).parents[3] / "config" / "example_arm.urdf")
+URDF = """<robot name="r">
+<link name="a"/><link name="b"/><link name="c"/>
+<joint name="turns" type="continuous"><parent link="a"/><child link="b"/></joint>
+<joint name="slides" type="prismatic"><parent link="b"/><child link="c"/>
+<limit lower="0.1" upper="0.4" velocity="0.2" effort="1"/></joint>
+</robot>"""
+
+
+def test_a_robot_is_read() -> None:
+    robot = parse_robot(URDF)
+    assert robot.links == ("a", "b", "c")
+    assert robot.last_link == "c"
+    assert robot.chain("b") == ("turns",)
+    lower, upper, speed = robot.limits_of(("slides", "turns"))
+    assert lower == pytest.approx([0.1, -math.pi])
+    assert upper == pytest.approx([0.4, math.pi])
+    assert speed.tolist() == [0.2, math.inf]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("<robot", "<robot xmlns:xacro='x'", "xacro FILE > robot.urdf"),
+        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
+        ("</robot>", "", "expected the URDF"),
+        ('upper="0.4"', 'upper="inf"', "slides.* 0.1 to inf"),
+        ('upper="0.4"', 'upper="0"', "slides.* 0.1 to 0.0"),
+        ('lower="0.1" upper="0.4"', 'lower="x" upper="0.4"', "could not convert"),
+        ('<parent link="b"/>', "", "slides has no parent"),
+        ('<child link="c"/>', '<child link="b"/>', "b has two parents"),
+        ('<parent link="a"/>', '<parent link="c"/>', "its own ancestor"),
+    ],
+)
+def test_what_is_no_robot_is_told(old: str, new: str, expected: str) -> None:
+    with pytest.raises(CardboxError, match=expected):
+        parse_robot(URDF.replace(old, new))
+
+
+def test_what_a_robot_lacks_is_told(tmp_path: Path) -> None:
+    with pytest.raises(CardboxError, match=r"joint 'wheel'; .*shoulder_roll"):
+        ROBOT.limits_of(("wheel",))
+    with pytest.raises(CardboxError, match=r"link 'foot'; .*base_link"):
+        ROBOT.chain("foot")
+    with pytest.raises(CardboxError, match="No such file"):
+        load_robot(tmp_path / "missing.urdf")
 
 
 def chain(count: int, kind: str = "revolute", more: str = "") -> str:
@@ -49,7 +98,7 @@ TOO_LARGE = {
 @pytest.mark.parametrize("name", TOO_LARGE)
 def test_what_is_too_large_is_refused_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text, words = TOO_LARGE[name]
-    built = "cardbox_tracker.applications.retargeting.robot.Xml.fromstring"
+    built = "cardbox_tracker.applications.retargeting.robot._robot"
     monkeypatch.setattr(built, lambda _: pytest.fail("it was built"))
     with pytest.raises(CardboxError, match=f"arm.urdf .*{words}"):
         parse_robot(text, "arm.urdf")
