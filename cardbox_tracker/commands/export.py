@@ -14,7 +14,7 @@ HELP = "write results as TRC, BVH or C3D, or as joint angles of the ISB"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox export``."""
-    from cardbox_tracker.exporting.formats import FORMATS
+    from cardbox_tracker.applications.exporting.formats import FORMATS
 
     parser.add_argument(
         "results",
@@ -56,11 +56,11 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the results or the model cannot be read or do not belong together, a library
             is missing, or the file cannot be written.
     """
+    from cardbox_tracker.applications.exporting.formats import FORMATS
+    from cardbox_tracker.applications.exporting.motion_reader import read_motion
+    from cardbox_tracker.applications.exporting.placed import images_of_body
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.estimation.estimate import UNCERTAIN
-    from cardbox_tracker.exporting.formats import FORMATS
-    from cardbox_tracker.exporting.placed import images_of_body
-    from cardbox_tracker.recordings.motion_reader import read_motion
 
     chosen = FORMATS[options.to]
     output = options.output or Path(options.results.resolve().stem + chosen.suffix)

@@ -15,7 +15,7 @@ HELP = "move a robot arm, given by its URDF, as the measured person moves theirs
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox retarget``."""
-    from cardbox_tracker.retargeting.config import RetargetConfig
+    from cardbox_tracker.applications.retargeting.config import RetargetConfig
 
     parser.add_argument(
         "results", type=Path, metavar="RESULTS", help="bag of results, of 'cardbox track --bag'"
@@ -59,10 +59,14 @@ def run(options: argparse.Namespace) -> None:
     Raises:
         CardboxError: the bag, the robot or the map cannot be read, or a result cannot be written.
     """
+    from cardbox_tracker.applications.retargeting.config import RetargetConfig
+    from cardbox_tracker.applications.retargeting.recording import (
+        retarget_bag,
+        write_bag,
+        write_csv,
+    )
+    from cardbox_tracker.applications.retargeting.retargeter import make_retargeter
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.recordings.retarget import retarget_bag, write_bag, write_csv
-    from cardbox_tracker.retargeting.config import RetargetConfig
-    from cardbox_tracker.retargeting.setup import make_retargeter
 
     check_outputs(
         (options.csv,),

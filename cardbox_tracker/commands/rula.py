@@ -15,11 +15,10 @@ from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_input
 from cardbox_tracker.errors import CardboxError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.recording import MomentImages, RulaRow
+    from cardbox_tracker.applications.ergonomics.report import PageContent
     from cardbox_tracker.body.model import BodyModel
-    from cardbox_tracker.ergonomics.config import RulaConfig
-    from cardbox_tracker.ergonomics.page import PageContent
-    from cardbox_tracker.ergonomics.recording import RulaRow
-    from cardbox_tracker.recordings.moment_images import MomentImages
 
 NAME = "rula"
 HELP = "score the strain on arms, neck and trunk in a recording (RULA)"
@@ -32,7 +31,7 @@ _LEAST_CLOCK_S = 1e9
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox rula``."""
-    from cardbox_tracker.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
 
     add_inputs(parser)
     parser.add_argument(
@@ -80,14 +79,16 @@ def run(options: argparse.Namespace) -> None:
         CardboxError: the recording or the body model cannot be read, a setting is out of range, an
             option has no effect, or a result cannot be written.
     """
-    from cardbox_tracker.ergonomics.config import RulaConfig
-    from cardbox_tracker.ergonomics.page import write_page
-    from cardbox_tracker.ergonomics.plot import plot_scores
-    from cardbox_tracker.ergonomics.recording import summarize, write_csv
-    from cardbox_tracker.ergonomics.report import report_lines
-    from cardbox_tracker.ergonomics.shares import score_shares, write_shares
-    from cardbox_tracker.recordings.moment_images import MomentImages
-    from cardbox_tracker.recordings.rula import RulaObserver
+    from cardbox_tracker.applications.ergonomics.config import RulaConfig
+    from cardbox_tracker.applications.ergonomics.recording import (
+        MomentImages,
+        RulaObserver,
+        score_shares,
+        summarize,
+        write_csv,
+        write_shares,
+    )
+    from cardbox_tracker.applications.ergonomics.report import plot_scores, report_lines, write_page
 
     if options.html is None and (options.title is not None or options.images != IMAGES[0]):
         raise CardboxError("--images and --title change the page of --html; give --html OUT.html")
@@ -123,7 +124,7 @@ def _content(
     body: BodyModel | None,
     images: MomentImages | None,
 ) -> PageContent:
-    from cardbox_tracker.ergonomics.page import PageContent
+    from cardbox_tracker.applications.ergonomics.report import PageContent
 
     name = options.recording.resolve().name
     person = f"stature {options.stature} m" if options.model is None else options.model.name

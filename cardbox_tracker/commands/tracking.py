@@ -122,12 +122,14 @@ def track_inputs(
         CardboxError: the recording or the body model cannot be read, a setting is out of range, or
             a result cannot be written.
     """
+    from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
+    from cardbox_tracker.applications.drawing.video import overlay_video
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.recording import open_recording
     from cardbox_tracker.recordings.result_bag import result_bag
     from cardbox_tracker.recordings.silhouettes import TimeSpan
-    from cardbox_tracker.recordings.track import TrackFiles, track_recording
+    from cardbox_tracker.recordings.track import track_recording
 
     start_s = start_of(options)
     # Mistakes in the numbers are reported before the recording is read.
@@ -159,7 +161,8 @@ def track_inputs(
     ) as source:
         total_s = max(1e-9, source.first.duration_s - start_s)
         with (
-            result_bag(files.bag, source.first.frame_id, force) as record,
+            overlay_video(files.video, source) as film,
+            result_bag(files.bag, source.first.frame_id, force, draw_sharp_overlay) as record,
             nullcontext(show) if show else progress_bar("track") as advance,
         ):
             summary = track_recording(
@@ -168,8 +171,9 @@ def track_inputs(
                 config,
                 options.seed,
                 start_s,
-                TrackFiles(files.table, files.video),
+                files.table,
                 observers=(
+                    film,
                     record,
                     *observers,
                     lambda frame, *_: advance((frame.time_s - start_s) / total_s),

@@ -14,9 +14,8 @@ from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_input
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
+    from cardbox_tracker.applications.viewing.scene import Scene
     from cardbox_tracker.evaluation.truth import TrueFrame
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.scene import Scene
 
 NAME = "view"
 HELP = "show results in a viewer: image, body in 3D, plots, error, a slider for the time"
@@ -67,11 +66,9 @@ def run(options: argparse.Namespace) -> None:
         raise CardboxError(
             "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
         )
-    from cardbox_tracker.viewing.feed import Feed
-    from cardbox_tracker.viewing.layout import columns, layout
-    from cardbox_tracker.viewing.library import recording
-    from cardbox_tracker.viewing.same_images import check_same_images
-    from cardbox_tracker.viewing.scene import Scene
+    from cardbox_tracker.applications.viewing.scene import Scene, columns, layout
+    from cardbox_tracker.applications.viewing.sources import check_same_images
+    from cardbox_tracker.applications.viewing.viewer import recording
 
     first_ns = check_same_images(*results) if len(results) > 1 else None
     truth = None if options.live else _truth_of(options, results)
@@ -83,10 +80,10 @@ def run(options: argparse.Namespace) -> None:
         if options.live:
             _show_nodes(Scene(stream))
         elif not results:
-            count = _track(options, Feed(Scene(stream), truth))
+            count = _track(options, Scene(stream, truth=truth))
             print(f"shown: {count} images with a posture", flush=True)
-        feeds = [Feed(Scene(stream, column, first_ns), truth) for column in shown[: len(results)]]
-        for column, count in zip(shown, _show_results(results, feeds), strict=False):
+        scenes = [Scene(stream, column, first_ns, truth) for column in shown[: len(results)]]
+        for column, count in zip(shown, _show_results(results, scenes), strict=False):
             print(column.named(f"shown: {count} images with a posture"), flush=True)
         if options.web and not options.live:
             stream.flush()
@@ -145,8 +142,8 @@ def _truth_of(
     Raises:
         CardboxError: the ground truth cannot be read, or is given for other images.
     """
+    from cardbox_tracker.applications.viewing.sources import image_stamps
     from cardbox_tracker.evaluation.truth import load_ground_truth
-    from cardbox_tracker.viewing.same_images import image_stamps
 
     path = options.truth or _truth_beside(options.recording)
     if path is None:
@@ -162,25 +159,25 @@ def _truth_of(
     return None
 
 
-def _show_results(paths: Sequence[Path], feeds: Sequence[Feed]) -> list[int]:
+def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
     """Show the results in bags; return the number of images with a posture of each."""
+    from cardbox_tracker.applications.viewing.sources import show_together
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.recordings.bag_reader import BagReader
-    from cardbox_tracker.viewing.result_bag import show_together
 
     if not paths:
         return []
     with ExitStack() as stack:
         bags = [stack.enter_context(BagReader(path)) for path in paths]
         show = stack.enter_context(progress_bar("view"))
-        return show_together(list(zip(bags, feeds, strict=False)), show)
+        return show_together(list(zip(bags, scenes, strict=False)), show)
 
 
-def _track(options: argparse.Namespace, feed: Feed) -> int:
+def _track(options: argparse.Namespace, scene: Scene) -> int:
     """Track the recording and show it; return the number of images with a posture."""
-    from cardbox_tracker.viewing.tracking import ShownTracking
+    from cardbox_tracker.applications.viewing.sources import ShownTracking
 
-    shown = ShownTracking(feed)
+    shown = ShownTracking(scene)
     track_inputs(options, observers=(shown,))
     return shown.count
 
