@@ -7,13 +7,14 @@ import math
 from pathlib import Path
 
 from cardbox_tracker.commands.arguments import (
+    REFERENCES,
     add_camera_pitch,
-    add_recording,
+    add_force,
     add_references,
     add_seed,
+    check_outputs,
     span,
 )
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
 
 NAME = "calibrate-extrinsics"
 HELP = "find where several cameras stand, from the person in a recording, without a board"
@@ -21,7 +22,16 @@ HELP = "find where several cameras stand, from the person in a recording, withou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox calibrate-extrinsics``."""
-    add_recording(parser)
+    parser.add_argument(
+        "recording", type=Path, metavar="BAG", help="rosbag2 folder or file of all cameras"
+    )
+    parser.add_argument(
+        "--background",
+        type=span,
+        required=True,
+        metavar="T0:T1",
+        help="seconds during which nobody is in view",
+    )
     parser.add_argument(
         "--cameras",
         nargs="+",
@@ -82,7 +92,7 @@ def run(options: argparse.Namespace) -> None:
         side_turn=options.side_turn,
         seed=options.seed,
     )
-    references = {name: getattr(options, name) for name in ("front", "side", "arms")}
+    references = {name: getattr(options, name) for name in REFERENCES}
     with progress_bar("calibrate") as show:
         result = calibrate_recording(
             options.recording,

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=Path, default=Path("demo_output"), metavar="DIR", help="folder of results"
     )
-    add_preset(parser, "default")
+    add_preset(parser)
     add_camera_count(parser, "several see the person together, with the preset default")
     add_seed(parser, "the recording and the filters")
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cardbox_tracker.commands.arguments import add_camera_count, add_seed
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
+from cardbox_tracker.commands.arguments import add_camera_count, add_force, add_seed, check_outputs
 
 NAME = "synthesize"
 HELP = "record a synthetic person, with ground truth"

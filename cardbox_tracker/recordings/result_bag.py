@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -30,7 +30,9 @@ from cardbox_tracker.recordings.bag_markers import write_markers
 from cardbox_tracker.recordings.bag_transforms import BagTransforms
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.recordings.track import Observer
+
+Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
+"""Callback that receives each image with its estimate and the tracker."""
 
 _LATCHED = ("/body_model", "/robot_description")
 
@@ -47,8 +49,8 @@ def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
 
 
 @contextmanager
-def result_bag(path: Path | None, frame_id: str, overwrite: bool = False) -> Iterator[Observer]:
-    """Context of an observer that writes the outputs of each image to a bag, if it has a path.
+def result_bag(path: Path, frame_id: str, overwrite: bool = False) -> Iterator[Observer]:
+    """Context of an observer that writes the outputs of each image to a bag.
 
     The bag appears on exit; after an error there is none. With ``overwrite`` a recording of that
     name is replaced.
@@ -56,9 +58,6 @@ def result_bag(path: Path | None, frame_id: str, overwrite: bool = False) -> Ite
     Raises:
         BagError: ``path`` exists and may not be replaced.
     """
-    if path is None:
-        yield lambda *_: None
-        return
     with result_writer(path, overwrite) as writer:
         yield _ResultBag(writer, frame_id)
 

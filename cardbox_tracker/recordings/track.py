@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cardbox_tracker.body.model import BodyModel
+from cardbox_tracker.body.model_file import save_body_model
 from cardbox_tracker.errors import CardboxError
 from cardbox_tracker.estimation.config import TrackerConfig
-from cardbox_tracker.estimation.estimate import UNCERTAIN, Estimate
+from cardbox_tracker.estimation.estimate import UNCERTAIN
 from cardbox_tracker.estimation.tracker import Tracker
 from cardbox_tracker.recordings.overlay_video import overlay_video
 from cardbox_tracker.recordings.recording import Recording
+from cardbox_tracker.recordings.result_bag import Observer, result_bag
 from cardbox_tracker.recordings.result_table import result_table
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
-
-Observer = Callable[[RecordedFrame, Estimate, Tracker], None]
-"""Callback that receives each image with its estimate and the tracker."""
 
 
 class TrackFiles(NamedTuple):
@@ -30,13 +27,14 @@ class TrackFiles(NamedTuple):
     Attributes:
         table: one row for each image, see :func:`~.result_table.result_table`.
         video: overlay video, at the rate and the resolution of the recording.
+        bag: folder of a bag with the topics of the tracker.
+        body: the body at the end of the recording.
     """
 
     table: Path | None = None
     video: Path | None = None
-
-
-_NO_FILES = TrackFiles()
+    bag: Path | None = None
+    body: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -68,8 +66,9 @@ def track_recording(
     config: TrackerConfig,
     seed: int,
     start_s: float,
-    files: TrackFiles = _NO_FILES,
+    files: TrackFiles | None = None,
     observers: tuple[Observer, ...] = (),
+    overwrite: bool = False,
 ) -> TrackSummary:
     """Track every image from ``start_s`` on.
 
@@ -80,12 +79,14 @@ def track_recording(
         seed: random seed; the same recording and seed give the same bytes.
         start_s: seconds from the recording's start at which the person stands in the front
             reference posture.
-        files: files to write; the table is written atomically.
-        observers: called after each image, such as a progress bar or a bag writer.
+        files: files to write, each atomically; None for none.
+        observers: called after each image, such as a progress bar.
+        overwrite: whether an existing bag is replaced.
 
     Raises:
         CardboxError: no image lies after ``start_s``, or a file cannot be written.
     """
+    files = files or TrackFiles()
     rng = np.random.default_rng(seed)
     tracker = Tracker(body, recording.first.camera, config, rng, others=recording.others)
     costs: list[int] = []
@@ -95,6 +96,9 @@ def track_recording(
         add_row = None
         if files.table is not None:
             add_row = stack.enter_context(result_table(files.table, recording.first.has_points))
+        if files.bag is not None:
+            bag = result_bag(files.bag, recording.first.frame_id, overwrite)
+            observers = (stack.enter_context(bag), *observers)
         if files.video is not None:
             video = stack.enter_context(overlay_video(files.video, recording))
             observers = (video, *observers)
@@ -120,4 +124,6 @@ def track_recording(
     if tracker.agreement is not None:
         tracker.agreement.check(is_last=True)
         remarks += tracker.agreement.remarks(recording.names[1:])
+    if files.body is not None:
+        save_body_model(tracker.body, files.body)
     return TrackSummary(frames, len(costs), *mean, frames_uncertain, tuple(remarks), tracker.body)
