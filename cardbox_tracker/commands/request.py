@@ -205,15 +205,15 @@ class Problems:
             return otherwise
 
     def check(self) -> None:
-        """Raise OptionsError if there was a problem: a line for each, if there are several."""
-        lines = list(dict.fromkeys(self._faults))
+        """Raise OptionsError if there was a problem."""
+        faults = list(dict.fromkeys(self._faults))
         if self._missing:
             *most, last = self._missing
             needed = f"{', '.join(most)}, and {last}" if most else last
             hints = f" ({'; '.join(self._hints)})" if self._hints else ""
-            lines.insert(0, f"{self._recording} needs {needed}{hints}")
-        if lines:
-            raise OptionsError("\n  ".join(lines))
+            faults.insert(0, f"{self._recording} needs {needed}{hints}")
+        if faults:
+            raise OptionsError("; also, ".join(faults))
 
 
 def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> None:
@@ -609,8 +609,7 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
         name: name of the recording, see :func:`~.recordings.folder.recordings_in`.
 
     Raises:
-        CardboxError: a file cannot be read, or has options that tracking does not know, or that
-            contradict each other.
+        CardboxError: a file cannot be read, or has options that tracking does not know.
     """
     found = copy.copy(options)
     for part in reversed([PurePosixPath(name), *PurePosixPath(name).parents][:-1]):
@@ -619,11 +618,7 @@ def with_own_options(options: argparse.Namespace, folder: Path, name: str) -> ar
             continue
         given = _read_options(path)
         for option in given:
-            for other in _REPLACED.get(option, ()):
-                if other in given:
-                    both = " and ".join(f"--{one.replace('_', '-')}" for one in (option, other))
-                    raise CardboxError(f"{path}: {both} exclude each other; leave one of them out")
-                setattr(found, other, None)
+            vars(found).update(dict.fromkeys(_REPLACED.get(option, ())))
         if "set" in given:
             given["set"] = (found.set or {}) | given["set"]
         vars(found).update(given)

@@ -92,7 +92,7 @@ class Row(NamedTuple):
     @classmethod
     def failed(cls, recording: str, error: Exception) -> Row:
         """Return the row of a recording that cannot be tracked, with the reason in one line."""
-        reason = "; ".join(line.strip() for line in str(error).splitlines())
+        reason = " ".join(str(error).split())
         if isinstance(error, OSError):
             reason = f"{type(error).__name__}: {reason}"
         elif not isinstance(error, CardboxError):
