@@ -50,11 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Write the body model and print its sizes.
-
-    Raises:
-        CardboxError: a number is impossible, or the model exists or cannot be written.
-    """
+    """Write the body model and print its sizes."""
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.body.proportions import body_from_proportions
 

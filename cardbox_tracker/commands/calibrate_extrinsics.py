@@ -70,12 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Estimate the extrinsics, write them and print their uncertainty.
-
-    Raises:
-        CardboxError: the recording or a span cannot be used, no pose fits, or the file cannot be
-            written.
-    """
+    """Estimate the extrinsics, write them and print their uncertainty."""
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.estimation.initialization.config import InitializationConfig
     from cardbox_tracker.progress import progress_bar

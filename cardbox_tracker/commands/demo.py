@@ -22,12 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Record, measure and track a synthetic person through the nodes; write the results.
-
-    Raises:
-        CardboxError: the results cannot be written, ROS is missing, a node failed, or the preset
-            is not for several cameras.
-    """
+    """Record, measure and track a synthetic person through the nodes; write the results."""
     from cardbox_tracker.demo.run import run_demo
 
     run_demo(options.output, options.preset, options.seed, options.cameras)

@@ -90,12 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the experiments and write report, plots and numbers.
-
-    Raises:
-        CardboxError: a session cannot be read, the results cannot be written, or there are no
-            experiments because this is not a checkout.
-    """
+    """Run the experiments and write report, plots and numbers."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.sessions:
         _sessions(options, jobs)

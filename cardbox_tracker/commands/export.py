@@ -48,12 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Read the results and write the file.
-
-    Raises:
-        CardboxError: the results or the model cannot be read or do not belong together, a library
-            is missing, or the file cannot be written.
-    """
+    """Read the results and write the file."""
     from cardbox_tracker.body.model_file import load_body_model
     from cardbox_tracker.estimation.estimate import UNCERTAIN
     from cardbox_tracker.exporting.formats import FORMATS

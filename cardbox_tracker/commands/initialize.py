@@ -51,12 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Measure the person, write the body model and print its sizes.
-
-    Raises:
-        CardboxError: options are missing or wrong, the recording cannot be read, its references
-            show wrong postures or give no body, or the model cannot be written.
-    """
+    """Measure the person, write the body model and print its sizes."""
     from cardbox_tracker.body.model import BodyModel
     from cardbox_tracker.body.model_file import save_body_model
     from cardbox_tracker.estimation.initialization.config import InitializationConfig

@@ -226,12 +226,7 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         metavar="RECORDING",
         help="rosbag2 folder or file, video, or folder of JPEG or PNG images",
     )
-    add(
-        "--background",
-        type=span,
-        metavar="T0:T1",
-        help="seconds during which nobody is in view",
-    )
+    add("--background", type=span, metavar="T0:T1", help="seconds during which nobody is in view")
     add(
         "--cameras",
         nargs="+",
@@ -250,25 +245,23 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
     add(
         "--depth",
         metavar="TOPIC",
-        help="depth images (16UC1, 32FC1 or compressedDepth) that cover the same view as the first "
-        "of --cameras; 'stereo' measures depth in the first two of them, a rectified pair, left "
-        "first",
+        help="depth images of the same view as the first of --cameras; 'stereo' measures depth in "
+        "the first two of them, a rectified pair, left first",
     )
     add(
         "--within",
         type=float,
         metavar="M",
-        help="in place of --background: limit of the depth in the images of --depth, metres; "
-        "choose it between the person and the wall",
+        help="in place of --background: all that is nearer in the images of --depth, metres, is "
+        "the person",
     )
     add(
         "--silhouettes",
         choices=("background", "detector", "person_in_view"),
-        help="source of the silhouettes: the difference from the scene of --background; the mask "
-        "of a person detector ('cardbox detector --install'); or the difference from a scene that "
-        "is learned around the person, who must step aside at some time. With neither --background "
-        "nor --within, the mask is the default with --detector mediapipe, and person_in_view for "
-        "videos and images",
+        help="what tells the person from the scene: the empty scene of --background; the mask of a "
+        "person detector; or a scene that is learned around the person, who must step aside at "
+        "some time. With neither --background nor --within, the mask is the default with "
+        "--detector mediapipe, and person_in_view for videos and images",
     )
     add(
         "--detector",
@@ -280,9 +273,8 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         "--fov",
         type=float,
         metavar="DEG",
-        help="the camera's field of view across the width of the image as it is shown: webcams 60 "
-        "to 78, phones 60 to 70 held sideways and 36 to 43 upright; for videos, images, and bags "
-        "without CameraInfo",
+        help="field of view across the width of the image as it is shown: webcams 60 to 78, phones "
+        "60 to 70 held sideways and 36 to 43 upright; not for bags with CameraInfo",
     )
     add(
         "--calibration",
@@ -294,8 +286,7 @@ def add_recording(parser: argparse.ArgumentParser, required: bool = True) -> Non
         "--camera-roll-deg",
         type=between(-_MOST_ROLL_DEG, _MOST_ROLL_DEG),
         metavar="R",
-        help="how far the camera is turned clockwise about its axis, seen from behind it; the "
-        "images are turned back",
+        help="how far the camera is turned clockwise, seen from behind it; images are turned back",
     )
     add(
         "--fps",
@@ -337,8 +328,7 @@ def add_tracking(parser: argparse.ArgumentParser, needs_recording: bool = True) 
         type=time,
         metavar="T",
         help="second at which the person stands as for --front; tracking starts there. With "
-        "--stature, or a body of 'cardbox body', any posture will do: it is fitted to the first "
-        "silhouette (default with --stature: 0)",
+        "--stature, or a body of 'cardbox body', any posture will do (default with --stature: 0)",
     )
     add_preset(parser)
     effort = settings_of(WholeBodyConfig)["effort"]

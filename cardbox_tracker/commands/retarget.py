@@ -49,11 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Retarget a recording to the robot and write the results.
-
-    Raises:
-        CardboxError: the bag, the robot or the map cannot be read, or a result cannot be written.
-    """
+    """Retarget a recording to the robot and write the results."""
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.retarget import retarget_bag, write_bag, write_csv
     from cardbox_tracker.retargeting.config import RetargetConfig

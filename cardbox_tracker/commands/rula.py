@@ -67,12 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person, score every image, and print times, part scores and declared inputs.
-
-    Raises:
-        CardboxError: the recording or the body model cannot be read, a setting is out of range, an
-            option has no effect, or a result cannot be written.
-    """
+    """Track the person, score every image, and print times, part scores and declared inputs."""
     from cardbox_tracker.ergonomics.config import RulaConfig
     from cardbox_tracker.ergonomics.page import write_page
     from cardbox_tracker.ergonomics.plot import plot_scores

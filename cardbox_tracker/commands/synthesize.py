@@ -39,11 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Write the recording.
-
-    Raises:
-        CardboxError: the motion is unknown, or the recording cannot be written.
-    """
+    """Write the recording."""
     from cardbox_tracker.progress import progress_bar
     from cardbox_tracker.simulation.session import SessionFormat, synthesize_session
 

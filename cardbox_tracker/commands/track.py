@@ -60,12 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Track the person and write the requested files.
-
-    Raises:
-        CardboxError: options are missing or wrong, a recording cannot be read, or a result cannot
-            be written.
-    """
+    """Track the person and write the requested files."""
     from cardbox_tracker.recordings.folder import is_one_recording, recordings_in
 
     path = options.recording

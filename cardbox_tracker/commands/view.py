@@ -55,11 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed, or the input cannot be read.
-    """
+    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes."""
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
     inputs = *inputs_of(options), options.truth, options.beside
