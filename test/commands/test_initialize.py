@@ -1,4 +1,4 @@
-"""'cardbox initialize', 'body' and 'calibrate-extrinsics': a person, and mistakes told in words."""
+"""'cardbox initialize', 'body' and 'calibrate-extrinsics': results and error messages."""
 
 from __future__ import annotations
 

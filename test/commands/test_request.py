@@ -1,4 +1,4 @@
-"""The request that the options make, what is told of wrong ones, and options in files."""
+"""The request that the options make, how wrong ones are reported, and options in files."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_a_model_needs_the_start(film: Path) -> None:
         (("--set", "foo=1", "--stature=9"), ["'foo' is no setting", "stature is 9 m"]),
     ],
 )
-def test_all_that_is_wrong_is_told_at_once(
+def test_all_that_is_wrong_is_reported_at_once(
     words: tuple[str, ...], expected: list[str], film: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(film.parent)
@@ -142,14 +142,14 @@ def test_all_that_is_wrong_is_told_at_once(
     assert told.count("; also, ") >= len(expected) - 1
 
 
-def test_a_recording_that_is_none_is_told_with_the_rest(tmp_path: Path) -> None:
+def test_a_recording_that_is_none_is_reported_with_the_rest(tmp_path: Path) -> None:
     told = refused(tmp_path / "no.mp4")
     assert "no.mp4 needs --stature M" in told
     assert "there is no recording" in told
 
 
 def test_films_are_known_by_their_content(tmp_path: Path) -> None:
-    """Images are a film; a folder without any, or a file of another kind, is told when opened."""
+    """Images are a film; a folder without any, or a file of another kind, is reported when it is opened."""
     cv2.imwrite(str(tmp_path / "1.png"), np.zeros((8, 8), np.uint8))
     assert "--fov DEG" in refused(tmp_path, "--stature", 1.7)
     (tmp_path / "text.txt").touch()

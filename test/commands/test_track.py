@@ -1,4 +1,4 @@
-"""'cardbox track' of a recording: bags and films, mistakes told in words, nothing lost."""
+"""'cardbox track' of a recording: bags and films, error messages, nothing lost."""
 
 from __future__ import annotations
 
