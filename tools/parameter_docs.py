@@ -109,8 +109,8 @@ def _settings_section() -> list[str]:
     lines = [
         *("", "## Settings of the tracker in a file", ""),
         "`cardbox track` takes any of these as `--set NAME=VALUE`. Its option `--settings` and the",
-        "parameter `settings_file` of the tracker take a YAML file, in which each part before a dot",
-        "is a level of its own:",
+        "parameter `settings_file` of the tracker take a YAML file, in which each part before a",
+        "dot is a level of its own:",
         "",
         *("```yaml", "whole_body:", "  effort: 0.5", "  cost:", "    yaw_deg: 20.0", "```", ""),
         "`torso`, `arm`, `strategy`, `cycles`, `average` and `torso_beside_arms` are of the preset",

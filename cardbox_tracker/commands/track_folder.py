@@ -121,14 +121,6 @@ class Job(NamedTuple):
     number: int = 0
 
 
-class Outcome(NamedTuple):
-    """A finished job: its row, and the lines that it printed."""
-
-    job: Job
-    row: Row
-    lines: list[str]
-
-
 def track_folder(options: argparse.Namespace) -> None:
     """Track each recording of a folder that is not finished, and print a summary.
 
@@ -146,15 +138,15 @@ def track_folder(options: argparse.Namespace) -> None:
     if len(rows) == len(recordings) > 1 and len(reasons) == 1:
         raise CardboxError(f"{reasons[0][1]} (the same for all {len(rows)} recordings)")
     if not options.force:
-        kept = [job for job in jobs if _is_finished(job, before, output, formats)]
-        jobs = [job for job in jobs if job not in kept]
-        rows |= {job.name: before[job.name] for job in kept}
+        kept = {job.name for job in jobs if _is_finished(job, before, output, formats)}
+        jobs = [job for job in jobs if job.name not in kept]
+        rows |= {name: before[name] for name in kept}
         if kept:
             print(f"{len(kept)} of {len(recordings)} recordings are finished; --force does again")
     remarks = _track_all(jobs, rows, output, formats, options.jobs)
-    for name, row in rows.items():
+    for row in rows.values():
         if row.status == FAILED:
-            _remove(output, name)
+            _remove(output, row.recording)
     _write_rows(output / SUMMARY, rows.values())
     for name, lines in sorted(remarks.items()):
         for line in lines:
@@ -279,8 +271,8 @@ def _prepared(
     return job._replace(request=request, progress=progress, number=number)
 
 
-def track_job(job: Job) -> Outcome:
-    """Track one recording on one thread; a failure is part of the outcome."""
+def track_job(job: Job) -> tuple[Job, Row, list[str]]:
+    """Track one recording on one thread; return its row, also of a failure, and printed lines."""
     cv2.setNumThreads(1)
     show = job.progress.of_task(job.number) if job.progress else lambda _: None
     printed = io.StringIO()
@@ -291,7 +283,7 @@ def track_job(job: Job) -> Outcome:
         # A fault of the program in one recording must not stop a hundred others.
         row = Row.failed(job.name, error)
     show(1.0)
-    return Outcome(job, row, printed.getvalue().splitlines())
+    return job, row, printed.getvalue().splitlines()
 
 
 def _publish(job: Job, output: Path) -> None:

@@ -149,7 +149,7 @@ def test_a_recording_that_is_none_is_reported_with_the_rest(tmp_path: Path) -> N
 
 
 def test_films_are_known_by_their_content(tmp_path: Path) -> None:
-    """Images are a film; a folder without any, or a file of another kind, is reported when it is opened."""
+    """Images are a film; a file of another kind is refused only when it is opened."""
     cv2.imwrite(str(tmp_path / "1.png"), np.zeros((8, 8), np.uint8))
     assert "--fov DEG" in refused(tmp_path, "--stature", 1.7)
     (tmp_path / "text.txt").touch()
