@@ -9,8 +9,15 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cardbox_tracker.commands.output_paths import add_force, check_outputs
-from cardbox_tracker.commands.tracking import add_inputs, inputs_of, track_inputs
+from cardbox_tracker.commands.arguments import add_force, check_outputs
+from cardbox_tracker.commands.request import (
+    OptionsError,
+    TrackingRequest,
+    add_tracking,
+    inputs_of,
+    tracking_request,
+)
+from cardbox_tracker.commands.tracking import track
 from cardbox_tracker.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
@@ -25,43 +32,36 @@ _TRUTH = "ground_truth.json"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``cardbox view``."""
     parser.add_argument("--live", action="store_true", help="show the results of the running nodes")
-    parser.add_argument(
-        "--save", type=Path, default=None, metavar="FILE.rrd", help="write a file for the viewer"
-    )
+    parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a file for the viewer")
     parser.add_argument(
         "--web", action="store_true", help="serve the viewer to a browser on this computer"
     )
     parser.add_argument(
         "--truth",
         type=Path,
-        default=None,
         metavar="FILE",
         help=f"{_TRUTH} of the recording, to plot the error; not needed if it lies beside BAG",
     )
     parser.add_argument(
         "--beside",
         type=Path,
-        default=None,
         metavar="RESULTS",
         help="second bag of results of the same recording, such as with other settings, to show "
         "beside the first",
     )
-    add_inputs(parser, needs_recording=False, needs_person=False)
+    add_tracking(parser, needs_recording=False)
     add_force(parser)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes.
-
-    Raises:
-        CardboxError: rerun-sdk is not installed, or the input cannot be read.
-    """
+    """Show a bag of results, a recording that is tracked meanwhile, or the running nodes."""
     if options.live == (options.recording is not None):
         raise CardboxError("expected either BAG or --live")
     inputs = *inputs_of(options), options.truth, options.beside
     check_outputs((options.save,), options.force, inputs=inputs)
     # A wrong input is reported before a missing library or display.
     results = [] if options.live else _results_of(options)
+    request = None if options.live or results else _request_of(options)
     if options.beside is not None and not results:
         raise CardboxError(
             "--beside needs a bag of results as BAG; 'cardbox track --bag' writes one"
@@ -79,8 +79,8 @@ def run(options: argparse.Namespace) -> None:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
         if options.live:
             _show_nodes(Scene(stream))
-        elif not results:
-            count = _track(options, Scene(stream, truth=truth))
+        elif request is not None:
+            count = _track(request, Scene(stream, truth=truth))
             print(f"shown: {count} images with a posture", flush=True)
         scenes = [Scene(stream, column, first_ns, truth) for column in shown[: len(results)]]
         for column, count in zip(shown, _show_results(results, scenes), strict=False):
@@ -106,7 +106,7 @@ def _results_of(options: argparse.Namespace) -> list[Path]:
     """Return the bags of results to show; none if the recording is to be tracked.
 
     Raises:
-        CardboxError: the recording cannot be read, or options are missing.
+        CardboxError: the recording cannot be read.
     """
     from cardbox_tracker.recordings.bag_reader import BagReader
     from cardbox_tracker.recordings.open_images import is_bag
@@ -116,13 +116,22 @@ def _results_of(options: argparse.Namespace) -> list[Path]:
         with BagReader(options.recording) as bag:
             if has_results(bag):
                 return [path for path in (options.recording, options.beside) if path is not None]
-    missing = [] if options.stature is not None else _missing(options)
-    if missing:
+    return []
+
+
+def _request_of(options: argparse.Namespace) -> TrackingRequest:
+    """Return what is tracked in a recording without results.
+
+    Raises:
+        CardboxError: options are missing or wrong.
+    """
+    try:
+        return tracking_request(options)
+    except OptionsError as error:
         raise CardboxError(
             f"{options.recording} has no results to show; give a bag of 'cardbox track --bag', or "
-            f"--{', --'.join(missing)} as for 'cardbox track', to track it now"
-        )
-    return []
+            f"the options of 'cardbox track', to track it now: {error}"
+        ) from None
 
 
 def _names_of(results: Sequence[Path]) -> list[str]:
@@ -173,23 +182,13 @@ def _show_results(paths: Sequence[Path], scenes: Sequence[Scene]) -> list[int]:
         return show_together(list(zip(bags, scenes, strict=False)), show)
 
 
-def _track(options: argparse.Namespace, scene: Scene) -> int:
-    """Track the recording and show it; return the number of images with a posture."""
+def _track(request: TrackingRequest, scene: Scene) -> int:
+    """Track a recording and show it; return the number of images with a posture."""
     from cardbox_tracker.applications.viewing.sources import ShownTracking
 
     shown = ShownTracking(scene)
-    track_inputs(options, observers=(shown,))
+    track(request, observers=(shown,))
     return shown.count
-
-
-def _missing(options: argparse.Namespace) -> list[str]:
-    """Return the names of the options that tracking needs."""
-    from cardbox_tracker.recordings.open_images import is_bag
-
-    sources = options.within, options.silhouettes, options.detector
-    is_empty_needed = is_bag(options.recording) and sources == (None, None, None)
-    needed = ("model", "start", *(["background"] if is_empty_needed else []))
-    return [name for name in needed if getattr(options, name) is None]
 
 
 def _truth_beside(bag: Path) -> Path | None:

@@ -53,9 +53,9 @@ def result_writer(path: Path, overwrite: bool = False) -> BagWriter:
 
 @contextmanager
 def result_bag(
-    path: Path | None, frame_id: str, overwrite: bool = False, draw: Draw | None = None
+    path: Path, frame_id: str, overwrite: bool = False, draw: Draw | None = None
 ) -> Iterator[Observer]:
-    """Context of an observer that writes the outputs of each image to a bag, if it has a path.
+    """Context of an observer that writes the outputs of each image to a bag.
 
     The bag appears on exit; after an error there is none.
 
@@ -68,9 +68,6 @@ def result_bag(
     Raises:
         BagError: ``path`` exists and may not be replaced.
     """
-    if path is None:
-        yield lambda *_: None
-        return
     with result_writer(path, overwrite) as writer:
         yield _ResultBag(writer, frame_id, draw)
 

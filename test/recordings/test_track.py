@@ -320,11 +320,3 @@ def test_after_an_error_no_bag_is_left(recording: Any, tmp_path: Path) -> None:
     ):
         raise RuntimeError("half way")
     assert os.listdir(tmp_path) == []
-
-
-def test_without_a_path_there_is_no_bag(
-    recording: Any, source: SilhouetteSource, tmp_path: Path
-) -> None:
-    with result_bag(None, source.frame_id) as results:
-        track(recording, source, tmp_path / "person.csv", observers=(results,))
-    assert os.listdir(tmp_path) == ["person.csv"]

@@ -62,18 +62,15 @@ def video_file(path: str | os.PathLike[str], fps: float) -> Iterator[Callable[[I
 
 
 @contextmanager
-def overlay_video(path: Path | None, recording: Recording) -> Iterator[Observer]:
+def overlay_video(path: Path, recording: Recording) -> Iterator[Observer]:
     """Context of an observer that draws each estimate over the image of the first camera.
 
     The video has the rate, the size and the aspect ratio of the recorded images; small images are
-    enlarged to at least 640 px along the longer side. Without a path there is none.
+    enlarged to at least 640 px along the longer side.
 
     Raises:
         CardboxError: the file cannot be written, or its suffix is not .mp4 or .avi.
     """
-    if path is None:
-        yield lambda *_: None
-        return
     try:
         rate_hz = round(1e9 / max(1, recording.first.period_ns()), 2)
     except BagError:
