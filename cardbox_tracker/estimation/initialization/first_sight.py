@@ -14,7 +14,7 @@ determine them. With an image, colours are learned, too (:mod:`.part_colors`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -138,7 +138,8 @@ class _Search:
     ) -> None:
         self._prior, self._camera, self._seen = body, camera, seen
         # A broad person must not be taken for a near one.
-        self._config = config.changed({"whole_body": {"cost": {"x_step_m": _X_STEP_M}}})
+        cost = replace(config.whole_body.cost, x_step_m=_X_STEP_M)
+        self._config = replace(config, whole_body=replace(config.whole_body, cost=cost))
         self._rng = rng
         unknown = body.unknown
         # Standard deviations of distance, hip height and breadths; 0 for known values.
