@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from cardbox_tracker.body import kinematics
 from cardbox_tracker.body.appearance import Appearance, bins_of
 from cardbox_tracker.body.cardbox import cardbox_patches
 from cardbox_tracker.body.model import BodyModel
@@ -24,7 +25,6 @@ from cardbox_tracker.estimation.cost import (
     joint_points_fit,
     joint_points_kernels,
     keypoint_fit_kernels,
-    kinematics,
     outline_fit_kernels,
     pose_prior,
     rasterisation,

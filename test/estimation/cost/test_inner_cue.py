@@ -150,7 +150,7 @@ def test_a_hand_under_the_other_forearm_gains_half() -> None:
 def test_arms_are_projected_as_the_kinematics_place_them(offset: tuple[float, float]) -> None:
     camera = CAMERA.with_pitch(0.2)
     rng = np.random.default_rng(1)
-    postures = np.hstack([rng.uniform(-0.6, 0.6, (20, 12)), np.tile(offset, (20, 1))])
+    postures = np.hstack([rng.uniform(-0.6, 1.2, (20, 12)), np.tile(offset, (20, 1))])
     moved = BODY.with_values(
         distance_m=2.0 - offset[0], hip_height_m=BODY.placement.hip_height_m + offset[1]
     )
@@ -167,7 +167,7 @@ def test_zones_are_where_head_and_torso_are() -> None:
     posture = np.zeros(14)
     posture[[0, 12, 13]] = 0.2, 0.4, 0.1
     moved = BODY.with_values(distance_m=1.6, hip_height_m=BODY.placement.hip_height_m + 0.1)
-    frames = pose(moved.rigid, posture[:12])
+    frames = pose(moved, posture[:12])
     u, v, half_width, half_height, hips, top = ArmView.of(BODY, CAMERA, np.ones(2)).zones(posture)
 
     def pixel(point_m: Any) -> Any:
@@ -301,9 +301,9 @@ def test_a_tracker_follows_a_hand_before_the_torso_with_the_image_only() -> None
     high[4:8] = np.radians((-10, 30, -110, 40))
     way = [(FRONT, low, share) for share in np.linspace(0.0, 1.0, 15)]
     way += [(low, high, share) for share in np.linspace(0.0, 1.0, 15)] + [(low, high, 1.0)] * 5
-    truth = CAMERA.project(CAMERA.reference_to_optical(pose(body.rigid, high).keypoints_m))
+    truth = CAMERA.project(CAMERA.reference_to_optical(pose(body, high).keypoints_m))
     away_px = {}
-    for with_image in True:
+    for with_image in (True, False):
         tracker = Tracker(body, CAMERA, preset, np.random.default_rng(0))
         for begin, end, share in way:
             image, silhouette = drawn((1 - share) * begin + share * end)
