@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.applications.exporting import motion_reader
-from cardbox_tracker.applications.exporting.motion import Motion, read_motion
+from cardbox_tracker.applications.exporting.motion import Motion
+from cardbox_tracker.applications.exporting.motion_reader import read_motion
 from cardbox_tracker.body.kinematics import keypoints_m
 from cardbox_tracker.body.model import BodyModel
 from cardbox_tracker.errors import CardboxError
