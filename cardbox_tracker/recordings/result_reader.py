@@ -120,13 +120,12 @@ class _Results:
                 _with_neck(joints),
                 place_m=place_from(joints),
             )
-        elif (stamp_ns := stamp_ns_of(message)) in self.by_stamp:
-            more: dict[str, FloatArray] = (
-                {"keypoints_m": points_of(message)}
-                if name == _KEYPOINTS
-                else {"stddev": _with_neck(joints_of(message))}
-            )
-            self.by_stamp[stamp_ns] = replace(self.by_stamp[stamp_ns], **more)
+        elif (found := self.by_stamp.get(stamp_ns_of(message))) is not None:
+            if name == _KEYPOINTS:
+                found = replace(found, keypoints_m=points_of(message))
+            else:
+                found = replace(found, stddev=_with_neck(joints_of(message)))
+            self.by_stamp[found.stamp_ns] = found
 
 
 def _with_neck(joints: JointValues) -> FloatArray:

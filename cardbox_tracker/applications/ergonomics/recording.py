@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -189,7 +189,7 @@ class RulaSummary:
 
 def summarize(rows: Sequence[RulaRow]) -> RulaSummary:
     """Return the expected time spent at each score."""
-    time_s = _time_at(rows, lambda scores: scores.grand, HIGHEST)
+    time_s = _time_at(rows, "grand", HIGHEST)
     total_s = float(time_s.sum())
     scored_s = durations_of(rows) * [row.scores is not None for row in rows]
     return RulaSummary(
@@ -231,13 +231,13 @@ class ScoreShares(NamedTuple):
 
 def score_shares(rows: Sequence[RulaRow], config: RulaConfig) -> tuple[ScoreShares, ...]:
     """Return the time at each score: the grand score, measured parts and tables, declared parts."""
-    grand_s = _time_at(rows, lambda scores: scores.grand, HIGHEST)
+    grand_s = _time_at(rows, "grand", HIGHEST)
     shares = [ScoreShares("grand", "grand score", MIXED, grand_s)]
     necks = {row.is_neck_measured for row in rows if row.scores is not None} or {False}
     neck = MIXED if len(necks) > 1 else (DECLARED, MEASURED)[necks.pop()]
     for name, words, highest, _ in PARTS:
         source = neck if name == "neck" else MIXED if "table" in name else MEASURED
-        time_s = _time_at(rows, lambda scores, name=name: scores.parts[name], highest)
+        time_s = _time_at(rows, name, highest)
         shares.append(ScoreShares(name, words, source, time_s))
     for name, highest in DECLARED_PARTS.items():
         time_s = np.eye(highest)[getattr(config, name) - 1] * grand_s.sum()
@@ -252,13 +252,13 @@ def durations_of(rows: Sequence[RulaRow]) -> FloatArray:
     return np.append(np.clip(steps_s, 0.0, LONGEST_STEP * usual_s), usual_s)[: len(rows)]
 
 
-def _time_at(
-    rows: Sequence[RulaRow], chances: Callable[[ScoreDistribution], FloatArray], highest: int
-) -> FloatArray:
-    """Return the expected time (highest,) at each score, s."""
-    nothing = np.zeros(highest)
-    found = [nothing if row.scores is None else chances(row.scores) for row in rows]
-    return np.asarray(durations_of(rows) @ np.reshape(found, (-1, highest)))
+def _time_at(rows: Sequence[RulaRow], part: str, highest: int) -> FloatArray:
+    """Return the expected time (highest,) at each score of a part, or of the grand score, s."""
+    found = np.zeros((len(rows), highest))
+    for chances, row in zip(found, rows, strict=True):
+        if row.scores is not None:
+            chances[:] = row.scores.grand if part == "grand" else row.scores.parts[part]
+    return np.asarray(durations_of(rows) @ found)
 
 
 def write_shares(shares: Sequence[ScoreShares], path: Path) -> None:
@@ -288,9 +288,10 @@ def _fields(row: RulaRow) -> list[str]:
     stamp, scores = str(row.stamp_ns), row.scores
     if scores is None:
         return [stamp, row.state, *[""] * (len(CSV_HEADER) - 2)]
-    mean, *others = scores.mean, scores.chance_above(ABOVE), *scores.grand.tolist()
-    parts = [scores.left, scores.right, *(scores.parts[part.name] for part in PARTS)]
-    others += map(expected, parts)
-    neck = MEASURED if row.is_neck_measured else DECLARED
-    values = (f"{value:.3f}" for value in others)
-    return [stamp, row.state, f"{mean:.3f}", str(scores.likeliest), *values, neck]
+    of_parts = [scores.left, scores.right, *(scores.parts[part.name] for part in PARTS)]
+    values = (scores.chance_above(ABOVE), *scores.grand.tolist(), *map(expected, of_parts))
+    return [
+        *(stamp, row.state, f"{scores.mean:.3f}", str(scores.likeliest)),
+        *(f"{value:.3f}" for value in values),
+        MEASURED if row.is_neck_measured else DECLARED,
+    ]

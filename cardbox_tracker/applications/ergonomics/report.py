@@ -164,7 +164,7 @@ def score_plot(rows: Sequence[RulaRow], moments: Sequence[RulaRow] = ()) -> byte
         (_UNCERTAIN_COLOUR, [row.state == UNCERTAIN for row in rows]),
         (_NOTHING_COLOUR, [row.scores is None for row in rows]),
     ):
-        spans = np.stack([time_s, durations_s], axis=1)[is_marked]
+        spans = [*zip(time_s[is_marked], durations_s[is_marked], strict=True)]
         axes.broken_barh(spans, (0.5, 0.2), color=colour)
     for number, row in enumerate(moments, 1):
         at = (row.time_s, row.worst)

@@ -148,7 +148,7 @@ class _BoundedBuilder(Xml.TreeBuilder):
         super().__init__()
         self._source, self._counts = source, dict.fromkeys(_MOST, 0)
 
-    def start(self, tag: str, attributes: Mapping[str, str]) -> Xml.Element:  # type: ignore[override]
+    def start(self, tag: str, attributes: Mapping[str, str]) -> Xml.Element:
         """Count an element; the joints of a robot lie in its root, others in transmissions."""
         is_joint = tag == "joint" and self._counts["levels of nested elements"] == 1
         freedoms = _FREEDOMS.get(attributes.get("type", ""), 1)
